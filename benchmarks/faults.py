@@ -25,7 +25,7 @@ from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import read_checked
 from flexclear.pipeline.core.artifacts.store import Store, read_record
 from flexclear.pipeline.core.workflow.journal import Journal, State
-from flexclear.pipeline.dynamics.compile.files import compiled
+from flexclear.pipeline.dynamics.compile.files import CODE, compiled
 
 SCENE = "checks/pendulum"
 #: what is killed, and which share of all kills; a sweep of a scene that takes some seconds
@@ -106,8 +106,7 @@ def _damage(folder: Path, rng: random.Random, flips: int, cuts: int) -> dict[str
         "memo of imports": [(path, _table(path)) for path in [store.root / "cache" / "imports.json"]],
         "generated sources": [(path, _kernel(path)) for path in kernels],
         "digests of kernels": [(path.with_suffix(".sum"), _kernel(path)) for path in kernels],
-        "index of the compiler": [(p, _kernel(k)) for k in kernels for p in k.parent.rglob(f"{k.stem}*.nbi")],
-        "compiled code": [(p, _kernel(k)) for k in kernels for p in k.parent.rglob(f"{k.stem}*.nbc")],
+        "compiled code": [(path.with_suffix(CODE), _kernel(path)) for path in kernels],
     }
     kinds["unfinished work"] = [(path, _piece(path)) for path in _unfinished(folder)]
     return {

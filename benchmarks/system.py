@@ -47,5 +47,13 @@ def limit_files(size: int) -> Callable[[], None]:
 
 
 def ended_by(exit_code: int) -> str:
-    """Name of the signal that ended a process, such as SIGSEGV; empty when it was none."""
-    return signal.Signals(-exit_code).name if exit_code < 0 else ""
+    """Name of the signal that ended a process, such as SIGSEGV; empty when it was none.
+
+    Real-time signals but the first and the last have no name: they are told by their number.
+    """
+    if exit_code >= 0:
+        return ""
+    try:
+        return signal.Signals(-exit_code).name
+    except ValueError:
+        return f"signal {-exit_code}"

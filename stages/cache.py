@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
+from stat import S_ISREG
 
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.paths import kernel_root
@@ -47,35 +50,45 @@ def _size(options: argparse.Namespace) -> None:
         sizes.setdefault(artifact.record.stage.partition("/")[0], []).append(artifact.size)
     for stage, each in sorted(sizes.items()):
         print(f"{stage:<12} {len(each):>6} artifacts {_megabytes(sum(each))}")
-    kernels = [path for path in kernel_root().rglob("*") if path.is_file()]
-    shown = [p for p in store.root.rglob("*") if p.is_file() and (store.root / "cache") not in p.parents]
-    for name, paths in (("kernels", kernels), ("shown", shown), ("orphans", list(found.orphans))):
-        print(f"{name:<12} {len(paths):>6} files     {_megabytes(sum(path.stat().st_size for path in paths))}")
+    shown = [path for path in store.root.rglob("*") if (store.root / "cache") not in path.parents]
+    for name, paths in (("kernels", kernel_root().rglob("*")), ("shown", shown), ("orphans", found.orphans)):
+        sizes_there = _sizes(paths)
+        print(f"{name:<12} {len(sizes_there):>6} files     {_megabytes(sum(sizes_there))}")
     print(f"results in {store.root}, kernels in {kernel_root()}")
 
 
+def _sizes(paths: Iterable[Path]) -> list[int]:
+    """Sizes of those that are files [bytes]; what others remove meanwhile, as locks, is none any more."""
+    found = []
+    for path in paths:
+        with suppress(FileNotFoundError):
+            facts = path.stat()
+            if S_ISREG(facts.st_mode):
+                found.append(facts.st_size)
+    return found
+
+
 def _check(options: argparse.Namespace) -> None:
+    from flexclear.pipeline.dynamics.compile import files
+
     store = workplace().store
     found = upkeep.inventory(store, whole=True)
     # one without a sum has not been compiled yet, or is about to be
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
-    faults = [*found.damaged, *(f"{path} is damaged" for path in kernels if not _kernel_whole(path))]
+    others = [path for path in kernels if files.of_another_build(path)]
+    damaged = [path for path in kernels if path not in set(others) and not files.compiled(path)]
+    faults = [*found.damaged, *(f"{path} is damaged" for path in damaged)]
     for fault in faults[:SHOWN]:
         print(shown(fault))
     if len(faults) > SHOWN:
         print(f"... and {len(faults) - SHOWN} more")
     told = f"{len(found.artifacts)} artifacts, {len(faults)} faults, {len(found.orphans)} files without a record"
-    print(f"{told}; {len(kernels)} compiled kernels")
+    unused = f", {len(others)} of another build, which nothing uses" if others else ""
+    print(f"{told}; {len(kernels)} compiled kernels{unused}")
     if faults:
         raise ResourceError(
             "damaged files are never used: what needs them makes them again; `cache prune` removes them"
         )
-
-
-def _kernel_whole(path: Path) -> bool:
-    from flexclear.pipeline.dynamics.compile.files import compiled
-
-    return compiled(path)
 
 
 def _explain(options: argparse.Namespace) -> None:

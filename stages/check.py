@@ -8,7 +8,6 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -166,11 +165,10 @@ def _assembled(scene: Scene) -> None:
     Of bodies from recipes of beams, which are meshed in no time, mass and frames are known without their modes; of
     flexible ones it is looked whether the joints fit where nothing is deformed.
     """
-    from flexclear.pipeline.core.registry import module_of
-    from flexclear.pipeline.dynamics.effects import STARTS
     from flexclear.pipeline.dynamics.model.assembly import assembled
     from flexclear.pipeline.dynamics.model.mechanism import build
     from flexclear.pipeline.dynamics.model.model import tabulate
+    from flexclear.pipeline.dynamics.run.run import placed
 
     bodies = {name: _undeformed(Path(mesh)) for name, mesh in scene.recipes().items()}
     meshed = {f"{s3_rigid.PREFIX}{name}": bodies[name] for name in scene.meshed()}
@@ -178,8 +176,7 @@ def _assembled(scene: Scene) -> None:
         table = scene.model_dump(mode="python", exclude_none=True)
         table["body"] = s3_rigid.filled(table["body"], meshed)
         scene = type(scene).model_validate(table)
-    if scene.start is not None and scene.start.at is not None:
-        scene = import_module(module_of(STARTS, scene.start.at)).placed(scene)
+    scene = placed(scene)
     if scene.flexible():
         assembled(build(scene, {name: bodies[name] for name in scene.flexible()}))
     else:

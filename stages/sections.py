@@ -11,7 +11,7 @@ from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.stages import as_json, limit, run
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check, workplace
+from flexclear.stages.workplace import Workplace, check, said_arguments, workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -29,6 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
     parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
     limit.argument(parser)
+    said_arguments(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
     as_json.json_argument(parser)
 

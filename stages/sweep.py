@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
 from flexclear.stages import limit, run, sweep_large, sweep_plan
 from flexclear.stages.sweep_engine import Engine, Job, engine, now
-from flexclear.stages.workplace import Workplace, near, workplace
+from flexclear.stages.workplace import Workplace, near, said_arguments, workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,6 +41,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster with this scheduler instead")
     parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset here (one sweep); .zarr: as Zarr")
     limit.argument(parser)
+    said_arguments(parser)
 
 
 def command(options: argparse.Namespace) -> None:

@@ -35,8 +35,13 @@ def common_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--jobs", type=int, metavar="N", help="processes at most; default: one for each core")
     limit.argument(parser)
+    said_arguments(parser)
+
+
+def said_arguments(parser: argparse.ArgumentParser) -> None:
+    """How much is said."""
     said = parser.add_mutually_exclusive_group()
-    said.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors and results")
+    said.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors, warnings and results")
     said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
 
 

@@ -50,15 +50,16 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _measured(seed: int, number: int, folder: Path) -> Record:
-    from flexclear.stages import plan, run, s8_plan
+    from flexclear.stages import plan, s8_plan
+    from flexclear.stages.workplace import check, workplace
 
     made = drawn(seed, number, folder / "recipes")
     scene, told = made.scene, dict(made.told)
-    place = run.workplace()
+    place = workplace()
     try:
         task = s8_plan.task(scene)
         outcome = place.bring(list(task.inputs.values()), 1)
-        run.check(outcome)
+        check(outcome)
         inputs = {name: place.store.load(outcome.records[id(below)]) for name, below in task.inputs.items()}
         params = {**task.params, **task.context}
         decided, planning = _planned(params, inputs)

@@ -12,14 +12,15 @@ from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.stages import run as stages
+from flexclear.stages.workplace import Workplace, workplace
 
 TREE = Path(__file__).resolve().parents[2]
 Overrides = tuple[tuple[str, object], ...]
 
 
 @cache
-def _place() -> stages.Workplace:
-    return stages.workplace()
+def _place() -> Workplace:
+    return workplace()
 
 
 def bundles(scene: Scene) -> dict[str, xr.Dataset]:

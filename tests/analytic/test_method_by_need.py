@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,6 +14,8 @@ from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.wanted import parse
 from flexclear.pipeline.dynamics.effects import schemes
+from flexclear.pipeline.dynamics.run.accuracy import FINER, Attempt, Search
+from flexclear.pipeline.dynamics.run.pace import Look, limited, pace
 from flexclear.pipeline.dynamics.run.suited import Rates, Suit
 from tests.analytic.mechanism_runs import TREE, bundles
 
@@ -74,7 +77,8 @@ def test_tighter_tolerances_give_smaller_errors_where_modes_ring() -> None:
 
 
 def known(**seen: tuple[float, float]) -> Suit:
-    return Suit(Rates(6e4, 20.0), 0.18, ("dop853", "exponential", "radau"), dict(seen))
+    runs = {name: dict([run]) for name, run in seen.items()}
+    return Suit(Rates(6e4, 20.0), 0.18, ("dop853", "exponential", "radau"), runs)
 
 
 def test_what_a_run_took_decides_about_the_next() -> None:
@@ -104,6 +108,88 @@ def test_a_guess_that_runs_correct_is_not_repeated() -> None:
     suit.learn(1e-4, "dop853", xr.Dataset(attrs={"method": "radau", "evaluations": 1}))
     assert suit.best(1e-4) == "radau"
     assert "stability limited the steps of dop853 in a run before" in suit.why(1e-4)
+
+
+def test_what_is_too_dear_at_a_tight_tolerance_is_taken_again_at_a_loose_one() -> None:
+    suit = known(exponential=(1e-5, 1200.0))
+    suit.learn(1e-7, "exponential", xr.Dataset(attrs={"method": "dop853", "evaluations": 26_000}))
+    assert suit.best(1e-7) != "exponential"
+    assert suit.best(1e-4) == "exponential"
+
+
+def test_where_the_explicit_method_is_dear_the_stiff_one_is_tried() -> None:
+    dear = known(exponential=(1e-4, 3e5), dop853=(1e-4, 9e4))
+    assert dear.best(1e-4) == "radau"
+    assert known(exponential=(1e-4, 3e5), dop853=(1e-4, 2e3)).best(1e-4) == "dop853"
+    dear.learn(1e-4, "radau", xr.Dataset(attrs={"method": "radau", "evaluations": 26_000}))
+    assert dear.best(1e-4) == "radau"
+    # evaluations of the low order grow fast with the tolerance
+    assert dear.best(1e-14) == "dop853"
+
+
+def test_a_run_that_was_handed_on_tells_what_its_last_method_took() -> None:
+    early, late = known(exponential=(1e-4, 5e4)), known(exponential=(1e-4, 5e4))
+    for suit, left in ((early, (4e4, 0.2)), (late, (4e4, 0.97))):
+        suit.told["exponential"], suit.left = 9e4, left
+        suit.learn(1e-5, "exponential", xr.Dataset(attrs={"method": "radau", "evaluations": 44_000}))
+    assert early.seen["radau"] == {1e-5: pytest.approx(5000.0)}
+    assert "radau" not in late.seen
+
+
+def looks(*pairs: tuple[float, int], stiff: float = 0.0) -> list[Look]:
+    """Of a run that was at times [s] after so many evaluations, twelve a step, a share of the steps being stiff."""
+    return [Look(time, used, used // 12, int(stiff * used / 12)) for time, used in pairs]
+
+
+def test_a_pace_that_drops_late_is_told_when_that_has_cost_as_much_as_all_before() -> None:
+    even, late = [(0.1 * k, 100 * k) for k in range(9)], [(0.8 + 1e-6 * k, 800 + 100 * k) for k in range(1, 9)]
+    assert pace(looks(*even), 500) == pytest.approx(1000.0)
+    assert pace(looks(*even, *late[:7]), 500) < 1e4
+    assert pace(looks(*even, *late), 500) == pytest.approx(1e8)
+
+
+def test_a_hasty_start_and_a_single_impact_tell_little() -> None:
+    start = [(0.0, 0), (1e-6, 500), (0.5, 1000), (1.0, 1500)]
+    assert pace(looks(*start), 5000) == pytest.approx(1000.0, rel=1e-3)
+    impact = [(0.0, 0), (0.5, 100), (0.5 + 1e-6, 1100)]
+    assert pace(looks(*impact), 5000) == pytest.approx(2200.0, rel=1e-3)
+
+
+def test_stability_is_looked_for_in_the_steps_of_late() -> None:
+    smooth, stiff = looks((0.0, 0), (0.5, 6000)), Look(0.6, 18_000, 1500, 900)
+    assert not limited(smooth)
+    assert limited([*smooth, Look(0.55, 12_000, 1000, 450), stiff])
+
+
+def searched(method: str, loose: int, tight: int) -> Search:
+    """Of which a run and one at a hundredth of its tolerance have been made."""
+    runs = {1e-4: (method, loose), 1e-4 * FINER: ("dop853", tight)}
+    made = {at: xr.Dataset(attrs={"method": name, "evaluations": n}) for at, (name, n) in runs.items()}
+    return Search(load_scene(RIGID), lambda scene, judges: xr.Dataset(), runs=made)
+
+
+def test_a_looser_tolerance_is_tried_only_where_it_saves() -> None:
+    """Where stability limits the steps it does not, where accuracy does the order tells how much."""
+    assert not searched("dop853", 10_000, 10_500).saves(1e-4, 1e-2)
+    assert searched("dop853", 10_000, 20_000).saves(1e-4, 1e-2)
+    assert not searched("dop853", 10_000, 20_000).saves(1e-4, 2e-4)
+
+
+def test_the_more_accurate_run_is_delivered_where_it_was_the_cheaper() -> None:
+    dear = searched("exponential", 80_000, 12_000)
+    attempt = Attempt(1e-4, dear.runs[1e-4], {"platform.velocity": 1e-3}, 0.2)
+    assert dear.cheapest(attempt).run.attrs["evaluations"] == 12_000
+    assert dear.cheapest(replace(attempt, share=2.0)).run is attempt.run
+
+
+def test_overdamped_modes_are_followed_as_those_that_ring() -> None:
+    """Twice the critical damping: its two decays are both exact, so that they limit no step."""
+    damped = {**SHORT, "body.rod1.damping": 2.0}
+    made = simulated(load_scene(RINGING, {**damped, "solver": {"integrator": "exponential", "rtol": 1e-5}}))
+    known = simulated(load_scene(RINGING, {**damped, "solver.rtol": 1e-11}))
+    error = np.abs(made.velocity - known.velocity).sel(body="platform").max() / np.abs(known.velocity).max()
+    assert float(error) < 1e-6  # 1.2e-8 here, of a tolerance of 1e-5 per step
+    assert made.evaluations < 0.5 * known.evaluations  # 832 of 7821 here; as many as those when damping was cut
 
 
 @pytest.mark.parametrize("given, chosen", [(True, True), (False, False)])

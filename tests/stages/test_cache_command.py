@@ -104,3 +104,17 @@ def test_what_an_artifact_was_made_from_is_told(store: Store, capsys: pytest.Cap
     assert main(["cache", "explain", "b"]) == 2
     assert main(["cache", "size"]) == 0
     assert "simulate          1 artifacts" in capsys.readouterr().out
+
+
+def test_kernels_of_another_build_are_told_and_are_no_damage(store: Store, capsys: pytest.CaptureFixture[str]):
+    """Their sums name other files than source and code; one of this build whose code is another's is damaged."""
+    folder = store.root.parent / "kernels" / "abc"
+    folder.mkdir(parents=True)
+    for name, ends in (("old", (".py", ".nbi")), ("bad", (".py", ".code"))):
+        (folder / f"flexclear_{name}.py").write_text("")
+        (folder / f"flexclear_{name}.sum").write_bytes(checked({f"flexclear_{name}{end}": "1" for end in ends}))
+    assert main(["cache", "check"]) == 4
+    told = capsys.readouterr().out
+    assert "2 compiled kernels, 1 of another build" in told
+    assert "flexclear_bad.py is damaged" in told
+    assert "flexclear_old.py is damaged" not in told

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import sys
@@ -166,6 +167,18 @@ def test_what_a_task_opens_is_noted_by_whoever_opens_it(tmp_path: Path) -> None:
     (tmp_path / "b.dat").read_text()
     assert read.keys() == {"a.dat", "b.dat"}
     assert read == opened.digests(read, tmp_path)
+
+
+def test_where_modules_are_looked_for_is_no_fact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What an import that fails looks into is no file of a task: whole places, and bare names of editable installs."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(opened.tempfile, "gettempdir", lambda: os.devnull)
+    monkeypatch.setattr(sys, "path", ["__editable__.finder.__path_hook__", str(tmp_path / "modules.zip")])
+    with opened.watched(tmp_path) as found:
+        for name in (*sys.path, "data.zip"):
+            with contextlib.suppress(OSError):
+                Path(name).open().close()
+    assert found == {"data.zip": opened.ABSENT}
 
 
 def test_a_project_inside_of_an_environment_is_no_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -43,6 +43,11 @@ def test_what_new_writes_has_no_mistake(kind: str, tmp_path: Path, capsys: pytes
     assert "is there already" in capsys.readouterr().err
 
 
+def test_all_beginnings_fit_into_one_folder(tmp_path: Path) -> None:
+    written = [path for kind in KINDS for path in write(kind, tmp_path)]
+    assert len({path.name for path in written}) == len(written)
+
+
 def test_a_hundred_typical_mistakes_are_all_in_the_table():
     assert len(MISTAKES) >= 100
     assert set(TOLD) == set(MISTAKES)

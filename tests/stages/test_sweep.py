@@ -347,9 +347,10 @@ import sys
 import numpy, xarray
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
-from flexclear.stages import run, sweep_plan
+from flexclear.stages import sweep_plan
+from flexclear.stages.workplace import workplace
 table = {"scene": "x", "keep": ["pin.peak_force"], "vary": {"time.end": [1e-4]}}
-plan = sweep_plan.prepare(sweep_plan.plan(read_sweep(table, "x"), load_scene(sys.argv[1]), "x"), run.workplace())
+plan = sweep_plan.prepare(sweep_plan.plan(read_sweep(table, "x"), load_scene(sys.argv[1]), "x"), workplace())
 import pickle
 (family,), (job,) = plan.families, plan.jobs
 before = set(sys.modules)

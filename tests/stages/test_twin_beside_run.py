@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -278,6 +280,11 @@ def test_what_goes_on_meanwhile_is_ended_with_what_it_goes_on_beside(monkeypatch
         raise KeyError
     assert ended.is_set()
     assert time.monotonic() - began < 0.5 * PATIENCE
+
+
+def test_workers_of_another_program_take_no_second_processor() -> None:
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
+        assert not pool.submit(cores.free).result()
 
 
 @pytest.mark.parametrize("count", [1, 2])

@@ -172,7 +172,10 @@ Source = str | dict[str, str]
 
 
 class Part(BaseModel):
-    """Base of everything a scene may say: frozen, and no unknown keys."""
+    """Base of everything a scene may say: frozen, and no unknown keys.
+
+    Modules of parts evaluate their annotations as they stand: as texts each would be compiled by each command.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 

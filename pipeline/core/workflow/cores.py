@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import copy_context
@@ -31,9 +32,8 @@ def tell(others_idle: bool) -> None:
 
 def free() -> bool:
     """Whether a processor is free, for all that this program knows; in workers of another program none is."""
-    import multiprocessing  # here, since what finds everything fresh must start quickly
-
-    idle = multiprocessing.parent_process() is None if _told is None else _told
+    known = sys.modules.get("multiprocessing.process")  # its workers have imported it; others need not, for 4 ms
+    idle = (known is None or known.parent_process() is None) if _told is None else _told
     return idle and cores() > 1
 
 

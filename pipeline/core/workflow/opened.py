@@ -60,9 +60,10 @@ class Opened:
             raise changed(name)
 
     def _left_out(self, name: str) -> bool:
-        # where modules are looked for there may be archives, which need not be there
-        code = name.endswith(CODE) or name in sys.path
-        return code or name.startswith(self.outside) or f"{os.sep}flexclear_kernels_" in name
+        if name.endswith(CODE) or name.startswith(self.outside) or f"{os.sep}flexclear_kernels_" in name:
+            return True
+        # where modules are looked for there may be archives, which need not be there; editable installs add bare names
+        return name in map(os.path.abspath, sys.path)
 
 
 _current: Opened | None = None

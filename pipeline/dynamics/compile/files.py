@@ -86,6 +86,12 @@ def _fetched(path: Path) -> bool:
     return True
 
 
+def of_another_build(path: Path) -> bool:
+    """Whether what was compiled of a file is kept as another build of the program does: it is whole, and not used."""
+    noted = read_checked(path.with_suffix(".sum"))
+    return noted is not None and set(noted) != {path.name, path.with_suffix(CODE).name}
+
+
 def _digests(path: Path) -> dict[str, str]:
     """Of the source and of the code that was made of it, by name."""
     there = (found for found in (path, path.with_suffix(CODE)) if found.is_file())

@@ -34,8 +34,6 @@ NOTHING, SWEEPS = 1e-13, 20
 SLOW = 1e-6
 #: largest change of a coordinate by which the positions' rates are asked for
 A_LITTLE = 1e-9
-#: most damping of an oscillator, as a share of the critical one; what is more stays outside
-MOST_DAMPING = 0.99
 
 
 def most(h):
@@ -363,7 +361,7 @@ def damp(h, w, o, i, loss):
     total, omega2 = 0.0, w[square(h, o, i)]
     for e in range(count(h)):
         total += w[axes(h, o, i) + e] ** 2 * w[loss + e]
-    return min(omega2 * total, 2.0 * MOST_DAMPING * np.sqrt(omega2))
+    return omega2 * total
 
 
 def make_find_oscillators(retract: Callable) -> Callable:

@@ -21,12 +21,45 @@ from flexclear.pipeline.dynamics.kernels import kernel
 COUNT = 5
 #: below this a + b the series of phi_4 is taken, and the others from it: upwards, division by a leaves rounding
 SERIES, TERMS = 1.0, 14
+#: where (b / 2)^2 - a is more, two decays are told from each other; where it is less, a is not small
+APART = 0.0625
+#: even order to which sine and cosine are expanded in between
+ALIKE = 12
 INVERSE_FACTORIALS = np.array([1.0 / factorial(k) for k in range(COUNT + TERMS)])
 
 
 @kernel
+def decaying(w, out, x):
+    """phi_0(-x), phi_1(-x), ... for a number x >= 0 into every second place of w from place out."""
+    value = 0.0
+    if x < SERIES:
+        for k in range(COUNT + TERMS - 1, -1, -1):
+            value = INVERSE_FACTORIALS[k] - x * value
+            if k < COUNT:
+                w[out + 2 * k] = value
+        return
+    value = np.exp(-x)
+    for k in range(COUNT):
+        w[out + 2 * k] = value
+        value = (INVERSE_FACTORIALS[k] - value) / x
+
+
+@kernel
+def apart(w, out, a, b, root):
+    """As `phi_functions`, of eigenvalues that are real and 2 root apart: by those of each alone."""
+    fast = 0.5 * b + root
+    slow = a / fast
+    decaying(w, out, slow)
+    decaying(w, out + 1, fast)
+    for k in range(COUNT):
+        beta = (w[out + 2 * k] - w[out + 2 * k + 1]) / (2.0 * root)
+        w[out + 2 * k] += slow * beta
+        w[out + 2 * k + 1] = beta
+
+
+@kernel
 def phi_functions(w, out, a, b):
-    """alpha_0, beta_0, alpha_1, ... into w from place out; a = (omega tau)^2, b = d tau with 0 <= b < 2 sqrt(a), or 0.
+    """alpha_0, beta_0, alpha_1, ... into w from place out; a = (omega tau)^2 and b = d tau, neither below 0.
 
     Good to some thousand roundings of 1/k!.
     """
@@ -37,9 +70,18 @@ def phi_functions(w, out, a, b):
             if k < COUNT:
                 w[out + 2 * k], w[out + 2 * k + 1] = alpha, beta
         return
-    root, decay = np.sqrt(a - 0.25 * b * b), np.exp(-0.5 * b)
-    beta = decay * np.sin(root) / root
-    alpha = decay * np.cos(root) + 0.5 * b * beta
+    square, decay = a - 0.25 * b * b, np.exp(-0.5 * b)
+    if square < -APART:
+        apart(w, out, a, b, np.sqrt(-square))
+        return
+    if square > APART:
+        root = np.sqrt(square)
+        alpha, beta = decay * np.cos(root), decay * np.sin(root) / root
+    else:  # the same series, whether it swings or creeps
+        alpha = beta = decay
+        for k in range(ALIKE, 0, -2):
+            alpha, beta = decay - square / ((k - 1) * k) * alpha, decay - square / (k * (k + 1)) * beta
+    alpha += 0.5 * b * beta
     for k in range(COUNT):
         w[out + 2 * k], w[out + 2 * k + 1] = alpha, beta
         rest = alpha - INVERSE_FACTORIALS[k]

@@ -20,6 +20,7 @@ from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.point import Runner
+from flexclear.pipeline.dynamics.run.run import placed
 
 #: starts of pilots with contacts: enough to see whether the motion parts
 MEMBERS = 3
@@ -99,7 +100,7 @@ class Pilots:
     def extent(self) -> Extent:
         """Of the full scene."""
         if self._extent is None:
-            model = tabulate(build(self.scene, self.bundles))
+            model = tabulate(build(placed(self.scene), self.bundles))
             self._extent = Extent(model.mechanism.length, model.nq + model.nv)
         return self._extent
 

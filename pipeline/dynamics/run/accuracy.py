@@ -13,7 +13,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,6 +41,8 @@ ENOUGH, WASTEFUL = 1.0, 1.0 / 3.0
 #: what the next try aims at, between the two
 AIM = 0.6
 TRIES = 12
+#: of the evaluations of a run that is accurate enough, what a looser tolerance must be foreseen to save
+SAVED = 0.25
 #: a run that is refused at a looser tolerance than this is tried again at a share of it
 REFUSED_FOR_GOOD, TIGHTER = 1e-9, 0.1
 #: an error that does not fall below this share when the tolerance falls by FINER has another cause than the steps
@@ -49,7 +51,7 @@ STUCK = 0.3
 
 @dataclass(frozen=True)
 class Attempt:
-    """A run at one tolerance: errors by quantity, as estimated, and the largest as a share of what is wanted."""
+    """A run at one tolerance: estimated errors by quantity, and the largest as a share of what is wanted."""
 
     rtol: float
     run: xr.Dataset
@@ -76,7 +78,7 @@ class Search:
         if self.suit is None:
             return self.once(edited(self.scene, {"solver.rtol": rtol}), {})
         name, why = self.suit.best(rtol), self.suit.why(rtol)
-        run = self.once(edited(self.scene, {"solver.rtol": rtol, "solver.integrator": name}), self.suit.judges())
+        run = self.once(edited(self.scene, {"solver.rtol": rtol, "solver.integrator": name}), self.suit.judges(rtol))
         self.suit.learn(rtol, name, run)
         return run.assign_attrs(method_reason=why)
 
@@ -91,6 +93,25 @@ class Search:
         witnesses = [other, *(r for tolerance, r in self.runs.items() if tolerance <= 0.1 * rtol)]
         errors = {q.name: max(quantities.error(run, r, q) for r in witnesses) for q in wanted}
         return Attempt(rtol, run, errors, max(errors[q.name] / w for q, w in wanted.items()))
+
+    def cheapest(self, found: Attempt) -> Attempt:
+        """The attempt, or the run that told its error, where another method made that for less."""
+        finer = found.rtol * FINER
+        other = self.runs.get(finer)
+        if found.share > ENOUGH or other is None or other.attrs["evaluations"] >= found.run.attrs["evaluations"]:
+            return found
+        return replace(found, rtol=finer, run=other)
+
+    def saves(self, rtol: float, looser: float) -> bool:
+        """Whether a run at a looser tolerance is foreseen to be so much cheaper that it is worth to be made.
+
+        Where stability limits the steps it is not, and it takes two runs to know its error.
+        """
+        before, finer = self.runs[rtol], self.runs.get(max(rtol * FINER, TIGHTEST))
+        if finer is None or finer.attrs["method"] != before.attrs["method"]:
+            return True
+        growth = math.log(finer.attrs["evaluations"] / before.attrs["evaluations"]) / math.log(1.0 / FINER)
+        return (rtol / looser) ** max(growth, 0.0) < 1.0 - SAVED
 
     def wanted(self, run: xr.Dataset) -> dict[Quantity, float]:
         """Wanted accuracy in SI by quantity; relative ones by the size that the quantity has in `run`."""
@@ -121,7 +142,7 @@ def deliver(
     the scene names one.  The dataset's attributes say what was wanted, estimated and met, and why by which integrator.
     """
     search = Search(scene, once, suit)
-    best = _search(search, progress)
+    best = search.cheapest(_search(search, progress))
     wanted = {q.name: w for q, w in search.wanted(best.run).items()}
     met = best.share <= ENOUGH
     verdict = "met" if met else _missed(search, best, wanted)
@@ -166,6 +187,8 @@ def _search(search: Search, progress: Progress) -> Attempt:
             if rtol <= TIGHTEST:
                 break
         rtol = _next(rtol, now.share, enough, too_loose)
+        if enough is not None and not search.saves(enough.rtol, rtol):
+            return enough
         if enough is not None and too_loose < 1.05 * enough.rtol:
             break  # the error jumps between two neighbouring tolerances
     return enough or nearest  # type: ignore[return-value]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import refusal
@@ -13,30 +14,62 @@ from flexclear.pipeline.dynamics.run.engine import Engine
 TRIAL, HOPELESS = 400_000, 10_000_000
 
 
+class Look(NamedTuple):
+    """Where a run was when it was looked at: time [s], and counts of evaluations, steps and steps that were stiff."""
+
+    time: float
+    evaluations: int
+    steps: int
+    stiff: int
+
+
 @dataclass(frozen=True)
 class Judge:
     """Who looks at a run now and then, whether another method should go on with it.
 
-    every: evaluations between two looks.  verdict: why another one should, or nothing.
+    every: evaluations between two looks.  verdict: why another one should, or nothing; given the looks so far, too, of
+    which the first is where the method began and the last the present one.
     """
 
     every: int
-    verdict: Callable[[Engine], str]
+    verdict: Callable[[Engine, Sequence[Look]], str]
 
 
-def foreseen(engine: Engine) -> float:
-    """Evaluations of the whole run, at the pace so far."""
-    return float(engine.n[m.EVALUATIONS] / max((engine.control[m.TIME] - engine.start) / engine.control[m.SPAN], 1e-12))
+def look(engine: Engine) -> Look:
+    """Where the run is now."""
+    n = engine.n
+    counts = (int(n[k]) for k in (m.EVALUATIONS, m.STEPS, m.STIFF_STEPS))
+    return Look(float(engine.control[m.TIME]), *counts)
 
 
-def limited(engine: Engine) -> bool:
-    """Whether stability, not accuracy, limits the steps that the method chooses."""
-    return bool(engine.n[m.STIFF_STEPS] > refusal.STIFF_SHARE * engine.n[m.STEPS])
+def half(looks: Sequence[Look]) -> Look:
+    """The last look at which at most half of what the method has used by now was used."""
+    middle = 0.5 * (looks[0].evaluations + looks[-1].evaluations)
+    return next(one for one in reversed(looks) if one.evaluations <= middle)
 
 
-def crawls(engine: Engine) -> str:
+def pace(looks: Sequence[Look], patience: float) -> float:
+    """Evaluations per second of motion by which to judge a method: as of late, since half of its evaluations.
+
+    patience: evaluations up to which the average counts where it is less; a hasty start or a single impact tell little.
+    """
+    first, middle, now = looks[0], half(looks), looks[-1]
+    average, late = (
+        (now.evaluations - since.evaluations) / max(now.time - since.time, 1e-300) for since in (first, middle)
+    )
+    return late if now.evaluations - first.evaluations > patience else min(average, late)
+
+
+def limited(looks: Sequence[Look]) -> bool:
+    """Whether of late stability, not accuracy, limits the steps that the method chooses."""
+    before, now = half(looks), looks[-1]
+    return now.stiff - before.stiff > refusal.STIFF_SHARE * (now.steps - before.steps)
+
+
+def crawls(engine: Engine, looks: Sequence[Look]) -> str:
     """Why the run would take far too long, where stability limits the steps; else nothing."""
-    n, control = engine.n, engine.control
-    if not engine.method.traits.hands_over_to or control[m.FIXED] or n[m.EVALUATIONS] < TRIAL:
+    n, control, now = engine.n, engine.control, looks[-1]
+    if not engine.method.traits.hands_over_to or control[m.FIXED] or now.evaluations < TRIAL or not limited(looks):
         return ""
-    return refusal.stiffness(n, control) if limited(engine) and foreseen(engine) > min(HOPELESS, n[m.CAP]) else ""
+    whole = now.evaluations + pace(looks, TRIAL) * (engine.end - now.time)
+    return refusal.stiffness(n, control) if whole > min(HOPELESS, n[m.CAP]) else ""

@@ -20,6 +20,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.folder import processor
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.pace import Look
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.collocation import Collocation
@@ -38,6 +39,7 @@ class Tape:
     """The arrays of one integration; rows and events may be replaced by larger ones.
 
     doubted: flexible bodies of which has been said that they left the range of their modes.
+    looks: where the run was when its pace was looked at, and where it began.
     """
 
     outputs: np.ndarray
@@ -47,6 +49,7 @@ class Tape:
     collocations: list[Collocation] = field(default_factory=list)
     passes: list[Pass] = field(default_factory=list)
     doubted: set[str] = field(default_factory=set)
+    looks: list[Look] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,7 @@ class Piece:
             "collocations": [[laid.start, laid.span, laid.evaluations] for laid in tape.collocations],
             "passes": [[getattr(one, item.name) for item in fields(one)] for one in tape.passes],
             "doubted": sorted(tape.doubted),
+            "looks": [list(one) for one in tape.looks],
             "straight": [list(rows) for rows in self.engine.straight.rows],
         }
         return State(arrays, notes, tape.rows[: n[m.N_RECORDED]], journal.seconds() - self.begun)
@@ -137,6 +141,7 @@ class Piece:
             ],
             [Pass(*one) for one in notes["passes"]],
             set(notes["doubted"]),
+            [Look(*one) for one in notes["looks"]],
         )
         tape.rows[: len(found.grown)], tape.events[: len(arrays["events"])] = found.grown, arrays["events"]
         self.engine.straight.rows[:] = [bytes(rows) for rows in notes["straight"]]

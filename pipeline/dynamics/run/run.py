@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
+from importlib import import_module
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from flexclear.pipeline.core.errors import SolverError, StoppedError
 from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.registry import lookup, module_of
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
@@ -64,8 +65,16 @@ class Run:
 
 
 def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Engine:
-    """The compiled engine of a scene."""
-    return prepare(tabulate(build(scene, bundles)), progress)
+    """The compiled engine of a scene where its run begins; paths are not looked for."""
+    return prepare(tabulate(build(begun(scene, bundles, progress)[0], bundles)), progress)
+
+
+def placed(scene: Scene) -> Scene:
+    """The scene whose joints and drives place the bodies where the run begins: itself, unless it begins elsewhere."""
+    if scene.start is None or scene.start.at is None:
+        return scene
+    found: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
+    return found
 
 
 def driven(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
@@ -176,13 +185,14 @@ def follow(
 ) -> Followed:
     """The trajectory from a consistent start y, the engine that came to its end, and why it is another; else nothing.
 
-    other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: see `integrate`.
+    other: gives the engine that takes over by its integrator, asked only when it is needed.  judges: see `integrate`;
+    none looks at an integrator that a run comes back to.
     stop, outputs: as of `trajectory.integrate`.
     """
-    left, reasons = None, list[str]()
+    left, reasons, judges = None, list[str](), dict(judges or {})
     while True:
         traits = engine.method.traits
-        judge, heir = (judges or {}).get(engine.model.scene.solver.integrator, (None, traits.hands_over_to))
+        judge, heir = judges.pop(engine.model.scene.solver.integrator, (None, traits.hands_over_to))
         try:
             done = stepping.integrate(engine, y, progress, stop, left, outputs, judge)
             return engine, done, "\n".join(reasons)

@@ -10,7 +10,7 @@ Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,30 +23,39 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import refusal
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.pace import Judge, foreseen, limited
+from flexclear.pipeline.dynamics.run.pace import Judge, Look, limited, pace
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.start import consistent_start
 
 #: evaluations of a step of the default method, and how far its region of stability reaches where steps swing about it,
 #: along both axes; the product of rate and step that its error control settles at
 STAGES, REACH = 12.0, 5.0
-#: an evaluation of the exponential method with its own algebra, in evaluations of the others
-DEARER = 1.4
+#: an evaluation with the algebra that its method needs, in evaluations of the default method
+DEARER = {DEFAULT: 1.0, VIBRATING: 1.4, STIFF: 2.0}
 #: of a scene with contacts, evaluations of the default method where the modes limit it, as a share of what it needs to
 #: be stable: it begins again at each contact, and steps more strictly there (measured: 1.45 and more)
 TOUCHING = 1.5
-#: least and largest power of the tolerance with which evaluations of the exponential method grow, as two runs tell
+#: least and largest power of the tolerance with which evaluations grow, as two runs tell
 LEAST_POWER, LARGEST_POWER = 0.02, 0.4
 #: the vibrations must be so much faster than all else, for nothing else limits the exponential method
-APART = 10.0
-#: a run of fewer evaluations needs no other method
-CHEAP = 2000.0
-#: how many times dearer than another one foresees a method must be to be given up, as pace and foresight are rough
-CLEARLY = 3.0
-#: a stiff run is handed on from so many evaluations in all; without another estimate, radau takes about as many
-CRAWLING = 300_000.0
-#: least evaluations between two looks
-LEAST_LOOK = 500
+APART = 2.0
+#: least that the default method must need before the exponential and the stiff one are tried, and before the stiff one
+#: is taken without any run
+CHEAP, WORTH, CRAWLING = 200.0, 3000.0, 300_000.0
+#: what the stiff method is taken to cost where nothing is known of it, at a tolerance and at looser ones
+UNKNOWN, AT = 20_000.0, 1e-4
+#: how many times dearer than another one a method must be to be given up, as pace and foresight are rough; and where it
+#: is only tried
+CLEARLY, TRIED = 3.0, 1.5
+#: where a method has used this share of what the other one is foreseen to take, it must be twice as many times dearer,
+#: earlier still more: starts may be hasty
+EARLY = 0.1
+#: what a method takes for the rest of a motion tells of it where that is more than half
+ENOUGH = 0.5
+#: evaluations between two looks, as a share of those foreseen, and at least
+LOOK, LEAST_LOOK = 0.02, 200
+#: an integrator that is too dear at a tolerance is taken again at one that is so many times looser
+AGAIN = 10.0
 #: relative step of the differences
 PERTURBATION = 1e-7
 
@@ -63,16 +72,19 @@ class Rates:
 class Suit:
     """What is known of a scene's costs.
 
-    span: of the run [s].  seen: by integrator, tolerance and evaluations of its last run; before: of the one before.
-    missed: integrators that a run with them has been handed on from.  touching: whether there are contacts.
+    span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  missed: by integrator, the
+    loosest tolerance at which a run with it has been handed on.  told: by integrator, what the present run was foreseen
+    to take when it was handed on from it.  left: evaluations and share of the motion when that happened last.
+    touching: whether there are contacts.
     """
 
     rates: Rates
     span: float
     names: tuple[str, ...]
-    seen: dict[str, tuple[float, float]] = field(default_factory=dict)
-    missed: set[str] = field(default_factory=set)
-    before: dict[str, tuple[float, float]] = field(default_factory=dict)
+    seen: dict[str, dict[float, float]] = field(default_factory=dict)
+    missed: dict[str, float] = field(default_factory=dict)
+    told: dict[str, float] = field(default_factory=dict)
+    left: tuple[float, float] = (0.0, 0.0)
     touching: bool = False
 
     @property
@@ -85,75 +97,143 @@ class Suit:
         """Evaluations that the default method takes at any tolerance."""
         return (TOUCHING if self.touching else 1.0) * self.by_stability
 
-    def cost(self, name: str, rtol: float) -> float:
-        """Evaluations foreseen at a tolerance, weighed by their algebra; nothing where only a run can tell."""
-        least = self.least if name == DEFAULT else 0.0
-        if name not in self.seen:
-            return least
-        at, evaluations = self.seen[name]
-        order = ORDERS[name] + 1.0
-        if name == DEFAULT:  # where stability limited the run, a tighter tolerance is free up to what accuracy needs
-            return max(least, min(evaluations, 1.0) if rtol > at else evaluations * (at / rtol) ** (0.5 / order))
+    def evaluations(self, name: str, rtol: float) -> float:
+        """Evaluations at a tolerance, taken over from the run at the nearest other one."""
+        seen = self.seen[name]
+        at = min(seen, key=lambda known: abs(np.log(known / rtol)))
         # half of them are spent on finding and beginning contacts, whatever the tolerance
-        return DEARER * evaluations * (at / rtol) ** self._power(name, (0.5 if self.touching else 1.0) / order)
+        power = (0.5 if self.touching or name == DEFAULT else 1.0) / (ORDERS[name] + 1.0)
+        if len(seen) > 1 and name != DEFAULT:  # of the default method two runs may only tell where it is stable
+            other = min((one for one in seen if one != at), key=lambda known: abs(np.log(known / at)))
+            told = float(np.log(seen[other] / seen[at]) / np.log(at / other))
+            power = float(np.clip(told, LEAST_POWER, LARGEST_POWER))
+        found: float = seen[at] * (at / rtol) ** power
+        # where stability limited the run, a looser tolerance saves nothing
+        return max(found, min(self.least, seen[at])) if name == DEFAULT else found
 
-    def _power(self, name: str, foreseen: float) -> float:
-        """The power of the tolerance with which evaluations grow: as two runs tell, otherwise as foreseen."""
-        if name not in self.before:
-            return foreseen
-        (at, evaluations), (other, others) = self.seen[name], self.before[name]
-        return float(np.clip(np.log(others / evaluations) / np.log(at / other), LEAST_POWER, LARGEST_POWER))
+    def cost(self, name: str, rtol: float) -> float:
+        """What a run is foreseen to take, in evaluations of the default method; nothing where only a run can tell."""
+        if name in self.seen:
+            return DEARER[name] * self.evaluations(name, rtol)
+        return self.least if name == DEFAULT else 0.0
+
+    def open(self, rtol: float) -> list[str]:
+        """Integrators that can be taken at a tolerance, the first of equally cheap ones first."""
+        left = [name for name in (VIBRATING, DEFAULT, STIFF) if name in self.names and not self._dropped(name, rtol)]
+        if VIBRATING in left and VIBRATING not in self.seen and not self._vibrates():
+            left.remove(VIBRATING)
+        others = [self.cost(name, rtol) for name in left if name != STIFF]
+        if STIFF in left and STIFF not in self.seen and others:
+            enough = WORTH * self._growth(rtol) if DEFAULT in self.seen else CRAWLING
+            if not min(others) > enough:
+                left.remove(STIFF)
+        return left or [STIFF]
+
+    def _growth(self, rtol: float) -> float:
+        """By how much more evaluations the stiff method takes than at a loose tolerance, by its order."""
+        return float(max(AT / rtol, 1.0) ** (1.0 / (ORDERS[STIFF] + 1.0)))
+
+    def _dropped(self, name: str, rtol: float) -> bool:
+        """What stability limits is dear at all tolerances, what accuracy limits at tighter ones."""
+        return name in self.missed and (name == DEFAULT or rtol < AGAIN * self.missed[name])
+
+    def _vibrates(self) -> bool:
+        """Whether the modes' vibrations alone make the default method dear."""
+        return self.rates.all > APART * self.rates.held and self.by_stability > CHEAP
 
     def best(self, rtol: float) -> str:
         """The integrator to take at a tolerance."""
-        vibrating = VIBRATING in self.names and self.rates.all > APART * self.rates.held
-        vibrating = vibrating and self.by_stability > CHEAP and VIBRATING not in self.missed
-        if vibrating and self.cost(VIBRATING, rtol) < self.cost(DEFAULT, rtol):
-            return VIBRATING
-        return STIFF if DEFAULT in self.missed else DEFAULT
+        return min(self.open(rtol), key=lambda name: self.cost(name, rtol))
+
+    def heir(self, name: str, rtol: float) -> tuple[str, float]:
+        """What goes on where an integrator is too dear, if any, and what that one is foreseen to take."""
+        others = [
+            one
+            for one in self.names
+            if one != name and not self._dropped(one, rtol) and (one != VIBRATING or one in self.seen)
+        ]
+        foreseen = {one: self.cost(one, rtol) or UNKNOWN * self._growth(rtol) for one in others}
+        best = min(foreseen, key=foreseen.__getitem__, default="")
+        return best, foreseen.get(best, 0.0)
 
     def why(self, rtol: float) -> str:
         """The reason in words."""
         name, most = self.best(rtol), f"{self.by_stability:.2g} evaluations for {DEFAULT} to be stable"
-        if name == STIFF:
+        known = [
+            f"{other} takes {n:.0f} at {at:.1e}"
+            for other, runs in self.seen.items()
+            if other != name
+            for at, n in [min(runs.items(), key=lambda run: abs(np.log(run[0] / rtol)))]
+        ]
+        if name == STIFF and DEFAULT in self.missed:
             return f"{STIFF}: stability limited the steps of {DEFAULT} in a run before"
+        if name in self.seen and known:
+            return (
+                f"{name}: at a relative tolerance of {rtol:.1e} it is foreseen to be the cheapest; {', '.join(known)}"
+            )
+        if name == STIFF and known:
+            return f"{STIFF}: tried, as {', '.join(known)} evaluations"
+        if name == STIFF:
+            return f"{STIFF}: the fastest rate at the start, {self.rates.all:.3g} 1/s, would take {most}"
         if name == VIBRATING:
             return (
                 f"{VIBRATING}: the modes' fastest vibration, {self.rates.all / 6.283:.3g} Hz, would take {most}; "
                 f"with them followed exactly, the fastest rate is {self.rates.held:.3g} 1/s"
             )
-        if VIBRATING in self.seen:
-            return (
-                f"{DEFAULT}: at a relative tolerance of {rtol:.1e} it is foreseen to take fewer evaluations than "
-                f"{VIBRATING}, which took {self.seen[VIBRATING][1]:.0f} at {self.seen[VIBRATING][0]:.1e}"
-            )
         if VIBRATING in self.missed:
-            return (
-                f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed over to it"
-            )
+            return f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed on"
         return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, takes no more than {most}"
 
-    def judges(self) -> dict[str, tuple[Judge, str]]:
+    def judges(self, rtol: float) -> dict[str, tuple[Judge, str]]:
         """By integrator, who looks whether its run goes as foreseen, and which one goes on if not."""
-        most = max(self.least, CHEAP)
-        look = max(int(0.1 * most), LEAST_LOOK)
-        found = {DEFAULT: (Judge(look, _stiff), STIFF)}
-        if VIBRATING in self.names:
-            found[VIBRATING] = (Judge(look, lambda engine: _too_dear(engine, most)), DEFAULT)
+        found = {}
+        self.told.clear()
+        for name in self.names:
+            heir, most = self.heir(name, rtol)
+            if not heir:
+                continue
+            every = max(int(LOOK * most), LEAST_LOOK)
+            found[name] = (Judge(every, self._verdict(name, heir, max(most, WORTH))), heir)
         return found
+
+    def _verdict(self, name: str, heir: str, most: float) -> Callable[[Engine, Sequence[Look]], str]:
+        """Why an integrator is to be given up for one that takes so much."""
+        tried = name == STIFF and STIFF not in self.seen and heir in self.seen
+
+        def verdict(engine: Engine, looks: Sequence[Look]) -> str:
+            if engine.model.scene.solver.integrator == DEFAULT and not limited(looks):
+                return ""
+            # what has been handed on from in this run already was seen to take more than was foreseen
+            enough = max(most, DEARER[heir] * self.told.get(heir, 0.0)) / DEARER[name]
+            whole = pace(looks, CLEARLY * enough) * self.span
+            used = max(looks[-1].evaluations - looks[0].evaluations, 1)
+            if whole < (TRIED if tried else CLEARLY) * (1.0 + EARLY * enough / used) * enough:
+                return ""
+            self.told[name] = whole
+            self.left = looks[-1].evaluations, (looks[-1].time - engine.start) / self.span
+            if name == DEFAULT:
+                return refusal.stiffness(engine.n, engine.control)
+            return (
+                f"at this pace the run takes {whole:.2g} evaluations with {name}, "
+                f"which {heir} is foreseen to make with {most / DEARER[heir]:.2g}"
+            )
+
+        return verdict
 
     def learn(self, rtol: float, name: str, run: xr.Dataset) -> None:
         """Remember what a run that began with an integrator took."""
-        if run.attrs["method"] != name:
-            self.missed.add(name)
-        else:
-            if name in self.seen and self.seen[name][0] != rtol:
-                self.before[name] = self.seen[name]
-            self.seen[name] = (rtol, float(run.attrs["evaluations"]))
+        if DEFAULT in self.told:  # where stability sets the pace, it tells what the whole run would have taken
+            self.seen.setdefault(DEFAULT, {})[rtol] = self.told[DEFAULT]
+        if run.attrs["method"] != name and not (name == DEFAULT and name in self.told):
+            self.missed[name] = max(rtol, self.missed.get(name, 0.0))
+        used, done = self.left if self.told else (0.0, 0.0)
+        if done < ENOUGH:
+            rest = (float(run.attrs["evaluations"]) - used) / (1.0 - done)
+            self.seen.setdefault(run.attrs["method"], {})[rtol] = max(rest, 1.0)
 
 
 #: powers of the step with which the error estimates fall
-ORDERS = {DEFAULT: 7.0, VIBRATING: 4.0}
+ORDERS = {DEFAULT: 7.0, VIBRATING: 4.0, STIFF: 3.0}
 
 
 def suit(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Suit:
@@ -188,21 +268,3 @@ def rates(engine: Engine, y: np.ndarray) -> Rates:
 
 def _fastest(J: np.ndarray) -> float:
     return float(np.abs(np.linalg.eigvals(J)).max(initial=0.0))
-
-
-def _stiff(engine: Engine) -> str:
-    """Why an explicit method is to be given up: stability limits its steps, and there are very many of them."""
-    if not limited(engine) or foreseen(engine) < CRAWLING:
-        return ""
-    return refusal.stiffness(engine.n, engine.control)
-
-
-def _too_dear(engine: Engine, most: float) -> str:
-    """Why the exponential method is to be given up: another one would be clearly cheaper."""
-    whole = DEARER * foreseen(engine)
-    if whole < CLEARLY * most:
-        return ""
-    return (
-        f"at this pace the run takes {whole / DEARER:.2g} evaluations, while {DEFAULT} needs {most:.2g}: "
-        "it is not the vibrations of the modes that make it dear"
-    )

@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.run import refusal, singular
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.pace import Judge, crawls
+from flexclear.pipeline.dynamics.run.pace import Judge, crawls, look
 from flexclear.pipeline.dynamics.run.pieces import Handover, Piece, Selections, Tape, piece
 from flexclear.pipeline.dynamics.run.reach import require_shallow
 from flexclear.pipeline.dynamics.run.specialised import settle
@@ -182,7 +182,9 @@ def _advance(
     """From segment to segment to the end; resumed: the first of them has been begun in an earlier attempt."""
     sample, control = _sampler(engine), engine.control
     settle(engine, progress)
-    if resumed and stop(_so_far(engine, tape)):
+    if not resumed:
+        tape.looks.append(look(engine))
+    elif stop(_so_far(engine, tape)):
         return
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[m.TIME]:
@@ -319,7 +321,8 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: P
         else:
             if engine.model.contacts:
                 require_shallow(engine)
-            if reason := judge.verdict(engine):
+            tape.looks.append(look(engine))
+            if reason := judge.verdict(engine, tape.looks):
                 raise StiffError(f"at t = {t:.6g} s: {reason}", _hand_over(engine, tape))
             settle(engine, progress)
             _warn(engine, tape, progress)
