@@ -18,7 +18,7 @@ from flexclear.pipeline.structure.fe.recipe import Recipe
 
 #: how `Field` describes what may be written as a number or with a unit
 _QUANTITY = re.compile(r"(?:^|; )([a-z ]+): SI number, or text with a unit$")
-_VECTORS = ("length", "velocity", "angular velocity", "number", "acceleration", "angle")
+_VECTORS = ("length", "angular velocity", "velocity", "number", "acceleration", "angle")
 _OWN_UNIT = "SI number, or text with a unit that fits where the law stands"
 #: unit of a bare number
 SI = {

@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 #: the request that lets a file share the bytes of another until one of them is written (linux/fs.h)
@@ -168,6 +169,15 @@ def _insist(change: Callable[[], None], path: Path) -> None:
                 raise PermissionError(error.errno, why, str(path)) from None
             else:
                 time.sleep(PAUSE)
+
+
+def started(thread: Thread) -> bool:
+    """Start a thread; whether the system lets this process have another one (a limit of a container, its own end)."""
+    try:
+        thread.start()
+    except RuntimeError:
+        return False
+    return True
 
 
 def sync_folder(folder: Path) -> None:

@@ -41,18 +41,18 @@ BODIES = "flexclear.pipeline.dynamics.bodies"
 FLEXIBLE = (f"{BODIES}.flexible", f"{BODIES}.interface", f"{BODIES}.ports", "flexclear.pipeline.structure")
 #: ways over singular poses and out of them, which no run takes that meets none
 RUNS = "flexclear.pipeline.dynamics.run"
-SINGULAR = (*(f"{RUNS}.{name}" for name in ("collocation", "singular_pass", "singular_start")), "numpy.polynomial")
+SINGULAR = tuple(f"{RUNS}.{name}" for name in ("collocation", "singular_pass", "singular_start"))
 SCHEME = Scheme("dop853")
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
 
-#: runs a scene for a moment, then says which modules of the project it took, and of NumPy
+#: runs a scene for a moment, then says which modules of the project it took
 RUN = """
 import sys
 from dataclasses import replace
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 dynamics.simulate(load_scene(sys.argv[1], {"time.end": "0.2 ms"}), {}, lambda share, text: None)
-print(*[name for name in sys.modules if name.startswith(("flexclear.pipeline.", "numpy."))])
+print(*[name for name in sys.modules if name.startswith("flexclear.pipeline.")])
 """
 #: reads a scene, then says which models of its parts have a schema of their own
 BUILT = """

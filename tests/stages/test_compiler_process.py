@@ -69,6 +69,14 @@ def results(files: list[Path]) -> list[int]:
     return [add(loaded[path.stem].address)(10) for path in files]
 
 
+def test_what_a_thread_has_loaded_stays_where_it_is_when_another_loads_it_too(files: list[Path]) -> None:
+    """It may be running; a run and its twin that are both handed over fetch the same."""
+    bring(files[:1], lambda _: None)
+    first = loaded[files[0].stem]
+    assert take(files[0], nothing)
+    assert loaded[files[0].stem] is first
+
+
 def test_a_second_process_leaves_the_code_on_disk(files: list[Path]) -> None:
     with compiler_process.second_process(files) as process:
         assert process is not None

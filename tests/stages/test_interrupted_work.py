@@ -13,12 +13,15 @@ import xarray as xr
 from numba import config
 
 from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.errors import InputError, StoppedError
 from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.workflow import cores, journal, stopping
+from flexclear.pipeline.core.workflow import cores, journal, schedule, stopping
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.dynamics.run import pace, pieces, specialised, trajectory
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.start import consistent_start
@@ -265,6 +268,39 @@ def test_a_run_that_is_asked_to_stop_leaves_what_there_is_marked_and_goes_on_lat
     with journal.kept(tmp_path, "key") as kept:
         assert dynamics.simulate(scene, {}, silent).identical(whole)
     assert kept.restored > 0.0
+
+
+def test_what_a_part_of_the_work_leaves_is_not_taken_for_what_there_is_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of an ensemble that is stopped: the motion of a member, which is no dataset."""
+
+    def stopped(*arguments: Any) -> None:
+        raise StoppedError("the time is over", ("engine", "trajectory"))
+
+    monkeypatch.setattr(schedule, "execute", stopped)
+    task = Task("ensemble", "bounce", "nothing:run", {}, "runs/bounce")
+    failed = schedule.attempt(task, {}, Store(tmp_path), Sources(tmp_path), silent)
+    assert isinstance(failed, schedule.Failure)
+    assert failed.exit_code == 4
+    assert failed.message == "bounce ensemble: the time is over; run it again, and it goes on from there"
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_piece_is_written_in_time_whoever_else_is_written_more_often(tmp_path: Path) -> None:
+    """A run and its twin look at the clock in turns: if what one has written counted for both, one might never be."""
+    now, kept = 0.0, journal.Journal(tmp_path, "key", clock=lambda: now, _written=0.0)
+    pieces_, state = [kept.name(digest) for digest in ("run", "twin")], journal.State({}, {}, np.zeros((1, 1)))
+    written: dict[str, list[float]] = {name: [0.0] for name in pieces_}
+    for now in np.arange(0.0, 200.0, 0.5):
+        for name in pieces_ if now % 3.0 == 0.0 else pieces_[1:]:  # the run takes longer from look to look
+            if kept.due(name):
+                kept.write(name, state)
+                written[name].append(now)
+    for times in written.values():
+        assert np.diff([*times, now]).max() <= journal.EVERY + 3.0
+    kept.finish(pieces_[0], state)
+    assert not kept._saved.keys() - pieces_[1:]
 
 
 def test_work_on_another_processor_is_not_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

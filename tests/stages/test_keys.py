@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import datetime
 import json
 import re
@@ -109,6 +110,21 @@ def f():
     assert libraries == {"numpy", "scipy", "xarray"}
     own, _ = imported(b"from .near import x", "flexclear.pipeline.post", package=True)
     assert own == {"flexclear.pipeline.post.near", "flexclear.pipeline.post.near.x"}
+
+
+def test_sources_are_parsed_while_other_threads_parse(monkeypatch: pytest.MonkeyPatch) -> None:
+    """CPython fails then, now and then: it takes what one thread counts for what the other does."""
+    parse, calls = ast.parse, list[int]()
+
+    def disturbed(source: bytes) -> ast.Module:
+        calls.append(1)
+        if len(calls) < 3:
+            raise SystemError("AST constructor recursion depth mismatch (before=57, after=54)")
+        return parse(source)
+
+    monkeypatch.setattr(ast, "parse", disturbed)
+    assert imported(b"import numpy", "flexclear.pipeline.core.x", package=False) == (set(), {"numpy"})
+    assert len(calls) == 3
 
 
 def test_a_closure_holds_every_file_that_its_modules_name(root: Path, sources: Sources):

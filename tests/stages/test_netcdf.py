@@ -151,6 +151,20 @@ def test_what_is_kept_of_what_was_written_is_what_would_be_read(data: LabelledAr
     assert_same(netcdf.as_read(data), netcdf.read((tmp_path / "a.nc").read_bytes()))
 
 
+def test_what_is_kept_holds_no_more_than_itself() -> None:
+    """A part of a larger array would keep all of it, and change with what else lies there."""
+    whole = np.zeros((3, 20_000))
+    data = labelled(
+        {"part": (("many",), whole[0]), "same": (("many",), whole[0]), "own": (("many",), np.ones(20_000))}, {}
+    )
+    kept = netcdf.as_read(data)
+    kept["part"].values[:] = 1.0
+    assert not whole.any()
+    assert not kept["same"].values.any()
+    assert all(array.values.base is None for array in kept.variables.values())
+    assert kept["own"].values is data["own"].values
+
+
 def test_what_all_stages_write_is_kept_as_it_would_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Meshes, modes, bodies, a run with contacts and its twin, its series: at the moment at which they are written."""
     seen: dict[str, LabelledArrays] = {}

@@ -73,10 +73,10 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(
         time.sleep(3e-3)  # the twin takes a tenth of that between two looks
         return hear(self, rows)
 
-    def late_twin(self: Pair, twin: Any) -> bool:
+    def late_twin(self: Pair, twin: Any, alive: Progress) -> bool:
         with self._news:
             assert self._news.wait_for(lambda: self._ended, PATIENCE)
-        return enough(self, twin)
+        return enough(self, twin, alive)
 
     if ahead == "twin":
         monkeypatch.setattr(Pair, "_hear", late_run)
@@ -91,9 +91,9 @@ def test_a_twin_that_has_parted_is_followed_no_further(root: Path, monkeypatch: 
     rows: list[float] = []
     enough = Pair._enough
 
-    def noted(self: Pair, twin: Any) -> bool:
+    def noted(self: Pair, twin: Any, alive: Progress) -> bool:
         rows.append(float(twin.rows[-1, 0]))
-        return enough(self, twin)
+        return enough(self, twin, alive)
 
     monkeypatch.setattr(Pair, "_enough", noted)
     scene = check(root, "clearance_slider_crank")
@@ -159,7 +159,7 @@ def test_a_twin_that_fails_after_it_has_parted_tells_as_much_as_one_that_does_no
 
         pair = Pair(engine)
         pair.run(lambda *told: follow(engine, start, silent, lambda name: engine, None, *told))
-        return pair.twin(start, steps)
+        return pair.twin(start, steps, silent)
 
     whole = twin(2.0 * engine.end)
     late, early = twin(whole.time[-1] + 0.2 * engine.end), twin(0.5 * whole.horizon)
@@ -186,6 +186,39 @@ def test_a_run_that_fails_does_not_wait_for_its_twin(root: Path, monkeypatch: py
     assert time.monotonic() - began < PATIENCE
 
 
+@pytest.mark.usefixtures("two")
+def test_a_twin_does_not_wait_for_a_run_that_never_began(root: Path) -> None:
+    """Ctrl-C may come at any moment, also when the thread is there and the run is not."""
+    engine = engine_of(check(root, "bounce"), {}, silent)
+    pair, start, began = Pair(engine), consistent_start(engine), time.monotonic()
+    came = threading.Event()
+
+    def steps(mine: Engine, y: np.ndarray, stop: Stop, outputs: np.ndarray) -> Followed:
+        came.set()
+        raise SolverError("its end")
+
+    def interrupted() -> None:
+        with cores.meanwhile(lambda alive: pair.twin(start, steps, alive)):
+            assert came.wait(PATIENCE)
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert time.monotonic() - began < PATIENCE
+
+
+@pytest.mark.usefixtures("two")
+def test_where_no_thread_is_to_be_had_the_work_is_done_when_its_result_is_asked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def none(self: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    monkeypatch.setattr(threading.Thread, "start", none)
+    with cores.meanwhile(lambda alive: threading.get_ident()) as result:
+        assert result() == threading.get_ident()
+
+
 @pytest.mark.parametrize("stopped", ["run", "twin"])
 def test_both_are_stopped_in_good_order_and_go_on_to_the_same_bits(
     stopped: str, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -201,7 +234,7 @@ def test_both_are_stopped_in_good_order_and_go_on_to_the_same_bits(
         if share is not None and share > 0.3 and stopped == "run":
             stopping.request("the time is over")
 
-    def late_twin(self: Pair, twin: Any) -> bool:
+    def late_twin(self: Pair, twin: Any, alive: Progress) -> bool:
         with self._news:
             assert self._news.wait_for(lambda: self._ended, PATIENCE)
         stopping.request("the time is over")

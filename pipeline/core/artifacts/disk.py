@@ -94,11 +94,13 @@ def settle(made: Path, path: Path) -> str:
             failed.append(error)
 
     beside = Thread(target=write)
-    beside.start()
+    if not system.started(beside):
+        write()
     try:
         digest = digest_of(made)
     finally:
-        beside.join()
+        if beside.ident is not None:
+            beside.join()
     if failed:
         raise failed[0]
     system.replace(made, path)

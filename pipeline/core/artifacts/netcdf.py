@@ -134,7 +134,8 @@ def _words(attrs: dict[str, Any]) -> list[str]:
 def as_read(data: LabelledArrays) -> LabelledArrays:
     """What `read` gives of the file that `write` makes of them, without the file.
 
-    Large arrays that are as they are read are not copied.
+    Large arrays that are as they are read are not copied, but for parts of larger ones: of what an engine has observed
+    a run holds a third, and whoever keeps that would keep all of it.
     """
     variables = {
         name: LabelledArray(array.dims, _values_as_read(array.values), _attributes_as_read(array.attrs))
@@ -144,11 +145,11 @@ def as_read(data: LabelledArrays) -> LabelledArrays:
 
 
 def _values_as_read(values: np.ndarray) -> np.ndarray:
-    """In one piece, writable, as this machine has them; texts as long as the longest of them."""
+    """In one piece and of its own, writable, as this machine has them; texts as long as the longest of them."""
     if values.dtype.kind in "OU":
         return np.asarray(values.astype(object), dtype=str)
     small = values.nbytes < _LARGE  # may be of what stays in this process, and costs nothing to copy
-    native = values.astype(values.dtype.newbyteorder("="), order="C", copy=small)
+    native = values.astype(values.dtype.newbyteorder("="), order="C", copy=small or values.base is not None)
     return np.require(native, requirements=["C", "W"])
 
 

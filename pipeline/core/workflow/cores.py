@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from flexclear.pipeline.core.errors import StoppedError
 from flexclear.pipeline.core.progress import Progress, silent
-from flexclear.pipeline.core.system import cores
+from flexclear.pipeline.core.system import cores, started
 
 __all__ = ["cores", "free", "meanwhile", "side_by_side", "tell", "width"]
 
@@ -81,12 +81,10 @@ class _GivenUpError(Exception):
 def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Result]]:
     """Meanwhile a thread does some work that is mostly compiled code; gives what waits for its result.
 
-    work: is given a progress to call now and then, which ends it when what goes on beside it has failed.  Where no
-    processor is free it is done when its result is asked for.  What waits raises what the work raised.
+    work: is given a progress to call now and then, and while it waits, which ends it when what goes on beside it has
+    failed.  Where no processor is free, or no thread is to be had, it is done when its result is asked for.  What waits
+    raises what the work raised.
     """
-    if not free():
-        yield lambda: work(silent)
-        return
     given_up, results, errors = Event(), list[Result](), list[BaseException]()
 
     def alive(fraction: float | None, text: str) -> None:
@@ -99,7 +97,7 @@ def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Resul
         except BaseException as error:
             errors.append(error)
 
-    def ended() -> None:
+    def ended() -> None:  # also where Ctrl-C came while it was being started
         while thread.is_alive():
             thread.join(TICK)
 
@@ -110,9 +108,8 @@ def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Resul
         return results[0]
 
     thread = Thread(target=copy_context().run, args=(do,))
-    thread.start()
     try:
-        yield result
+        yield result if free() and started(thread) else lambda: work(silent)
     except BaseException as error:
         if not isinstance(error, StoppedError):  # of that the work hears itself, and leaves what it has in good order
             given_up.set()

@@ -17,6 +17,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from threading import Lock
 
 from flexclear.pipeline.core.artifacts.disk import checked, publish, read_checked
 from flexclear.pipeline.core.artifacts.paths import TREE
@@ -26,6 +27,9 @@ __all__ = ["TREE", "Sources", "imported", "library_version", "library_versions",
 OWN = ("flexclear", "benchmarks")
 #: what modules import, by name, with the digest of the text that says so: what one `Sources` has learnt no other parses
 KNOWN: dict[str, tuple[str, list[str], list[str]]] = {}
+#: how often a source is parsed at most, where threads of libraries come between
+ATTEMPTS = 10
+_PARSING = Lock()
 #: distributions whose name differs from that of their import package
 DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtkmodules": "vtk"}
 
@@ -168,13 +172,24 @@ def imported(source: bytes, name: str, package: bool, *, deep: bool = True) -> t
     """
     own: set[str] = set()
     libraries: set[str] = set()
-    for target in _imports(ast.parse(source).body, name if package else name.rpartition(".")[0], deep):
+    for target in _imports(_parsed(source).body, name if package else name.rpartition(".")[0], deep):
         top = target.partition(".")[0]
         if top in OWN:
             own.add(target)
         elif top not in sys.stdlib_module_names:
             libraries.add(top)
     return own, libraries
+
+
+def _parsed(source: bytes) -> ast.Module:
+    """The syntax tree. CPython counts in one place how deep all threads are in theirs, and may find that it is wrong.
+
+    That is so in 3.11 and 3.12 at least (its issue 106905); runs, their twins and members of ensembles are threads.
+    """
+    for _ in range(ATTEMPTS):
+        with contextlib.suppress(SystemError), _PARSING:  # libraries parse as well, and wait for nobody
+            return ast.parse(source)
+    return ast.parse(source)
 
 
 def _imports(statements: Iterable[ast.stmt], package: str, deep: bool) -> Iterable[str]:

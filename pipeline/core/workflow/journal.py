@@ -59,6 +59,7 @@ class Journal:
     _chunks: dict[str, list[tuple[int, str]]] = field(default_factory=dict)
     _covered: set[str] = field(default_factory=set)
     _written: float = field(default_factory=time.monotonic)
+    _saved: dict[str, float] = field(default_factory=dict)
     _took: float = 0.0
     _lock: RLock = field(default_factory=RLock)
 
@@ -67,7 +68,9 @@ class Journal:
         with self._lock:
             count = self._asked.get(digest, 0)
             self._asked[digest] = count + 1
-        return f"{digest[:24]}-{count}"
+            made = f"{digest[:24]}-{count}"
+            self._saved[made] = self._written
+        return made
 
     def find(self, name: str) -> State | None:
         """What an earlier attempt left of a piece; None where there is nothing, or something is damaged."""
@@ -88,14 +91,15 @@ class Journal:
             self.restored += float(notes["seconds"])
         return State(arrays, notes["notes"], np.concatenate(rows), float(notes["seconds"]))
 
-    def due(self) -> bool:
-        """Whether it is time to write."""
-        return self.clock() - self._written > max(EVERY, self._took / SHARE)
+    def due(self, name: str = "") -> bool:
+        """Whether it is time to write; a piece of that name, whenever others were written, as threads do beside it."""
+        return self.clock() - self._saved.get(name, self._written) > max(EVERY, self._took / SHARE)
 
     def finish(self, name: str, state: State) -> None:
         """A piece is done; it is written with what is written next."""
         with self._lock:
             self._waiting[name] = state
+            self._saved.pop(name, None)
             if self.due():
                 self.write()
 
@@ -121,6 +125,8 @@ class Journal:
                     self._drop(piece)
                 self._covered = set()
             self._written, self._took = self.clock(), self.clock() - begun
+            if name in self._saved:
+                self._saved[name] = self._written
 
     @contextlib.contextmanager
     def uncounted(self) -> Iterator[None]:

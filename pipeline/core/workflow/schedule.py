@@ -299,9 +299,9 @@ def attempt(
 def _left(task: Task, stopped: StoppedError, store: Store) -> str:
     """What is told of a task that was stopped: what there is of it, and that it can go on."""
     told = f"{stopped}; run it again, and it goes on from there"
-    if stopped.partial is not None:
+    time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
+    if time is not None:  # else it is of a part of the work, such as a member of an ensemble, and no dataset
         path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
         if path is not None:
-            time = stopped.partial.attrs["stopped_at"]
             told += f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)"
     return told

@@ -77,7 +77,8 @@ def _fetched(path: Path) -> bool:
     if INTERPRETED or not compiled(path):
         return False
     try:
-        loaded[path.stem] = machine_code.load(path.with_suffix(CODE).read_bytes())
+        # another thread may have loaded it meanwhile, and be in it
+        loaded.setdefault(path.stem, machine_code.load(path.with_suffix(CODE).read_bytes()))
     except Exception:
         return False
     with contextlib.suppress(OSError):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -21,7 +21,7 @@ from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.run import Run, engines, follow, observed
 from flexclear.pipeline.dynamics.run.start import consistent_start
-from flexclear.pipeline.dynamics.run.trajectory import Trajectory
+from flexclear.pipeline.dynamics.run.trajectory import Followed, Trajectory
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.sensitivity import Twin
@@ -75,8 +75,11 @@ def _followed(
 
     pair = Pair(engine)
     followed = pair.run(lambda *told: follow(engine, start, progress, other, None, *told))
-    twin = pair.twin(start, lambda mine, y, *told: follow(mine, y, silent, lambda n: another(other(n)), None, *told))
-    return *followed, twin
+
+    def steps(mine: Engine, y: np.ndarray, *told: Any) -> Followed:
+        return follow(mine, y, silent, lambda name: another(other(name)), None, *told)
+
+    return *followed, pair.twin(start, steps, silent)
 
 
 def _repeated(task: Callable[[], object], most: int) -> tuple[float, ...]:

@@ -92,7 +92,7 @@ class Piece:
 
     def keep(self, tape: Tape) -> None:
         """Write the state, when it is time to."""
-        if self.journal.due():
+        if self.journal.due(self.name):
             self.save(tape)
 
     def save(self, tape: Tape) -> None:

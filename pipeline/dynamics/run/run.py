@@ -133,8 +133,8 @@ def integrate(
 
     bundles: reduced flexible bodies by name.  judges: who looks whether another integrator shall go on; without them
     the explicit ones hand over where they would crawl.  The twin of a run with contacts is made beside it, where a
-    processor is free.  Raises InputError for a scene that cannot be built, SolverError when the run
-    cannot go on, StoppedError with the run so far as `partial` when it is asked to stop.
+    processor is free.  Raises InputError for a scene that cannot be built, SolverError when the run cannot go on,
+    StoppedError with the run so far as `partial` when it is asked to stop.
     """
     made = _maker(scene, bundles, progress)
     engine = made("", progress)
@@ -169,7 +169,11 @@ def integrate(
     from flexclear.pipeline.dynamics.run.sensitivity import Pair
 
     pair = Pair(engine)
-    with meanwhile(lambda alive: pair.twin(start, lambda mine, y, *told: steps(mine, y, alive, twins, *told))) as twin:
+
+    def beside_it(alive: Progress) -> Twin:
+        return pair.twin(start, lambda mine, y, *told: steps(mine, y, alive, twins, *told), alive)
+
+    with meanwhile(beside_it) as twin:
         done = checked(lambda: pair.run(lambda *told: steps(engine, start, progress, ours, *told)))
         try:
             return replace(done, twin=twin())

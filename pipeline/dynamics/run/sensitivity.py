@@ -18,7 +18,9 @@ from threading import Condition
 import numpy as np
 
 from flexclear.pipeline.core.errors import SolverError, StoppedError
+from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.quantities import PARTED
+from flexclear.pipeline.core.workflow.cores import TICK
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.observation import frames
@@ -87,17 +89,20 @@ class Pair:
                 self._news.notify_all()
         return engine, trajectory.without(self.added), switched
 
-    def twin(self, start: np.ndarray, steps: Callable[[Engine, np.ndarray, Stop, np.ndarray], Followed]) -> Twin:
+    def twin(
+        self, start: np.ndarray, steps: Callable[[Engine, np.ndarray, Stop, np.ndarray], Followed], alive: Progress
+    ) -> Twin:
         """Run the scene again from a start whose balls are offset, and compare the links' velocities.
 
-        steps: takes the same steps as the run, with an engine from a start.
+        steps: takes the same steps as the run, with an engine from a start.  alive: called while it waits for the run;
+        what it raises ends the work.
         """
         engine, twin, failed = self._engine, self._unseen(), False
         size = max(engine.rtol * engine.model.length, SMALLEST)
 
         def enough(rows: np.ndarray) -> bool:
             twin.rows = rows
-            return self._enough(twin)
+            return self._enough(twin, alive)
 
         try:
             select_rows(engine, start, engine.start)
@@ -107,8 +112,7 @@ class Pair:
             twin.rows = steps(engine, moved, enough, self.outputs)[1].rows
         except SolverError:
             failed = True
-        with self._news:
-            self._news.wait_for(lambda: self._ended)
+        self._wait(lambda: self._ended, alive)
         time, separation, horizon = self._compared(twin)
         if failed and horizon is None:
             # a neighbour that cannot be run says nothing for the run itself: it is believed nowhere
@@ -122,7 +126,7 @@ class Pair:
             self._news.notify_all()
         return False
 
-    def _enough(self, twin: _Seen) -> bool:
+    def _enough(self, twin: _Seen, alive: Progress) -> bool:
         """Whether the twin has been followed far enough beyond the horizon.
 
         What is visible depends on the largest velocity of the whole run. Where the two have parted by the largest one
@@ -138,12 +142,17 @@ class Pair:
                 return False
             if complete or ended:
                 return complete
-            self._wait_beyond(known)
+            self._wait_beyond(known, alive)
 
-    def _wait_beyond(self, known: np.ndarray) -> None:
+    def _wait_beyond(self, known: np.ndarray, alive: Progress) -> None:
         """Wait until there is more of the run than the rows that are known, or no more will come."""
+        self._wait(lambda: self._ended or self._run.rows is not known, alive)
+
+    def _wait(self, until: Callable[[], bool], alive: Progress) -> None:
+        """Wait for news of the run; a run that has failed before it began sends none."""
         with self._news:
-            self._news.wait_for(lambda: self._ended or self._run.rows is not known)
+            while not self._news.wait_for(until, TICK):
+                alive(None, "")
 
     def _compared(self, twin: _Seen) -> tuple[np.ndarray, np.ndarray, float | None]:
         """Times of comparison [s], distances [m/s] and the horizon [s], when both have ended; None where they stay."""
