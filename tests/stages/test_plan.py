@@ -136,7 +136,7 @@ def test_the_elements_that_are_called_for_make_the_error_that_is_wanted(tmp_path
         return place.store.load(place.bring([task], 1).records[id(task)])
 
     recipe = tmp_path / "coarse.toml"
-    text = (tmp_path / "rod.toml").read_text()
+    text = (tmp_path / "leg_rod.toml").read_text()
     recipe.write_text(re.sub(r"(?m)^elements = .*$", "elements = 2", text))
     modes = {"reference": "craig-bampton", "count": 8, "interfaces": ["bottom", "top"]}
     body = leg.body["rod"].model_dump(mode="json", exclude_none=True, exclude={"modes", "mesh", "damping"})

@@ -117,7 +117,7 @@ class Suit:
             return DEARER[name] * self.evaluations(name, rtol)
         return self.least if name == DEFAULT else 0.0
 
-    def open(self, rtol: float) -> list[str]:
+    def possible(self, rtol: float) -> list[str]:
         """Integrators that can be taken at a tolerance, the first of equally cheap ones first."""
         left = [name for name in (VIBRATING, DEFAULT, STIFF) if name in self.names and not self._dropped(name, rtol)]
         if VIBRATING in left and VIBRATING not in self.seen and not self._vibrates():
@@ -143,7 +143,7 @@ class Suit:
 
     def best(self, rtol: float) -> str:
         """The integrator to take at a tolerance."""
-        return min(self.open(rtol), key=lambda name: self.cost(name, rtol))
+        return min(self.possible(rtol), key=lambda name: self.cost(name, rtol))
 
     def heir(self, name: str, rtol: float) -> tuple[str, float]:
         """What goes on where an integrator is too dear, if any, and what that one is foreseen to take."""
