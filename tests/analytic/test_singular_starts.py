@@ -67,6 +67,17 @@ def test_a_run_leaves_a_singular_pose_along_the_branch_that_its_velocities_belon
     assert dataset["rank"].values[:2].tolist() == [2, 4]
 
 
+def test_a_run_from_a_singular_pose_can_be_asked_for_accuracy() -> None:
+    """Its equations cannot be linearised there, so that nothing tells which integrator suits it."""
+    table = lying() | {"accuracy": {"beam1.position": "0.1 mm"}, "output": {"interval": 0.05}}
+    del table["solver"]
+    dataset = simulate(table)
+    assert dataset.attrs["method_reason"].startswith("dop853: it is tried first")
+    assert dataset.attrs["accuracy_verdict"] == "met"
+    known = simulate(lying())
+    assert float(np.abs(dataset.position - known.position).sel(body="beam1").max()) < 1e-4
+
+
 def at_rest(table: Table) -> None:
     for body in table["body"].values():
         body.pop("velocity", None)

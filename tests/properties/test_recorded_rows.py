@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -12,8 +12,10 @@ from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.dynamics.equations.named_bodies import put_quaternion
 from flexclear.pipeline.dynamics.record.motion import Motions
+from flexclear.pipeline.dynamics.record.topology import topology
 from flexclear.pipeline.dynamics.run.observation import observe
-from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.pipeline.dynamics.run.run import engine_of, observed
+from flexclear.pipeline.dynamics.run.run import integrate as whole
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 from tests.analytic.mechanism_runs import TREE
@@ -41,6 +43,19 @@ def test_a_row_is_recorded_alike_alone_and_between_others_from_which_its_closing
             size = np.abs(there).max(initial=0.0)
             # 1e-13 by how rows are closed, times what accelerations feel of that, and a factor ten
             assert np.abs(here[0] - there[k]).max(initial=0.0) <= 1e-11 * size, (field.name, k)
+
+
+def test_closure_rows_may_be_chosen_twice_between_two_rows():
+    """Then a part of the record has no row, as of a redundant mechanism of which outputs are rare."""
+    scene = load_scene(TREE / "scenes/gallery/four_bar.toml", {"time.end": "20 ms"})
+    run = whole(scene, {}, silent)
+    (begun, kept), at = run.trajectory.selections[0], run.trajectory.time[2:4].mean()
+    chosen = ((begun, kept), (at, kept), (1.0001 * at, kept))
+    twice = replace(run, trajectory=replace(run.trajectory, selections=chosen))
+    assert [part.stop - part.start for part, _ in twice.trajectory.parts()] == [3, 0, len(run.trajectory.rows) - 3]
+    again = observed(run.engine, twice.trajectory)
+    assert np.array_equal(again.state[:3], run.observed.state[:3])
+    assert np.array_equal(topology(twice)[0]["condition"][1], topology(run)[0]["condition"][1])
 
 
 def test_bodies_and_frames_are_recorded_where_their_links_carry_them():

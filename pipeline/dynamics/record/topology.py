@@ -70,7 +70,7 @@ def _singular_values(
 def _values(J: np.ndarray) -> np.ndarray:
     """Singular values of matrices (..., rank, nv), largest first."""
     if not J.size:
-        return np.zeros((len(J), 0))
+        return np.zeros(J.shape[:2])
     squares = np.linalg.eigvalsh(J @ np.swapaxes(J, 1, 2))[:, ::-1]
     values = np.sqrt(np.maximum(squares, 0.0))
     poor = ~(values[:, -1] * WELL > values[:, 0])

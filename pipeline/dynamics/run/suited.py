@@ -16,6 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.integrators import DEFAULT, STIFF, VIBRATING, by_need
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited
@@ -62,7 +63,7 @@ PERTURBATION = 1e-7
 
 @dataclass(frozen=True)
 class Rates:
-    """Fastest rates [1/s] of the equations at the start: of all, and with the bodies' modes held."""
+    """Fastest rates [1/s] of the equations at the start, 0 if unknown: of all, and with the bodies' modes held."""
 
     all: float
     held: float
@@ -182,6 +183,8 @@ class Suit:
             )
         if VIBRATING in self.missed:
             return f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed on"
+        if not self.rates.all:
+            return f"{DEFAULT}: it is tried first, as nothing at the start tells of a fast rate"
         return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, takes no more than {most}"
 
     def judges(self, rtol: float) -> Judges:
@@ -247,8 +250,11 @@ def suit(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Suit:
     )
     start = consistent_start(engine)
     engine.select_pieces_after(engine.start)
-    touching = bool(engine.model.contacts)
-    return Suit(rates(engine, start), engine.end - engine.start, names, touching=touching)
+    try:
+        known = rates(engine, start)
+    except SolverError:  # a run may well start where nothing can be linearised, as in a singular pose
+        known = Rates(0.0, 0.0)
+    return Suit(known, engine.end - engine.start, names, touching=bool(engine.model.contacts))
 
 
 def rates(engine: Engine, y: np.ndarray) -> Rates:
