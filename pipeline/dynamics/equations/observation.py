@@ -378,7 +378,7 @@ def make_observation(
                     break
                 foreseen = foreseen and foresee(h, w, rows, r, state, out, states)
                 evaluate(h, f, w, n, rows[r, 0], h[m.Y], h[m.SLOPES])
-                if not foreseen or open_by(h, w) <= tolerance:
+                if not foreseen or (n[m.EVALUATION] == m.OK and open_by(h, w) <= tolerance):
                     close(h, f, w, n, rows[r, 0], tolerance)
                     break
                 uneven, foreseen = first, False  # as where a step ends

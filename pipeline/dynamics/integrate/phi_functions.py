@@ -61,7 +61,7 @@ def apart(w, out, a, b, root):
 def phi_functions(w, out, a, b):
     """alpha_0, beta_0, alpha_1, ... into w from place out; a = (omega tau)^2 and b = d tau, neither below 0.
 
-    Good to some thousand roundings of 1/k!.
+    Good to some ten thousand roundings of 1/k!, and mostly to a few.
     """
     if a + b < SERIES:
         alpha, beta = INVERSE_FACTORIALS[COUNT - 1 + TERMS], 0.0
