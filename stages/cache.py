@@ -75,8 +75,8 @@ def _check(options: argparse.Namespace) -> None:
     found = upkeep.inventory(store, whole=True)
     # one without a sum has not been compiled yet, or is about to be
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
-    others = [path for path in kernels if files.of_another_build(path)]
-    damaged = [path for path in kernels if path not in set(others) and not files.compiled(path)]
+    others = {path for path in kernels if files.of_another_build(path)}
+    damaged = [path for path in kernels if path not in others and not files.compiled(path)]
     faults = [*found.damaged, *(f"{path} is damaged" for path in damaged)]
     for fault in faults[:SHOWN]:
         print(shown(fault))

@@ -84,7 +84,7 @@ def suited(engine: Engine) -> bool:
 
 
 def _make(engine: Engine, progress: Progress) -> None:
-    """Code for the engine's wiring and the closure rows that are solved for now, unless that would be no faster.
+    """Code for the engine's wiring and the closure rows that its selection keeps, unless that would be no faster.
 
     An integration that goes on in another process needs that of the rows which it has met before, too.
     """

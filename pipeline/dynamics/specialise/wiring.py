@@ -26,7 +26,7 @@ STATE, RATES = m.HEADER + 1, m.HEADER + 2
 
 
 def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
-    """The wiring in h, with the closure rows that are solved for now."""
+    """The wiring in h, with the closure rows that its selection keeps."""
     sizes = h[:SIZES].copy()
     sizes[[m.N_LAWS, m.N_GROUPS, m.N_BODIES, m.N_FRAMES]] = 0
     tables = []
