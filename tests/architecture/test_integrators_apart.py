@@ -26,7 +26,7 @@ PRIVATE = {
     "adams-bashforth-moulton": {"adams", "rk4", "runge_kutta", "hermite"},
     "generalized-alpha": {"generalized_alpha", "newton", "hermite"},
     "radau": {"radau", "newton", "hermite"},
-    "exponential": {"exponential", "modal_basis", "contact_springs", "phi_functions", "newton"},
+    "exponential": {"exponential", "modal_basis", "phi_functions", "newton"},
 }
 STEPPING = {"adaptive", "fixed"}
 

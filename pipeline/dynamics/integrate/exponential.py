@@ -1,16 +1,15 @@
 r"""Exponential Lobatto collocation of order 6: stiff modes are followed exactly, everything else by a cubic.
 
-The equations are split, :math:`\dot y = A y + g(y)`: A holds the vibrations that the modal stiffness and the closed
-contacts give the mechanism in its present state (`modal_basis`), g is what is left, without stiff modes. In
+The equations are split at every step, :math:`\dot y = A y + g(y)`: A holds the vibrations that the modal stiffness
+gives the mechanism in its present pose (`modal_basis`), g is the rest, without stiff modes. In
 
 .. math:: y(\theta h) = y_0 + \theta h\,\varphi_1(\theta h A)\,\dot y_0
           + h \sum_{k=1}^{3} k!\,\theta^{k+1}\varphi_{k+1}(\theta h A)\,d_k
 
 the :math:`d_k` are the coefficients of the cubic through g at Lobatto's nodes, minus its start; the nodes' states are
 found by iteration, which converges with h times the slope of g. So steps need not resolve the modes' vibrations, which
-are kept with their phases, and the solution between the nodes is dense output. A needs not be exact, what it lacks is
-in g: while contacts are closed, it is kept for some steps, as long as the iteration converges fast. Where nothing
-vibrates the method is Lobatto IIIA.
+keep their phases, and the solution between the nodes is dense output. A needs not be exact: what it lacks is in g.
+Without flexible bodies the method is Lobatto IIIA.
 
 Source: Hochbruck & Ostermann, Exponential integrators, *Acta Numerica* 19 (2010), sec. 2.2 (collocation);
 Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.7 (Lobatto IIIA) and
@@ -28,17 +27,7 @@ from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import modal_basis, phi_functions
 from flexclear.pipeline.dynamics.integrate.method import Method, slope
-from flexclear.pipeline.dynamics.integrate.modal_basis import (
-    count,
-    damping,
-    lift,
-    pressed,
-    read,
-    room,
-    square,
-    turn,
-    work_rate,
-)
+from flexclear.pipeline.dynamics.integrate.modal_basis import count, damping, lift, read, room, square, turn, work_rate
 from flexclear.pipeline.dynamics.integrate.newton import limit
 from flexclear.pipeline.dynamics.integrate.norms import scaled_norm, set_error_scales
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -60,14 +49,12 @@ MOST_SWEEPS = 10
 FORGETTING = 0.3
 #: steps are so long that corrections fall by this factor per sweep, which goes with their square; no less is aimed at
 SWIFT, LEAST = 0.1, 0.01
-#: where they fall more slowly than this, or after so many steps, the oscillators are made anew
-SLOW, OLD = 0.08, 6.0
 
 # Memory between steps -------------------------------------------------------------------------------------------------
-# whether the oscillators serve the present state, whether there are any, step of the phi functions, length of the step
-# before (0: none), its rate of convergence, length of the step whose dense output is asked for, the slowest convergence
-# within the last attempt, steps since the oscillators were made, whether this step has been attempted before
-BASIS_HOLDS, BASIS_KNOWN, PHI_STEP, LAST_STEP, RATE, LENGTH, SLOWEST, AGE, TRIED, VECTORS = range(10)
+# whether the oscillators are those of the present pose, whether there are any, step of the phi functions, length of the
+# step before (0: none), its rate of convergence, length of the step whose dense output is requested, the slowest
+# convergence within the last attempt
+BASIS_HOLDS, BASIS_KNOWN, PHI_STEP, LAST_STEP, RATE, LENGTH, SLOWEST, VECTORS = range(8)
 #: vectors over the state: departures of g from its start at the nodes, and those of the step before
 DEPARTURE, BEFORE = 0, NODES
 #: pairs (z, z') of all oscillators: of the departures, of the slope at the start and of its state, two to work with
@@ -81,7 +68,7 @@ AT_NODE = PHI + 2 * SOURCES
 
 def memory(h: np.ndarray) -> int:
     """Floats kept between steps."""
-    size = modal_basis.most(h)
+    size = h[m.NV]
     vectors, pairs, nodes = 2 * NODES * h[m.NY], 2 * N_PAIRS * size, (NODES + 1) * AT_NODE * size
     return int(VECTORS + vectors + pairs + nodes + modal_basis.floats(h))
 
@@ -248,7 +235,7 @@ def predict(h, w, step):
 def begin(h, f, w, n):
     """Neither oscillators of this pose nor a step before are known."""
     o = h[m.MEMORY]
-    w[o + BASIS_HOLDS] = w[o + LAST_STEP] = w[o + TRIED] = 0.0
+    w[o + BASIS_HOLDS] = w[o + LAST_STEP] = 0.0
     w[o + RATE] = 1.0
 
 
@@ -304,13 +291,12 @@ def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> t
         find_oscillators(h, f, w, n, basis(h), w[o + BASIS_KNOWN] > 0.0)
         n[m.JACOBIANS] += 1
         w[o + BASIS_HOLDS], w[o + BASIS_KNOWN], w[o + PHI_STEP] = 1.0, 1.0, 0.0
-        w[o + AGE] = 0.0
 
     @kernel
     def prepare(h, f, w, n, step):
         """Oscillators, phi functions, and what is read off the start of the step."""
         o = h[m.MEMORY]
-        if w[o + BASIS_HOLDS] == 0.0 or (w[o + TRIED] > 0.0 and w[o + AGE] > 0.0):
+        if w[o + BASIS_HOLDS] == 0.0:
             complete(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], slope(h, NODE))
             n[m.EVALUATIONS] += 1
             renew(h, f, w, n)
@@ -318,7 +304,6 @@ def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> t
             for e in range(NODES):
                 find_phi(h, w, e, step, C[e])
             w[o + PHI_STEP] = step
-        w[o + TRIED] = 1.0
         read(h, w, basis(h), slope(h, 0), pair(h, OF_SLOPE))
         read(h, w, basis(h), h[m.Y], pair(h, OF_STATE))
 
@@ -372,13 +357,9 @@ def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> t
         """The cubic of an accepted step predicts the next one's; its end, where evaluated last, gives oscillators."""
         for i in range(NODES * h[m.NY]):
             w[vector(h, BEFORE) + i] = w[vector(h, DEPARTURE) + i]
-        o = h[m.MEMORY]
-        w[o + LAST_STEP], w[o + TRIED] = step, 0.0
-        w[o + AGE] += 1.0
-        if not pressed(h, w, basis(h)) or w[o + SLOWEST] > SLOW or w[o + AGE] >= OLD:
-            w[o + BASIS_HOLDS] = 0.0
-            if n[m.STATE] == h[m.Y_NEW] and n[m.ABRIDGED] == 0:
-                renew(h, f, w, n)
+        w[h[m.MEMORY] + LAST_STEP], w[h[m.MEMORY] + BASIS_HOLDS] = step, 0.0
+        if n[m.STATE] == h[m.Y_NEW] and n[m.ABRIDGED] == 0:
+            renew(h, f, w, n)
 
     return begin, attempt, error, extend, keep
 

@@ -1,11 +1,10 @@
-r"""Vibrations that modal stiffness and closed contacts give the constrained mechanism, in the state just evaluated.
+r"""Vibrations that modal stiffness gives the constrained mechanism, in the state just evaluated.
 
-With M the mass matrix, J the closures' Jacobian and K the stiffness of springs, which are the modes and the closed
-contacts (`contact_springs`) and of which the rows W give the lengths, springs accelerate the coordinates by
-:math:`-P W^T K W x`, where :math:`P = M^{-1} - M^{-1}J^T(JM^{-1}J^T)^{-1}JM^{-1}`. The symmetric
-:math:`K^{1/2} W P W^T K^{1/2} = Q \Omega^2 Q^T` parts them into oscillators :math:`z = Q^T K^{1/2} W x`, each with a
-shape over all coordinates and a share of the springs' damping; the positions' rates and the drives' work follow
-linearly. What this leaves out (other forces, coupling by damping, the change of pose and depth) is not stiff, friction
+With M the mass matrix, J the closures' Jacobian and K the modal stiffness, the modes' springs accelerate the
+coordinates by :math:`-P K q`, where :math:`P = M^{-1} - M^{-1}J^T(JM^{-1}J^T)^{-1}JM^{-1}`. The symmetric
+:math:`K^{1/2} P K^{1/2} = Q \Omega^2 Q^T` separates them into oscillators :math:`z = Q^T K^{1/2} q`, each with a shape
+over all coordinates and a fraction of the modal damping; the positions' rates and the drives' work follow linearly.
+What this leaves out (other forces, coupling by damping, the change of pose) is not stiff, contacts and steep friction
 excepted.
 
 A is the matrix of all that: :math:`A y = B \Lambda C y`, where C reads (z, z') off a state, B lifts them to one and
@@ -24,7 +23,6 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies.interface import to_interface, to_modes
 from flexclear.pipeline.dynamics.equations.closures import add_spread, solve, take_spread
 from flexclear.pipeline.dynamics.equations.envelope import backward, forward
-from flexclear.pipeline.dynamics.integrate import contact_springs as springs
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot6
 
@@ -36,18 +34,16 @@ SLOW = 1e-6
 A_LITTLE = 1e-9
 
 
-def most(h):
-    """Room for oscillators: one for each speed and contact, as an array or a kernel asks."""
-    return h[m.NV] + h[m.N_SURFACES]
-
-
-room = kernel(most)
+@kernel
+def room(h):
+    """Most oscillators: one per speed."""
+    return h[m.NV]
 
 
 def floats(h: np.ndarray) -> int:
     """Floats of the work space that a basis takes."""
-    size = int(most(h))
-    return 3 * size + 3 * size * size + 2 * size * int(h[m.NY]) + springs.floats(h)
+    size, ny = int(h[m.NV]), int(h[m.NY])
+    return 3 * size + 3 * size * size + 2 * size * ny
 
 
 # Places; o is where the basis begins ----------------------------------------------------------------------------------
@@ -103,41 +99,19 @@ def response(h, o, j):
 
 
 @kernel
-def contacts(h, o):
-    """Where w holds the contacts as springs."""
-    return lifting(h, o, 2 * room(h))
-
-
-@kernel
-def modes(h):
-    """Number of modes."""
+def count(h):
+    """Number of modes, which is that of oscillators."""
     total = 0
     for k in range(h[m.N_FLEX]):
         total += m.FLEXES.n_modes(h, k)
     return total
 
 
-@kernel
-def count(h):
-    """Number of oscillators, which is that of springs: modes, then contacts."""
-    return modes(h) + h[m.N_SURFACES]
-
-
-@kernel
-def pressed(h, w, o):
-    """Whether some contact is a spring now."""
-    result = False
-    for c in range(h[m.N_SURFACES]):
-        result |= w[root(h, o, modes(h) + c)] > 0.0
-    return result
-
-
 # Functions of the state -----------------------------------------------------------------------------------------------
 @kernel
 def read(h, w, o, state, out):
-    """C: z, then z', of what w holds for each variable from place `state` on; `room` apart."""
-    size, first = count(h), modes(h)
-    for i in range(size):
+    """C: z, and z' after `room` entries, of what w holds for each variable from index `state` on."""
+    for i in range(count(h)):
         row, e, z, rate = reading(h, o, i), 0, 0.0, 0.0
         for k in range(h[m.N_FLEX]):
             q, c = state + m.FLEXES.q0(h, k), state + h[m.NQ] + m.FLEXES.c0(h, k)
@@ -146,20 +120,13 @@ def read(h, w, o, state, out):
                 rate += w[row + e] * w[c + j]
                 e += 1
         w[out + i], w[out + room(h) + i] = z, rate
-    for c in range(h[m.N_SURFACES]):
-        if w[root(h, o, first + c)] > 0.0:
-            depth, rate = springs.change(h, w, contacts(h, o), c, state)
-            for i in range(size):
-                weight = w[reading(h, o, i) + first + c]
-                w[out + i] += weight * depth
-                w[out + room(h) + i] += weight * rate
 
 
 @kernel
 def lift(h, w, o, pair, t, out):
     """Add B, a time t after the pose, of (z, z') to what w holds for each variable from place `out` on.
 
-    z and z' stand `room` apart from place `pair` on.
+    z' follows z after `room` entries.
     """
     nq, nv = h[m.NQ], h[m.NV]
     for i in range(count(h)):
@@ -239,8 +206,8 @@ def respond(h, f, w, b):
 
 
 @kernel
-def responses(h, f, w, n, o):
-    """What the root of each spring's stiffness does, and the symmetric matrix; contacts with their row."""
+def responses(h, f, w, o):
+    """Responses to the root of each mode's stiffness, and the symmetric matrix."""
     nq, nv, e = h[m.NQ], h[m.NV], 0
     for i in range(count(h)):
         for k in range(nq, nq + nv + 2):
@@ -255,38 +222,18 @@ def responses(h, f, w, n, o):
             to_interface(h, f, w, b)
             respond(h, f, w, b)
             e += 1
-    for c in range(h[m.N_SURFACES]):
-        b, s = response(h, o, e) + nq, contacts(h, o)
-        stiffness, loss = springs.stiffen(h, f, w, n, s, c)
-        w[root(h, o, e)], w[damping(h, o, e)] = np.sqrt(stiffness), loss
-        if stiffness > 0.0:
-            springs.find_row(h, f, w, s, c)
-            for k in range(nv):
-                w[b + k] = w[root(h, o, e)] * w[springs.row(h, s, c) + k]
-            w[b + nv] = w[root(h, o, e)] * springs.direct_power(h, w, s, c, h[m.U])
-            w[b + nv + 1] = w[root(h, o, e)] * springs.direct_power(h, w, s, c, h[m.DU])
-            to_interface(h, f, w, b)
-            respond(h, f, w, b)
-        e += 1
     for i in range(e):
         couple(h, w, o, i)
 
 
 @kernel
 def couple(h, w, o, i):
-    """Row i of the symmetric matrix: what the response of spring i does along all springs."""
-    nv, j, b = h[m.NV], 0, response(h, o, i) + h[m.NQ]
+    """Row i of the symmetric matrix: what the response of mode i's spring does along all modes."""
+    j, b = 0, response(h, o, i) + h[m.NQ]
     for k in range(h[m.N_FLEX]):
         for c in range(m.FLEXES.c0(h, k), m.FLEXES.c0(h, k) + m.FLEXES.n_modes(h, k)):
             w[matrix(h, o, i) + j] = w[root(h, o, j)] * w[b + c]
             j += 1
-    for c in range(h[m.N_SURFACES]):
-        total, along = 0.0, springs.row(h, contacts(h, o), c)
-        if w[root(h, o, j)] > 0.0:
-            for k in range(nv):
-                total += w[along + k] * w[b + k]
-        w[matrix(h, o, i) + j] = w[root(h, o, j)] * total
-        j += 1
 
 
 @kernel
@@ -343,30 +290,21 @@ def diagonalise(h, w, o, n):
 
 
 @kernel
-def losses(h, f, w, o, out):
-    """Damping over stiffness [s] of each mode into w from place `out` on; 0 of modes without stiffness."""
-    e = 0
+def damp(h, f, w, o, i):
+    """Damping of oscillator i by the modal damping: the part that does not couple it to others."""
+    total, e = 0.0, 0
     for k in range(h[m.N_FLEX]):
         n = m.FLEXES.n_modes(h, k)
         stiffness = h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + 12 * n + n * n
         for j in range(n):
-            stiff = f[stiffness + j] > 0.0
-            w[out + e] = f[stiffness + n + j] / f[stiffness + j] if stiff else 0.0
+            if f[stiffness + j] > 0.0:
+                total += w[axes(h, o, i) + e] ** 2 * f[stiffness + n + j] / f[stiffness + j]
             e += 1
-
-
-@kernel
-def damp(h, w, o, i, loss):
-    """Damping of oscillator i by the springs', whose shares stand from place `loss` on: what couples it to no other."""
-    total, omega2 = 0.0, w[square(h, o, i)]
-    for e in range(count(h)):
-        total += w[axes(h, o, i) + e] ** 2 * w[loss + e]
-    return omega2 * total
+    return w[square(h, o, i)] * total
 
 
 def make_find_oscillators(retract: Callable) -> Callable:
     """The kernel find_oscillators(h, f, w, n, o, known), at the state in Y or Y_NEW that has just been evaluated."""
-    find_measures, find_gradient = springs.make_gradients(retract)
 
     @kernel
     def shapes(h, w, o, state, n):
@@ -403,8 +341,8 @@ def make_find_oscillators(retract: Callable) -> Callable:
     @kernel
     def find_oscillators(h, f, w, n, o, known):
         """Fill the basis; known: whether it holds the axes of another pose."""
-        size, touching = count(h), contacts(h, o)
-        responses(h, f, w, n, o)
+        size = count(h)
+        responses(h, f, w, o)
         if known:
             into_axes(h, w, o, size)
         else:
@@ -413,16 +351,7 @@ def make_find_oscillators(retract: Callable) -> Callable:
                     w[axes(h, o, i) + j] = 1.0 if i == j else 0.0
         diagonalise(h, w, o, size)
         shapes(h, w, o, n[m.STATE], size)
-        if h[m.N_SURFACES] > 0 and not known:
-            find_measures(h, w, touching, n[m.STATE])
-        for c in range(h[m.N_SURFACES]):
-            if w[root(h, o, modes(h) + c)] > 0.0:
-                find_gradient(h, w, touching, c, n[m.STATE])
-        loss = response(h, o, 0)  # used up
-        losses(h, f, w, o, loss)
-        for c in range(h[m.N_SURFACES]):
-            w[loss + modes(h) + c] = w[damping(h, o, modes(h) + c)]
         for i in range(size):
-            w[damping(h, o, i)] = damp(h, w, o, i, loss)
+            w[damping(h, o, i)] = damp(h, f, w, o, i)
 
     return find_oscillators
