@@ -26,7 +26,7 @@ PARTS: Mapping[str, Mapping[str, str]] = {
     f"{_RUN}.run.engine": {"prepare": "assembling"},
     f"{_RUN}.model.model": {"tabulate": "assembling"},
     f"{_RUN}.run.trajectory": {"integrate": "integrating"},
-    f"{_RUN}.run.sensitivity": {"Pair.twin": "integrating"},
+    f"{_RUN}.run.horizon": {"Pair.perturbed_run": "integrating"},
     f"{_RUN}.run.run": {"observed": "recording"},
     f"{_RUN}.record.dataset": {"recorded": "recording"},
     "flexclear.pipeline.post.series": {"derived": "deriving"},

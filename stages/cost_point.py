@@ -50,7 +50,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}
     costs["recording_seconds"] = float(np.median(cost.recording))
     costs["compile_seconds"] = inputs["kernels"].attrs["compile_seconds"]
-    return {"nc": kept.assign_attrs(**costs, **_twin(done), **_contacts(scene))}
+    return {"nc": kept.assign_attrs(**costs, **_growth(done), **_contacts(scene))}
 
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -82,12 +82,12 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     return {"nc": kept.assign_attrs(cpu_seconds=seconds)}
 
 
-def _twin(run: xr.Dataset) -> dict[str, float]:
-    """Growth of a displacement of the start into velocities up to the horizon [1/s], of runs with contacts."""
-    if "twin_separation" not in run:
+def _growth(run: xr.Dataset) -> dict[str, float]:
+    """Growth of a fraction of the clearance into a fraction of the velocities up to the horizon, with contacts."""
+    if "separation" not in run:
         return {}
-    believed = run["twin_time"].values <= float(run["horizon"])
-    return {"growth": float(run["twin_separation"].values[believed].max()) / float(run.attrs["twin_perturbation"])}
+    before = run["separation_time"].values <= float(run["horizon"])
+    return {"growth": float(run["separation"].values[before].max()) / float(run.attrs["separation_perturbation"])}
 
 
 def _contacts(scene: Scene) -> dict[str, float]:

@@ -10,6 +10,7 @@ from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.origins import assumed
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.post.horizon import sentence
 from flexclear.stages import compare, s5_post
 from flexclear.stages.graph import Graph
 from flexclear.stages.run import Workplace, check, in_file
@@ -146,13 +147,8 @@ def _stability(run: xr.Dataset | None) -> dict[str, str]:
     if run is None:
         return {}
     found = _told(run.attrs, STABILITY)
-    end = float(run["time"].values[-1])
-    horizon = float(run["horizon"]) if "horizon" in run else end
-    found["runs that start almost equally"] = (
-        "stay together to the end"
-        if horizon >= end
-        else f"differ visibly from {1e3 * horizon:.4g} ms on (the run lasts {1e3 * end:.4g} ms)"
-    )
+    if "horizon" in run:
+        found["predictability"] = sentence(float(run["horizon"]), float(run["time"].values[-1]))
     for name, label, unit in (
         ("energy_error", "largest error of the energy balance", "J"),
         ("constraint_error", "largest error of a closed loop", "m"),

@@ -42,7 +42,7 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _beside_a_run(here: Mechanism) -> Record:
-    """Times of a run without its twin, and of all members."""
+    """Times of a run without its perturbed run, and of all members."""
     full = _with_members(here, MEMBERS)
     tasks = {
         "run": partial(_timed, partial(dynamics.simulate, here.scene, here.bundles, silent)),

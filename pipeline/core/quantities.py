@@ -25,8 +25,25 @@ if TYPE_CHECKING:
 SAME_TIME = 1e-13
 #: closings with an approach above this count as impacts [m/s]
 IMPACT = 1e-4
-#: a run is believed point by point until velocities of neighbouring runs differ by this share of the largest one
-PARTED = 1e-3
+#: fraction of its clearance by which the perturbed run moves each contact at the start: the order of the offset in
+#: ensembles, and far above what an integration at the default tolerance errs by
+PERTURBATION = 2e-5
+#: neighbouring runs are visibly separated where they differ by this fraction of the largest motion
+SEPARATED = 1e-3
+#: a separation that lasts for this fraction of the run ends its predictability horizon; an impact that comes a little
+#: earlier in one of two runs separates them for its duration only
+LASTING = 1.0 / 36.0
+
+
+def lasting(time: np.ndarray, separated: np.ndarray, least: float) -> int | None:
+    """Index of the first time from which on `separated` holds for `least` [s] or to the last time; None without one.
+
+    time [s], separated: shape (n,).
+    """
+    joined = np.flatnonzero(~separated)
+    until = np.append(time[joined], np.inf)[np.searchsorted(joined, np.arange(len(time)))]
+    first = np.flatnonzero(separated & (until > time + least))
+    return int(first[0]) if len(first) else None
 
 
 def series(run: xr.Dataset, quantity: Quantity) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.quantities import PARTED
+from flexclear.pipeline.core.quantities import LASTING, PERTURBATION, SEPARATED, lasting
 from flexclear.pipeline.post.rotations import angle_about_y
 
 if TYPE_CHECKING:
@@ -28,15 +28,25 @@ def spread(velocity: np.ndarray) -> np.ndarray:
     return np.linalg.norm(velocity - velocity.mean(axis=0), axis=-1).max(axis=(0, 2))
 
 
-def horizon(time: np.ndarray, velocity: np.ndarray, share: float = PARTED) -> float:
-    """First time at which `spread` passes `share` of the largest speed; the last time if it never does [s].
+def horizon(time: np.ndarray, velocity: np.ndarray, share: float = SEPARATED) -> float:
+    """Time from which on `spread` stays above `share` of the largest speed; the last time if it never does [s].
 
     Beyond it two runs that differ by a perturbation far below any tolerance differ visibly, so a
     pointwise value is one draw out of many.
     """
     peak = float(np.linalg.norm(velocity, axis=-1).max())
-    beyond = np.flatnonzero(spread(velocity) > share * peak)
-    return float(time[beyond[0]] if beyond.size else time[-1])
+    first = lasting(time, spread(velocity) > share * peak, LASTING * float(time[-1] - time[0]))
+    return float(time[-1] if first is None else time[first])
+
+
+def sentence(horizon: float, end: float) -> str:
+    """Statement on a run's predictability horizon [s]; end: of the run [s]."""
+    neighbour = f"A run whose contacts start {100.0 * PERTURBATION:g} % of their clearance elsewhere"
+    difference = f"{100.0 * SEPARATED:g} % of each body's largest motion"
+    if horizon >= end:
+        return f"{neighbour} stays within {difference} to the end, but for moments of impacts."
+    whole = f"the run lasts {1e3 * end:.4g} ms"
+    return f"{neighbour} differs by more than {difference} from {1e3 * horizon:.4g} ms on ({whole})."
 
 
 def ensemble_statistics(ensemble: xr.Dataset | LabelledArrays) -> Variables:

@@ -75,7 +75,7 @@ def motion(model: Model, data: dict[str, xr.Dataset]) -> Motion:
 
 
 def believed_until(post: xr.Dataset) -> float:
-    """Time up to which the run is shown point by point [s]: where its ensemble parts, or else the run and its twin."""
+    """Time up to which the run is shown point by point [s]: where its ensemble diverges, or else the perturbed run."""
     return float(post.ensemble_horizon if "ensemble_horizon" in post else post.horizon)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from flexclear.pipeline.core.algebra import first_largest, rotation_between
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled, of
 from flexclear.pipeline.core.artifacts.schema import conformed, require_complete
-from flexclear.pipeline.core.quantities import IMPACT, PARTED
+from flexclear.pipeline.core.quantities import IMPACT, SEPARATED
 from flexclear.pipeline.post.horizon import QUANTILES, Variables, ensemble_statistics, horizon
 from flexclear.pipeline.post.impacts import impacts, of_kind
 from flexclear.pipeline.post.rotations import angle_about_y
@@ -51,7 +51,7 @@ def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> Labe
     data["horizon"] = ((), np.array(end))
     attributes = {
         "impact_threshold": f"{IMPACT:g} m/s",
-        "horizon_criterion": f"velocities of the ensemble, or of run and twin, differ by {PARTED:g} of the largest",
+        "horizon_criterion": f"ensemble, or run and perturbed run, stay separated by {SEPARATED:g} of the motion",
     }
     attributes["references"] = str(run.attrs.get("references", ""))
     title = f"What follows from: {run.attrs['title']}"

@@ -26,7 +26,7 @@ def _number(dim: str, long_name: str, units: str = "1") -> Variable:
 _MOTION = "translation or rotation: what it is along or about"
 COORDINATES: Schema = {
     "time": _number("time", "time", "s"),
-    "twin_time": _number("twin_time", "time at which run and twin were compared", "s"),
+    "separation_time": _number("separation_time", "time at which run and perturbed run were compared", "s"),
     "ensemble_time": _number("ensemble_time", "time of the ensemble's output", "s"),
     "waypoint": _number("waypoint", "time since the period began", "s"),
     "axis": _words("axis", "component along x, y, z"),

@@ -207,11 +207,12 @@ RUN: Schema = {
     "pass_time": _V(("singular_pass",), "s", "time of a pass through a singular pose", optional=True),
     "pass_condition": _V(("singular_pass",), "1", "condition number where the pass was located", optional=True),
     "pass_rank_loss": _V(("singular_pass",), "1", "closure rows that depend on others in that pose", optional=True),
-    "horizon": _V((), "s", "time up to which pointwise values mean something", optional=True),
-    "twin_separation": _V(
-        ("twin_time",),
-        "m s-1",
-        "largest distance of a velocity from that in the same run started `twin_perturbation` [m] away",
+    "horizon": _V((), "s", "predictability horizon: time up to which pointwise values mean something", optional=True),
+    "separation": _V(
+        ("separation_time",),
+        "1",
+        "largest separation of a body from the same run started `separation_perturbation` of the clearance away, in "
+        "the norm of the kinetic energy, as a fraction of its largest motion",
         optional=True,
     ),
     "event_time": _V(("event",), "s", "time of the event", optional=True),

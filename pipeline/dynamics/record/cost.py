@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Trajectory
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.sensitivity import Twin
+    from flexclear.pipeline.dynamics.run.horizon import PerturbedRun
 
 #: an integration is repeated so often, and short ones until they have taken this time together, but no more often than
 #: that: a disturbance of a millisecond is a tenth of some. What has taken LONG is an average by itself [s]
@@ -35,8 +35,8 @@ REPEATS, ENOUGH, MOST, LONG = 3, 0.05, 15, 1.5
 class Cost:
     """Processor times [s] of warm repeats, each one's integration and of some its record; and what was run.
 
-    run: the same dataset as every run's (schema RUN).  length: size of the mechanism [m].  The twin of a run with
-    contacts is in no time, nor are setting up and the look at the ledger.
+    run: the same dataset as every run's (schema RUN).  length: size of the mechanism [m].  No time includes the
+    perturbed run of a scene with contacts, nor setting up and checking the ledger.
     """
 
     run: xr.Dataset
@@ -55,23 +55,23 @@ def measure(
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
-    last, trajectory, switched, twin = _followed(engine, start, progress, other)
+    last, trajectory, switched, perturbed = _followed(engine, start, progress, other)
     seen = observed(last, trajectory)
     if checked:
         require_closed(last.model, trajectory, seen)
     recording = _repeated(lambda: dataset(Run(scene, last, trajectory, observed(last, trajectory), None, switched)), 0)
-    run = dataset(Run(scene, last, trajectory, seen, twin, switched))
+    run = dataset(Run(scene, last, trajectory, seen, perturbed, switched))
     integration = _repeated(lambda: follow(engine, start, silent, other), MOST)
     return Cost(run, integration, recording, engine.model.length)
 
 
 def _followed(
     engine: Engine, start: np.ndarray, progress: Progress, other: Callable[[str], Engine]
-) -> tuple[Engine, Trajectory, str, Twin | None]:
-    """What a run follows, and where it has contacts its twin after it: what is measured goes on alone."""
+) -> tuple[Engine, Trajectory, str, PerturbedRun | None]:
+    """The run, and after it the perturbed run of a scene with contacts: a measured run has no other next to it."""
     if not engine.model.contacts:
         return *follow(engine, start, progress, other), None
-    from flexclear.pipeline.dynamics.run.sensitivity import Pair
+    from flexclear.pipeline.dynamics.run.horizon import Pair
 
     pair = Pair(engine)
     followed = pair.run(lambda *told: follow(engine, start, progress, other, None, *told))
@@ -79,7 +79,7 @@ def _followed(
     def steps(mine: Engine, y: np.ndarray, *told: Any) -> Followed:
         return follow(mine, y, silent, lambda name: another(other(name)), None, *told)
 
-    return *followed, pair.twin(start, steps, silent)
+    return *followed, pair.perturbed_run(start, steps, silent)
 
 
 def _repeated(task: Callable[[], object], most: int) -> tuple[float, ...]:

@@ -13,6 +13,7 @@ from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled
 from flexclear.pipeline.core.artifacts.schema import RUN, conformed
 from flexclear.pipeline.core.citations import cited
+from flexclear.pipeline.core.quantities import PERTURBATION
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import library_version
@@ -71,10 +72,10 @@ def recorded(run: Run) -> LabelledArrays:
         from flexclear.pipeline.dynamics.record.wear import wear_series
 
         parts.append(wear_series(model, seen))
-    if run.twin is not None:
-        horizon: Variables = {"horizon": ((), np.array(run.twin.horizon))}
-        separation: Variables = {"twin_separation": (("twin_time",), run.twin.separation)}
-        parts.append((separation | horizon, {"twin_time": run.twin.time}))
+    if run.perturbed is not None:
+        horizon: Variables = {"horizon": ((), np.array(run.perturbed.horizon))}
+        separation: Variables = {"separation": (("separation_time",), run.perturbed.separation)}
+        parts.append((separation | horizon, {"separation_time": run.perturbed.time}))
     for name, asked in run.scene.output.requests().items():
         record = lookup(RECORDS, name, where="[output]")
         parts.append(record(motions, asked))
@@ -190,8 +191,8 @@ def _report(run: Run) -> dict[str, float | int | str]:
         "largest_rate_drift_before_projection": run.trajectory.rate_drift,
         "closure_residual_of_given_start": run.model.mechanism.start_residual,
     }
-    if run.twin is not None:
-        told["twin_perturbation"] = run.twin.perturbation
+    if run.perturbed is not None:
+        told["separation_perturbation"] = PERTURBATION
     told |= {"redundant_closure_rows": redundant, "method": run.model.scene.solver.integrator}
     if run.mended:
         told["start_mended"] = "\n".join(run.mended)

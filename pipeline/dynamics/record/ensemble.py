@@ -24,9 +24,9 @@ from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.run.crew import Place
 from flexclear.pipeline.dynamics.run.engine import Engine, another
+from flexclear.pipeline.dynamics.run.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.run import engines, follow, observed
-from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.singular import select_rows
 from flexclear.pipeline.dynamics.run.specialised import abreast
 from flexclear.pipeline.dynamics.run.start import consistent_start

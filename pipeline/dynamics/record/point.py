@@ -27,10 +27,10 @@ from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.alike import engines_alike
 from flexclear.pipeline.dynamics.run.crew import Crews, Place, crews
 from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.periods import Cursor, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallow
-from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.specialised import side_by_side
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory

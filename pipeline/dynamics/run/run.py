@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.dynamics.run.collocation import Collocation
-    from flexclear.pipeline.dynamics.run.sensitivity import Twin
+    from flexclear.pipeline.dynamics.run.horizon import PerturbedRun
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Run:
     """A finished integration.
 
     scene: as the user gave it; the engine may hold another, made for it.
-    twin: the run's twin, of scenes with contacts.
+    perturbed: the same run from a perturbed start, of scenes with contacts.
     mended: what was changed of the start that the scene gives, in words.
     switched: from when on and why another integrator took the place of the first; empty when none did.
     """
@@ -54,7 +54,7 @@ class Run:
     engine: Engine
     trajectory: Trajectory
     observed: Observed
-    twin: Twin | None = None
+    perturbed: PerturbedRun | None = None
     switched: str = ""
     mended: tuple[str, ...] = ()
 
@@ -110,7 +110,7 @@ def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
     """What makes the engine of a run by an integrator's name, that of the scene's own by none; it tells how it goes."""
     posed, choice = begun(scene, bundles, progress)
     moved, given = driven(posed, bundles, progress)
-    making = Lock()  # a run and its twin may both go on with another integrator
+    making = Lock()  # a run and its perturbed run may both go on with another integrator
 
     def made(name: str, tell: Progress) -> Engine:
         wanted = edited(moved, {"solver.integrator": name}) if name else moved
@@ -132,9 +132,9 @@ def integrate(
     """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands.
 
     bundles: reduced flexible bodies by name.  judges: who looks whether another integrator shall go on; without them
-    the explicit ones hand over where they would crawl.  The twin of a run with contacts is made beside it, where a
-    processor is free.  Raises InputError for a scene that cannot be built, SolverError when the run cannot go on,
-    StoppedError with the run so far as `partial` when it is asked to stop.
+    the explicit ones hand over where they would crawl.  The perturbed run of a scene with contacts is stepped
+    concurrently where a processor is free.  Raises InputError for a scene that cannot be built, SolverError when the
+    run cannot go on, StoppedError with the run so far as `partial` when it is asked to stop.
     """
     made = _maker(scene, bundles, progress)
     engine = made("", progress)
@@ -143,7 +143,7 @@ def integrate(
     for sentence in [*mended, *([choice] if choice else [])]:
         progress(None, sentence)
 
-    ours, twins = judges or (None, None)
+    ours, others = judges or (None, None)
 
     def steps(
         mine: Engine, y: np.ndarray, tell: Progress, panel: Panel | None, stop: Stop, outputs: np.ndarray | None = None
@@ -166,17 +166,17 @@ def integrate(
 
     if not engine.model.contacts:
         return checked(lambda: steps(engine, start, progress, ours, never))
-    from flexclear.pipeline.dynamics.run.sensitivity import Pair
+    from flexclear.pipeline.dynamics.run.horizon import Pair
 
     pair = Pair(engine)
 
-    def beside_it(alive: Progress) -> Twin:
-        return pair.twin(start, lambda mine, y, *told: steps(mine, y, alive, twins, *told), alive)
+    def neighbour(alive: Progress) -> PerturbedRun:
+        return pair.perturbed_run(start, lambda mine, y, *told: steps(mine, y, alive, others, *told), alive)
 
-    with meanwhile(beside_it) as twin:
+    with meanwhile(neighbour) as perturbed:
         done = checked(lambda: pair.run(lambda *told: steps(engine, start, progress, ours, *told)))
         try:
-            return replace(done, twin=twin())
+            return replace(done, perturbed=perturbed())
         except StoppedError as stopped:
             stopped.partial = done
             raise

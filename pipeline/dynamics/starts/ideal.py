@@ -24,9 +24,9 @@ from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.horizon import offset_jacobian
 from flexclear.pipeline.dynamics.run.observation import observe
 from flexclear.pipeline.dynamics.run.run import driven
-from flexclear.pipeline.dynamics.run.sensitivity import offset_jacobian
 from flexclear.pipeline.dynamics.run.start import consistent_start, project, rates_at_speeds
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 

@@ -90,12 +90,12 @@ def _other_theory(points: Sequence[Point]) -> Point | None:
 
 
 def _location(quantity: Quantity, reference: xr.Dataset, located: float, size: float) -> float:
-    """Bound from the root finder's tolerance: a displacement of that size, grown as the run's twin does."""
+    """Bound from the root finder's tolerance: a displacement of that size, grown as the perturbed run's does."""
     if "clearance" not in reference.attrs:
         return np.nan
     displacement = located * float(reference.attrs["clearance"])
     if quantity.kind == "velocity":
-        return relative(float(reference.attrs.get("growth", 0.0)) * displacement, size)
+        return float(reference.attrs.get("growth", 0.0)) * located
     if quantity.kind == "impact_times":
         speed = reference["event_approach_speed"].values[reference["event_kind"].values == "closing"]
         hard = speed[speed > quantities.IMPACT]

@@ -11,6 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.horizon import sentence
 from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
 from flexclear.pipeline.post.series import parameters
 
@@ -92,15 +93,12 @@ def _horizon(run: xr.Dataset) -> list[str]:
     if "horizon" not in run:
         return []
     end, horizon = float(run["time"].values[-1]), float(run["horizon"])
-    if horizon >= end:
-        return [
-            "Runs that start almost equally stay together to the end: only its own error limits what this run says."
-        ]
-    return [
-        f"Runs that start almost equally differ visibly from <span class='n'>{1e3 * horizon:.4g} ms</span> on (the run "
-        f"lasts <span class='n'>{1e3 * end:.4g} ms</span>). Later values are those of this one run; use averages over "
-        "several runs (<code>[ensemble]</code>) there."
-    ]
+    later = (
+        " Later values are those of this one run; use averages over several runs (<code>[ensemble]</code>) there."
+        if horizon < end
+        else ""
+    )
+    return [html.escape(sentence(horizon, end)) + later]
 
 
 def _trust(run: xr.Dataset) -> list[str]:

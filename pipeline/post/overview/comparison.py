@@ -17,6 +17,7 @@ from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.post.horizon import sentence
 from flexclear.pipeline.post.overview.curves import curves, has, measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table
 
@@ -167,8 +168,7 @@ def table(compared: xr.Dataset) -> Table:
     ]
     end = float(compared["time"].values[-1])
     notes += [
-        f"{label}: runs that start almost equally differ visibly from {1e3 * float(horizon):.4g} ms on; later values "
-        "are those of this run only."
+        f"{label}: {sentence(float(horizon), end)} Later values are those of this run only."
         for label, horizon in zip(labels, compared["horizon"].values, strict=True)
         if horizon < end
     ]

@@ -1,4 +1,4 @@
-"""A run and its twin go on side by side where a processor is free; what comes of them is what comes of one by one."""
+"""A run and its perturbed run are stepped concurrently where a processor is free, with the same results as in turn."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ import xarray as xr
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import SolverError, StoppedError
 from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.quantities import LASTING
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import cores, journal, stopping
-from flexclear.pipeline.dynamics.run import pace, sensitivity, specialised, trajectory
+from flexclear.pipeline.dynamics.run import horizon, pace, specialised, trajectory
 from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.horizon import Pair, PerturbedRun
 from flexclear.pipeline.dynamics.run.run import engine_of, follow
-from flexclear.pipeline.dynamics.run.sensitivity import Pair, Twin
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
 
@@ -38,7 +39,7 @@ def two(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def parting(monkeypatch: pytest.MonkeyPatch) -> None:
     """Motions count as parted before half of the slider-crank's run is over, and are looked at some hundred times."""
-    monkeypatch.setattr(sensitivity, "PARTED", 1e-8)
+    monkeypatch.setattr(horizon, "SEPARATED", 1e-6)
     monkeypatch.setattr(trajectory, "SLICE", 100)
 
 
@@ -98,13 +99,12 @@ def test_a_twin_that_has_parted_is_followed_no_further(root: Path, monkeypatch: 
     monkeypatch.setattr(Pair, "_enough", noted)
     scene = check(root, "clearance_slider_crank")
     run = dynamics.simulate(scene, {}, silent)
-    horizon, shown = float(run.horizon), run.twin_time.values
-    assert 0.0 < horizon < rows[-1] < 0.8 * scene.time.end
-    # what is told of it ends some comparisons after the horizon, wherever it was stopped
-    assert 1 <= (shown > horizon).sum() <= sensitivity.BEYOND + 1
+    end, shown = float(run.horizon), run.separation_time.values
+    assert 0.0 < end < rows[-1] < 0.8 * scene.time.end
+    # the record of it ends where the separation has lasted, wherever the perturbed run was stopped
+    assert shown[-1] <= end + 1.2 * LASTING * scene.time.end
     assert np.all(np.diff(shown) > 0.0)
-    visible = run.twin_separation.values > sensitivity.PARTED * np.linalg.norm(run.velocity.values, axis=2).max()
-    assert not visible[shown < 0.9 * horizon].any()
+    assert np.all(run.separation.values[shown >= end] > horizon.SEPARATED)
 
 
 @pytest.mark.usefixtures("two")
@@ -134,10 +134,10 @@ def test_of_a_twin_that_cannot_be_run_the_run_is_believed_nowhere(
 
     scene = check(root, "bounce")
     expected = alone(scene, monkeypatch)
-    monkeypatch.setattr(sensitivity, "perturbed", refused)
+    monkeypatch.setattr(horizon, "perturbed", refused)
     processors(monkeypatch, processors_there)
     found = dynamics.simulate(scene, {}, silent)
-    assert (float(found.horizon), found.sizes["twin_time"]) == (scene.time.start, 1)
+    assert (float(found.horizon), found.sizes["separation_time"]) == (scene.time.start, 1)
     assert found.position.identical(expected.position)
 
 
@@ -147,7 +147,7 @@ def test_a_twin_that_fails_after_it_has_parted_tells_as_much_as_one_that_does_no
     engine = engine_of(check(root, "clearance_slider_crank"), {}, silent)
     start = consistent_start(engine)
 
-    def twin(until: float) -> Twin:
+    def twin(until: float) -> PerturbedRun:
         def steps(mine: Engine, y: np.ndarray, stop: Stop, outputs: np.ndarray) -> Followed:
             def failing(rows: np.ndarray) -> bool:
                 enough = stop(rows)
@@ -159,7 +159,7 @@ def test_a_twin_that_fails_after_it_has_parted_tells_as_much_as_one_that_does_no
 
         pair = Pair(engine)
         pair.run(lambda *told: follow(engine, start, silent, lambda name: engine, None, *told))
-        return pair.twin(start, steps, silent)
+        return pair.perturbed_run(start, steps, silent)
 
     whole = twin(2.0 * engine.end)
     late, early = twin(whole.time[-1] + 0.2 * engine.end), twin(0.5 * whole.horizon)
@@ -198,7 +198,7 @@ def test_a_twin_does_not_wait_for_a_run_that_never_began(root: Path) -> None:
         raise SolverError("its end")
 
     def interrupted() -> None:
-        with cores.meanwhile(lambda alive: pair.twin(start, steps, alive)):
+        with cores.meanwhile(lambda alive: pair.perturbed_run(start, steps, alive)):
             assert came.wait(PATIENCE)
             raise KeyboardInterrupt
 
@@ -258,7 +258,7 @@ def test_what_is_kept_for_comparisons_alone_is_not_in_the_dataset(root: Path) ->
     """Ten outputs in the whole run, and comparisons between them."""
     scene = check(root, "bounce", **{"output.interval": 0.1})
     run, pair = dynamics.simulate(scene, {}, silent), Pair(engine_of(scene, {}, silent))
-    assert run.sizes["twin_time"] >= len(pair.added) >= 0.9 * sensitivity.SAMPLES
+    assert run.sizes["separation_time"] >= len(pair.added) >= 0.9 * horizon.SAMPLES
     assert not np.isin(run.time.values, pair.added).any()
     assert np.isin(trajectory.output_times(np.array([scene.time.start, scene.time.end]), 0.1), run.time.values).all()
 

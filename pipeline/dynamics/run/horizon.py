@@ -1,0 +1,306 @@
+"""Predictability horizon of a run with contacts: the growth of a small perturbation of its start.
+
+Impacts make neighbouring motions diverge exponentially, and with them the errors of any integration. The perturbed run
+starts with every contact moved by a small fraction of its clearance. The separation of the two runs is measured body by
+body in the norm of the kinetic energy, so that rotations, centres of mass and vibrations all count. Where a body stays
+visibly separated for some time, the horizon ends; beyond it, values of the run are one draw out of many. A difference
+that disappears again is none: an impact that comes a little earlier, or a perturbation that dies out.
+
+The perturbed run is stepped concurrently where a processor is free, else after the run. It takes the run's own steps
+from another start, with the same output times, and ends where the horizon is known: the result does not depend on
+which of the two was ahead.
+
+Source: finite-time growth rates: Ott, *Chaos in Dynamical Systems*, 2nd ed. (2002), sec. 4.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Condition
+
+import numpy as np
+
+from flexclear.pipeline.core.errors import SolverError, StoppedError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.quantities import LASTING, PERTURBATION, SEPARATED, lasting
+from flexclear.pipeline.core.workflow.cores import TICK
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.run.engine import Engine, another
+from flexclear.pipeline.dynamics.run.observation import frames
+from flexclear.pipeline.dynamics.run.singular import select_rows
+from flexclear.pipeline.dynamics.run.start import project, rates_at_speeds
+from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop, output_times
+
+#: the two are compared at about this many times, which bounds the cost; where outputs are rarer, between them as well
+SAMPLES = 180
+#: a body's motion counts relative to its own largest, but no less than this fraction of the liveliest body's, below
+#: which rounding and the drift of loops move it
+AT_REST = 1e-3
+
+
+@dataclass(frozen=True)
+class PerturbedRun:
+    """Separation of a run and the same run from a perturbed start.
+
+    time [s], separation, a fraction of the largest motion, shape (n,); horizon [s], the start where the perturbed run
+    fails.
+    """
+
+    time: np.ndarray
+    separation: np.ndarray
+    horizon: float
+
+
+@dataclass
+class _Seen:
+    """One of the two so far. rows: of the record.  motion: at the times of comparison, (times so far, entries)."""
+
+    rows: np.ndarray
+    motion: np.ndarray
+
+
+class Pair:
+    """A run and its perturbed run, in two threads with an engine each; a third engine evaluates their rows.
+
+    outputs: times [s] at which both record rows.  added: those of them that the scene does not request.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        requested = output_times(engine.breaks, engine.model.scene.output.interval)
+        self.added = _between(engine, requested)
+        self.outputs = np.union1d(requested, self.added)
+        self.times = np.union1d(self.outputs[:: max(1, len(self.outputs) // SAMPLES)], self.outputs[-1])
+        self._engine, self._looking = another(engine), another(engine)
+        self._metric = _Metric(engine)
+        self._run, self._news = self._unseen(), Condition()
+        self._complete, self._ended = False, False
+
+    def run(self, steps: Callable[[Stop, np.ndarray], Followed]) -> Followed:
+        """Result of the run that takes these steps, without the rows that serve comparisons alone."""
+        try:
+            engine, trajectory, switched = steps(self._hear, self.outputs)
+            self._hear(trajectory.rows)
+            self._complete = True
+        except StoppedError as stopped:
+            if stopped.partial is not None:
+                engine, trajectory = stopped.partial
+                stopped.partial = engine, trajectory.without(self.added)
+            raise
+        finally:
+            with self._news:
+                self._ended = True
+                self._news.notify_all()
+        return engine, trajectory.without(self.added), switched
+
+    def perturbed_run(
+        self, start: np.ndarray, steps: Callable[[Engine, np.ndarray, Stop, np.ndarray], Followed], alive: Progress
+    ) -> PerturbedRun:
+        """Run the scene again from a start whose contacts are moved, and compare the two.
+
+        steps: takes the same steps as the run, with an engine from a start.  alive: called while it waits for the run;
+        what it raises ends the work.
+        """
+        engine, other, failed = self._engine, self._unseen(), False
+
+        def enough(rows: np.ndarray) -> bool:
+            other.rows = rows
+            return self._enough(other, alive)
+
+        try:
+            select_rows(engine, start, engine.start)
+            direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
+            offsets = [PERTURBATION * contact.joint.clearance * direction for contact in engine.model.contacts]
+            moved = perturbed(engine, start, offset_jacobian(engine, start), np.concatenate(offsets))
+            other.rows = steps(engine, moved, enough, self.outputs)[1].rows
+        except SolverError:
+            failed = True
+        self._wait(lambda: self._ended, alive)
+        time, separation, horizon = self._compared(other)
+        if failed and horizon is None:
+            # a neighbour that cannot be run says nothing for the run itself: no value is predictable
+            return PerturbedRun(np.array([engine.start]), np.zeros(1), engine.start)
+        return PerturbedRun(time, separation, engine.end if horizon is None else horizon)
+
+    def _hear(self, rows: np.ndarray) -> bool:
+        """Note the rows that the run has so far; it goes on."""
+        with self._news:
+            self._run.rows = rows
+            self._news.notify_all()
+        return False
+
+    def _enough(self, other: _Seen, alive: Progress) -> bool:
+        """Whether the perturbed run has gone far enough beyond the horizon.
+
+        What is visible depends on the largest motion of the whole run. Where the two are separated by the largest one
+        so far, the perturbed run waits for the run instead of going on, since that seldom changes.
+        """
+        while True:
+            with self._news:
+                complete, ended, known = self._complete, self._ended, self._run.rows
+            self._look(self._run)
+            self._look(other)
+            first = self._separated(self._separation(other))
+            if first is None or self._time(other.rows)[-1] < self._judged(first):
+                return False
+            if complete or ended:
+                return complete
+            self._wait_beyond(known, alive)
+
+    def _wait_beyond(self, known: np.ndarray, alive: Progress) -> None:
+        """Wait until the run has more rows than the known ones, or has ended."""
+        self._wait(lambda: self._ended or self._run.rows is not known, alive)
+
+    def _wait(self, until: Callable[[], bool], alive: Progress) -> None:
+        """Wait for news of the run; a run that fails before it begins sends none."""
+        with self._news:
+            while not self._news.wait_for(until, TICK):
+                alive(None, "")
+
+    def _compared(self, other: _Seen) -> tuple[np.ndarray, np.ndarray, float | None]:
+        """Times of comparison [s], separation and the horizon [s], when both have ended; None where they stay close."""
+        self._look(self._run)
+        self._look(other)
+        separation = self._separation(other)
+        time, k = self.times[: len(separation)], self._separated(separation)
+        if k is None:
+            return time, separation, None
+        shown = time <= self._judged(k)
+        time, separation = time[shown], separation[shown]
+        finer = self.outputs[(self.outputs > self.times[max(k - 1, 0)]) & (self.outputs < self.times[k])]
+        here, there = self._motion(self._run.rows, finer), self._motion(other.rows, finer)
+        between = self._metric.distance(here, there, self._largest())
+        first = np.flatnonzero(between > SEPARATED)[:1]
+        horizon = float(finer[first[0]] if len(first) else time[k])
+        return np.insert(time, k, finer[first]), np.insert(separation, k, between[first]), horizon
+
+    def _separated(self, separation: np.ndarray) -> int | None:
+        """Index of the comparison from which on the two stay visibly separated."""
+        return lasting(self.times[: len(separation)], separation > SEPARATED, LASTING * self._span)
+
+    def _judged(self, k: int) -> float:
+        """Time [s] up to which a separation that begins at comparison k is looked at."""
+        return min(float(self.times[k]) + LASTING * self._span, float(self.times[-1]))
+
+    @property
+    def _span(self) -> float:
+        return self._engine.end - self._engine.start
+
+    def _unseen(self) -> _Seen:
+        model = self._looking.model
+        return _Seen(m.empty_record(0, len(model.contacts), model.ny), np.zeros((0, self._metric.entries)))
+
+    def _look(self, seen: _Seen) -> None:
+        """Add the motion at the times of comparison that a run has come to since the last look."""
+        rows = seen.rows
+        if len(rows):
+            reached = int(np.searchsorted(self.times, self._time(rows)[-1], side="right"))
+            new = self._motion(rows, self.times[len(seen.motion) : reached])
+            seen.motion = np.concatenate([seen.motion, new])
+
+    def _time(self, rows: np.ndarray) -> np.ndarray:
+        return m.record(rows, len(self._looking.model.contacts)).time
+
+    def _motion(self, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Motion at times of which there are rows, shape (time, entries)."""
+        return self._metric.motion(self._looking, rows[np.searchsorted(self._time(rows), times)])
+
+    def _separation(self, other: _Seen) -> np.ndarray:
+        """Separation at the times of comparison that both have come to."""
+        both = min(len(self._run.motion), len(other.motion))
+        return self._metric.distance(self._run.motion[:both], other.motion[:both], self._largest())
+
+    def _largest(self) -> np.ndarray:
+        """Largest motion of each body in the run so far, shape (body,)."""
+        return self._metric.norms(self._run.motion).max(axis=0, initial=0.0)
+
+
+class _Metric:
+    """The motion of all bodies as entries whose squares add up to twice their kinetic energies.
+
+    Of a body: its centre of mass's velocity times the root of its mass, its angular velocity in its own axes times the
+    root of its inertia, and the rates of its modes, which have unit mass. Of flexible bodies the deformation's share in
+    the first two is left out: this is a measure of separation, not an energy balance.
+    """
+
+    def __init__(self, engine: Engine) -> None:
+        model = engine.model
+        self._bodies = list[tuple[int, float, np.ndarray, np.ndarray, np.ndarray]]()
+        for i, link in enumerate(model.mechanism.links):
+            if link.undeformed is not None:
+                moments, axes = np.linalg.eigh(link.undeformed.moments)
+                turning = axes * np.sqrt(np.maximum(moments, 0.0))
+                modes = np.arange(model.nv)[model.numbering.modal_coordinates[i]] if link.flexible else np.zeros(0, int)
+                self._bodies.append((i, link.mass, link.undeformed.com, turning, modes))
+        sizes = [6 + len(modes) for *_, modes in self._bodies]
+        self.entries = sum(sizes)
+        self._first = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64)
+
+    def motion(self, engine: Engine, rows: np.ndarray) -> np.ndarray:
+        """Entries of all bodies in rows of the record [sqrt(J)], shape (row, entries)."""
+        seen = frames(engine, rows).links
+        speeds = m.record(rows, len(engine.model.contacts)).state[:, engine.model.speeds]
+        entries = [np.zeros((len(rows), 0))]
+        for i, mass, com, turning, modes in self._bodies:
+            R_WB, omega = seen["axes"][:, i], seen["omega"][:, i]
+            velocity = seen["velocity"][:, i] + np.cross(omega, R_WB @ com)
+            spin = np.einsum("tij,ti->tj", R_WB, omega)
+            entries += [np.sqrt(mass) * velocity, spin @ turning, speeds[:, modes]]
+        return np.hstack(entries)
+
+    def norms(self, motion: np.ndarray) -> np.ndarray:
+        """Root of twice the kinetic energy of each body [sqrt(J)], shape (row, body)."""
+        if not len(self._first):
+            return np.zeros((len(motion), 0))
+        return np.sqrt(np.add.reduceat(motion**2, self._first, axis=1))
+
+    def distance(self, one: np.ndarray, other: np.ndarray, largest: np.ndarray) -> np.ndarray:
+        """Largest separation of a body at each time, as a fraction of its largest motion in the run."""
+        scale = np.maximum(largest, AT_REST * largest.max(initial=0.0))
+        return np.asarray((self.norms(one - other)[:, scale > 0.0] / scale[scale > 0.0]).max(axis=1, initial=0.0))
+
+
+def _between(engine: Engine, requested: np.ndarray) -> np.ndarray:
+    """Times [s] between outputs that are rarer than comparisons should be.
+
+    Motions diverge in impacts: outputs as rare as a stroke would show it one stroke late.
+    """
+    interval = engine.model.scene.output.interval
+    parts = int(np.ceil(SAMPLES * interval / (engine.end - engine.start) - 1e-9))
+    if parts <= 1:
+        return np.zeros(0)
+    times = output_times(engine.breaks, interval / parts)
+    after = np.clip(np.searchsorted(requested, times), 1, len(requested) - 1)
+    distance = np.minimum(np.abs(times - requested[after - 1]), np.abs(times - requested[after]))
+    return times[distance > 1e-9 * interval / parts]
+
+
+def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """Change of the ball-to-socket vectors (world) per change of the positions, closures closed; (3 contacts, nv).
+
+    Of a stop, whose way has no direction in space, its three rows are alike.  From the velocities that unit speeds add
+    to those of the drives, so that no step width enters.
+    """
+    engine.select_pieces_after(engine.start)
+    contacts, stops = engine.model.arrays.table(m.CONTACTS), engine.model.arrays.size(m.N_SURFACES)
+
+    def offset_rates(speeds: np.ndarray) -> np.ndarray:
+        rates_at_speeds(engine, y, speeds)
+        velocity = engine.table(m.SITE_FRAMES)["velocity"]
+        offset = velocity[contacts["inner"]] - velocity[contacts["outer"]]
+        offset[stops:] = engine.table(m.TOUCH)["rate"][stops:, None]
+        return np.asarray(offset).ravel()
+
+    driven = offset_rates(np.zeros(engine.model.nv))
+    rates = [offset_rates(unit) - driven for unit in np.eye(engine.model.nv)]
+    return np.reshape(rates, (engine.model.nv, -1)).T if rates else np.zeros((len(driven), 0))
+
+
+def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """The start with the balls moved by `offsets` (3 per contact) [m] as nearly as the joints allow."""
+    engine.select_pieces_after(engine.start)
+    speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
+    moved, nq = y.copy(), engine.model.nq
+    # rates per unit time, for one unit: a displacement of 1e-8 m is linear
+    moved[:nq] += rates_at_speeds(engine, y, speeds)[:nq] - rates_at_speeds(engine, y, np.zeros(len(speeds)))[:nq]
+    return project(engine, moved)

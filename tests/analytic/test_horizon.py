@@ -1,0 +1,175 @@
+"""The predictability horizon: growth of a small perturbation of the start."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.quantities import PERTURBATION, lasting
+from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.run.observation import frames
+from flexclear.pipeline.dynamics.run.run import engine_of, observed
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline.post.horizon import horizon
+from tests.analytic.mechanism_runs import TREE, run
+
+
+def test_rigid_clearance_converges_over_the_whole_stroke():
+    """Perturbations grow 2 to 10 times over 0.18 s (28 impacts), measured independently with DOP853 at 1e-13."""
+    csj = run("sps4/variants/first_csj")
+    assert float(csj.horizon) == csj.time.values[-1]
+    # of ten times the perturbation, but for moments of impacts; the bound has ten times of room
+    assert np.median(csj.separation.values[-20:]) < 100.0 * PERTURBATION
+
+
+def test_frames_by_which_runs_are_compared_are_those_of_full_rows_but_for_open_loops():
+    engine = engine_of(load_scene(TREE / "scenes/sps4/variants/first_csj.toml"), {}, silent)
+    trajectory = integrate(engine, consistent_start(engine), silent)
+    seen, alone = observed(engine, trajectory), frames(engine, trajectory.rows)
+    for what in ("links", "sites"):
+        for field in ("origin", "axes", "omega", "velocity"):
+            here, known = getattr(alone, what)[field], getattr(seen, what)[field]
+            # rtol is 1e-10, at which loops drift; rates count per second, so that they are open by more
+            assert np.abs(here - known).max() < 1e-7 * np.abs(known).max(), (what, field)
+
+
+def test_the_perturbed_run_of_a_motion_that_does_not_return_starts_where_the_run_does():
+    """Two lifts, one after the other: at the end other pieces of the law are in force than at the start."""
+    law = (("type", "step"), ("start", (0.0, 0.01)), ("end", (0.01, 0.02)), ("change", (1e-3, 1e-3)))
+    lifted = run("sps4/csj", (("drive.P1.law", law), ("drive.P2.law", law), ("time.end", 0.02)))
+    assert float(lifted.horizon) == lifted.time.values[-1]
+    assert np.median(lifted.separation.values[-20:]) < 100.0 * PERTURBATION
+
+
+def test_the_undamped_flexible_mechanism_is_believed_for_a_part_of_the_stroke_only():
+    """Perturbations grow by 1e6 to 1e7 within 0.1 s there, measured independently with DOP853."""
+    far = run("sps4/far_csj_cb")
+    # before the first impact, at 4.6 ms, nothing separates them
+    assert 0.0046 < float(far.horizon) < 0.12
+    after = far.separation_time.values > float(far.horizon)
+    # by some hundred here, up to where the perturbed run ends
+    assert far.separation.values[after].max() > 50.0 * far.separation.values[1:4].max()
+
+
+def test_rare_outputs_do_not_hide_that_motions_part():
+    """Impacts part them; a twin that is looked at once per stroke would be believed for a whole one."""
+    often = run("sps4/far_csj_cb")
+    rarely = run("sps4/far_csj_cb", (("output.interval", 0.18),))
+    assert len(rarely.time.values) < len(often.time.values) - 1500
+    # looked at where contacts end, at most some milliseconds apart once they come in rows
+    assert abs(float(rarely.horizon) - float(often.horizon)) < 0.01
+
+
+def test_the_horizon_is_one_of_the_mechanism_and_hardly_of_the_tolerance():
+    loose, tight = (float(run("sps4/far_csj_cb", (("solver.rtol", rtol),)).horizon) for rtol in (1e-6, 1e-11))
+    assert 0.5 < loose / tight < 2.0
+
+
+def four_bar(**changes: object) -> Scene:
+    """A rigid four-bar with a loose pin between coupler and rocker, which turns about the ground as the crank does."""
+    pin = {
+        "type": "clearance-revolute",
+        "between": ["coupler.B", "rocker.B"],
+        "clearance": 2e-4,
+        "pin_radius": 8e-3,
+        "length": 16e-3,
+        "normal": {"law": "flores", "restitution": 0.8},
+        **{end: {"youngs_modulus": 207e9, "poisson": 0.29} for end in ("journal_material", "pin_material")},
+    }
+    data = {
+        "title": "a four-bar with a loose pin",
+        "time": {"end": 0.5},
+        "output": {"interval": 5e-4},
+        "solver": {"integrator": "radau", "rtol": 1e-8},
+        "body": {
+            "ground": {"type": "ground", "frames": {"O1": {}, "O2": {"position": [0.2, 0, 0]}}},
+            "crank": bar(0.3, 0.025, [1e-5, 1e-4, 1e-4], O=0.0, A=0.05),
+            "coupler": bar(0.8, 0.09, [1e-4, 3e-3, 3e-3], A=0.0, B=0.18),
+            "rocker": bar(0.4, 0.06, [1e-4, 6e-4, 6e-4], O=0.0, B=0.12),
+        },
+        "joint": {
+            "main": {"type": "revolute", "between": ["ground.O1", "crank.O"]},
+            "A": {"type": "revolute", "between": ["crank.A", "coupler.A"]},
+            "O2": {"type": "revolute", "between": ["ground.O2", "rocker.O"]},
+            "B": pin,
+        },
+        "drive": {"motor": {"joint": "main", "law": {"type": "polynomial", "coefficients": [0, 10.0 * np.pi]}}},
+        "load": {"gravity": {"type": "gravity", "acceleration": [0, -9.81, 0]}},
+        "start": {"at": "ideal", "joint": {"O2": {"near": np.deg2rad(110.0)}}},
+    }
+    return Scene.model_validate(data | changes)
+
+
+def bar(mass: float, com: float, inertia: list[float], **ends: float) -> dict[str, object]:
+    frames = {name: {"position": [x, 0, 0]} for name, x in ends.items()}
+    return {"type": "rigid", "mass": mass, "com": [com, 0, 0], "inertia": inertia, "frames": frames}
+
+
+def test_bodies_that_only_turn_about_fixed_points_are_compared_as_well():
+    """Frames of links lie on pins there, whose velocities are zero or prescribed; an ensemble diverges all the same."""
+    loose = dynamics.simulate(four_bar(), {}, silent)
+    members = dynamics.ensemble(four_bar(ensemble={"members": 4}), {}, silent)
+    diverged = horizon(members.time.values, members.velocity.values)
+    assert float(loose.horizon) < 0.5
+    # two draws of an exponential growth from 4 and 10 nm: the same impact or one of the next
+    assert 0.5 < diverged / float(loose.horizon) < 2.0
+
+
+def test_a_perturbation_that_dies_out_ends_no_horizon():
+    """Loose, with a rtol at which integration errs by more than the perturbation, and without an impact."""
+    scene = four_bar(load={"gravity": {"type": "gravity", "acceleration": [0, -981.0, 0]}})
+    pressed = dynamics.simulate(edited(scene, {"solver.rtol": 1e-5, "time.end": 0.05}), {}, silent)
+    assert float(pressed.horizon) == 0.05
+
+
+@pytest.mark.parametrize("what", ["stop", "ball"])
+def test_without_a_free_coordinate_nothing_can_separate(what: str):
+    guide = {"type": "prismatic", "between": ["ground.rail", "slide.rail"]}
+    data = {
+        "title": "a driven slide",
+        "time": {"end": 0.2},
+        "body": {
+            "ground": {"type": "ground", "frames": {"rail": {}, "floor": {"position": [0, 0, 0.006]}}},
+            "slide": {"type": "rigid", "mass": 1.0, "inertia": [1e-3] * 3, "frames": {"rail": {}}},
+        },
+        "joint": {"guide": guide},
+        "drive": {"push": {"joint": "guide", "law": {"type": "polynomial", "coefficients": [0.02, -0.05]}}},
+    }
+    normal = {"law": "hertz", "stiffness": 1e5, "exponent": 1.5}
+    if what == "stop":
+        data["stop"] = {"end": {"joint": "guide", "lower": 0.015, "normal": normal}}
+    else:
+        data["joint"]["floor"] = {
+            "type": "ball-on-plane",
+            "between": ["ground.floor", "slide.rail"],
+            "ball_radius": 5e-3,
+            "normal": normal,
+        }
+    held = dynamics.simulate(Scene.model_validate(data), {}, silent)
+    assert float(held.contact_normal_force.max()) > 0.0
+    assert float(held.horizon) == 0.2
+    assert float(held.separation.max()) == 0.0
+
+
+@pytest.mark.parametrize(
+    "separated, first",
+    [
+        ([0, 1, 1, 0, 0, 0, 0, 0], None),
+        ([0, 1, 1, 0, 1, 1, 1, 1], 4),
+        ([0, 0, 0, 0, 0, 0, 1, 1], 6),
+        ([1, 1, 1, 1, 0, 0, 0, 0], 0),
+        ([0] * 8, None),
+    ],
+)
+def test_a_separation_counts_where_it_lasts(separated: list[int], first: int | None):
+    assert lasting(np.arange(8.0), np.array(separated, dtype=bool), 2.5) == first
+
+
+def test_a_run_without_contacts_has_no_perturbed_run():
+    ideal = run("sps4/ideal")
+    assert "horizon" not in ideal
+    assert "separation" not in ideal
