@@ -21,7 +21,6 @@ _CORE, _RUN = "flexclear.pipeline.core", "flexclear.pipeline.dynamics"
 PARTS: Mapping[str, Mapping[str, str]] = {
     f"{_CORE}.scene.load": {"load_scene": "scene"},
     f"{_CORE}.workflow.task": {"facts": "keys", "key": "keys"},
-    f"{_CORE}.workflow.settled": {"state": "keys", "again": "keys"},
     f"{_CORE}.artifacts.store": {"Store.find": "keys", "_store": "writing"},
     f"{_RUN}.run.engine": {"prepare": "assembling"},
     f"{_RUN}.model.model": {"tabulate": "assembling"},

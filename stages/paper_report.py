@@ -9,11 +9,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from flexclear.pipeline.core.artifacts.paths import DATA, TREE
+from flexclear.pipeline.core.artifacts.paths import DATA
 from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow import opened
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import kernels, s4_simulate, s5_post, timing
@@ -80,21 +79,14 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
     return {f"kernels/{k}": task for k, task in enumerate(found.values())}
 
 
-def bring(place: Workplace) -> tuple[list[Task], Outcome, dict[str, str]]:
-    """Bring everything that the report shows, and the page, up to date; what fails is left out of the page.
-
-    Returns the tasks as well, and the digests of the files that were read to build them.
-    """
+def bring(place: Workplace) -> Outcome:
+    """Bring everything that the report shows, and the page, up to date; what fails is left out of the page."""
     scenes = Scenes()
-    with opened.noticed(TREE, outside=(place.store.root,)) as read:
-        tasks = report_tasks(place, scenes)
-    shown = place.bring(tasks)
+    shown = place.bring(report_tasks(place, scenes))
     graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in shown.records]
-    with opened.noticed(TREE, outside=(place.store.root,)) as read_for_page:
-        page = page_task(place, shown.records, graphs)
-    made = place.bring([page])
+    made = place.bring([page_task(place, shown.records, graphs)])
     check(made)
-    return [*tasks, page], Outcome({**shown.records, **made.records}, shown.failures), read_for_page | read
+    return Outcome({**shown.records, **made.records}, shown.failures)
 
 
 def report_tasks(place: Workplace, scenes: Scenes) -> list[Task]:

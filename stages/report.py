@@ -9,8 +9,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from flexclear.pipeline.core.workflow import settled
-from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.pipeline.post.render import gl
 from flexclear.stages.workplace import Workplace, check, common_arguments, near, workplace
 
@@ -43,36 +41,15 @@ def make(place: Workplace, *, folder: bool = False) -> Path:
 
     What fails is left out of the page and raised (FailedTasksError) after the page is written.
     """
-    now, outcome = state(place), None
-    if not settled.again(memo(place), now, place.store):
-        outcome = _bring(place, now)
+    from flexclear.stages import paper_report
+
+    outcome = paper_report.bring(place)
     if gl.state().endswith("none"):
         place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
-    if outcome is not None:
-        check(outcome)
+    check(outcome)
     target = place.store.root / "report" / "index.html"
     if not folder:
         return target
     from flexclear.stages.own_report import publish_page
 
     return publish_page(target.parent, "folder", target.read_bytes(), folder=True)
-
-
-def _bring(place: Workplace, now: dict[str, str]) -> Outcome:
-    """Whatever there is to be done; remembered when nothing is left, and all of it was of one state."""
-    from flexclear.stages import paper_report
-
-    tasks, outcome, read = paper_report.bring(place)
-    if not outcome.failures and state(place) == now:
-        settled.keep(memo(place), now, read, tasks, outcome.records, place.store)
-    return outcome
-
-
-def memo(place: Workplace) -> Path:
-    """What remembers a report that was brought up to date."""
-    return place.store.root / "cache" / "report.json"
-
-
-def state(place: Workplace) -> dict[str, str]:
-    """All that decides the report's tasks: beside what `settled.state` finds, where results are, and what can draw."""
-    return settled.state({"results": str(place.store.root), "gl": gl.state()})

@@ -94,14 +94,6 @@ def test_what_is_fresh_needs_no_library_that_computes_or_draws(fresh: Path, comm
     assert found <= ALLOWED
 
 
-def test_a_report_that_is_known_again_reads_no_scene(fresh: Path) -> None:
-    """Nor does it import what checks scenes."""
-    imported("report", results=fresh)
-    before = records(fresh)
-    assert imported("report", results=fresh) == {"flexclear"}
-    assert records(fresh) == before
-
-
 def test_what_needs_a_library_shows_it(fresh: Path) -> None:
     """The principal moments of a full inertia matrix are eigenvalues: so the test above would see NumPy."""
     assert "numpy" in imported("why", "checks/bennett", results=fresh)

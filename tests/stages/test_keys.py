@@ -16,7 +16,15 @@ from hypothesis import strategies as st
 from flexclear.pipeline.core.artifacts.disk import read_checked
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources, imported, parents, source_file, sources_of
+from flexclear.pipeline.core.workflow.fingerprint import (
+    TREE,
+    Sources,
+    code_digest,
+    imported,
+    parents,
+    source_file,
+    sources_of,
+)
 from flexclear.pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
 from flexclear.stages import s4_simulate, s5_post
 from flexclear.stages.graph import Graph
@@ -265,10 +273,67 @@ def test_editing_a_module_reruns_only_scenes_that_reach_it(
 ):
     before = {name: keys(graph(root, name), sources) for name in ("sps4/ideal", "sps4/csj", "sps4/far_cb")}
     path = copy / "pipeline" / module
-    path.write_text(path.read_text() + "\n# one more line\n")
+    path.write_text(path.read_text() + "\nEDITED = 1\n")
     edited = Sources(copy)
     after = {name: keys(graph(root, name), edited) for name in before}
     assert {name for name in before if changed(before[name], after[name])} == scenes
+
+
+REWORDED = {
+    "comment": ("    return a + b", "    # the sum\n    return a + b"),
+    "docstring": ('"""Sum."""', '"""The sum of two numbers."""'),
+    "message": ("must be positive", "{a} is negative; give a positive number"),
+    "layout": ("    return a + b", "    return (\n        a + b\n    )"),
+}
+CHANGED = {
+    "operation": ("a + b", "a - b"),
+    "number": ("LIMIT = 0", "LIMIT = 1"),
+    "text": ('"sum"', '"total"'),
+    "which error": ("ValueError", "TypeError"),
+    "condition": ("a < LIMIT", "a <= LIMIT"),
+}
+SOURCE = '''"""Adds."""
+
+LIMIT = 0
+NAME = "sum"
+
+
+def add(a, b):
+    """Sum."""
+    if a < LIMIT:
+        raise ValueError(f"must be positive")
+    return a + b
+'''
+
+
+@pytest.mark.parametrize("edit", [*REWORDED, *CHANGED])
+def test_words_do_not_count_and_code_does(edit: str):
+    before, after = (REWORDED | CHANGED)[edit]
+    assert before in SOURCE
+    one, other = (code_digest(ast.parse(text)) for text in (SOURCE, SOURCE.replace(before, after)))
+    assert (one == other) is (edit in REWORDED)
+
+
+def test_docstrings_count_where_they_are_titles():
+    one, other = (ast.parse(f'"""{title}."""\nX = 1\n') for title in ("One", "Other"))
+    assert code_digest(one) == code_digest(other)
+    assert code_digest(one, docstring=True) != code_digest(other, docstring=True)
+
+
+@pytest.mark.parametrize(
+    "module, edit",
+    [
+        ("core/system.py", ('"""', '"""More words. ')),
+        ("core/registry.py", ('"""', '"""More words. ')),
+        ("core/scene/mistakes.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
+        ("core/citations.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
+    ],
+)
+def test_another_word_runs_nothing_again(root: Path, sources: Sources, copy: Path, module: str, edit: tuple[str, str]):
+    before = keys(graph(root, "sps4/far_csj_cb"), sources)
+    path = copy / "pipeline" / module
+    path.write_text(path.read_text().replace(*edit, 1))
+    assert changed(before, keys(graph(root, "sps4/far_csj_cb"), Sources(copy))) == set()
 
 
 def test_the_memo_of_imports_notices_edits(copy: Path):
@@ -294,7 +359,7 @@ def test_a_process_reads_its_own_sources_once(tmp_path: Path, monkeypatch: pytes
         patch.setattr(Sources, "_parse", lambda self, path, name: pytest.fail(f"{name} is read again"))
         assert sources_of(TREE, memo).closure(roots) == known
     assert {name: module.digest for name, module in known.items()} == {
-        name: digest for name, (digest, *_) in (read_checked(memo) or {}).items()
+        name: digest for name, (_, digest, *_) in (read_checked(memo) or {}).items()
     }
 
 

@@ -20,6 +20,7 @@ from flexclear.pipeline.core.workflow import opened
 from flexclear.pipeline.core.workflow.execute import execute, find, states
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
 from flexclear.pipeline.core.workflow.task import Task, facts
+from flexclear.pipeline.post import pages
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.stages import s4_simulate
@@ -227,3 +228,31 @@ def test_libraries_that_write_and_draw_count(sources: Sources) -> None:
     drawn = facts(Task("s", "scene", "flexclear.stages.s6_render:run", {}, ""), {}, sources)
     assert drawn["library vtk"][0].isdigit()
     assert drawn["library pillow"][0].isdigit()
+
+
+def test_what_a_page_opens_counts_each_time(root: Path) -> None:
+    """Whatever the process did before: a second page of one process depends on the same files as its first."""
+    found = []
+    for _ in range(2):
+        with opened.watched(root) as read:
+            for name in ("page.css", "page.js", "viewer.js"):
+                assert pages.asset(name)
+        found.append(read)
+    assert found[0] == found[1]
+    assert {Path(name).name for name in found[0]} == {"page.css", "page.js", "viewer.js"}
+
+
+def test_what_a_library_writes_for_itself_is_no_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Matplotlib reads its list of fonts and writes it anew, where the home folder cannot be written in a folder of
+    its own, which the environment names from then on; other processes may do so meanwhile."""
+    own, others, table = tmp_path / "own.json", tmp_path / "state" / "fonts.json", tmp_path / "table.csv"
+    others.parent.mkdir()
+    for path in (own, others, table):
+        path.write_text("before")
+    with opened.watched(tmp_path) as read:
+        assert own.read_text() == table.read_text() == "before"
+        own.write_text("after")
+        monkeypatch.setenv("MPLCONFIGDIR", str(others.parent))
+        assert others.read_text() == "before"
+        os.replace(shutil.copy(own, tmp_path / "new.json"), others)
+    assert set(read) == {"table.csv"}

@@ -1,6 +1,7 @@
 """Which source a result depends on: the static import closure of modules, and their digests.
 
-Only names below `OWN` are followed; other top-level imports are libraries, which count by their
+A module counts by its syntax tree without comments, docstrings and the words of the errors that it raises: wording
+changes no result.  Only names below `OWN` are followed; other top-level imports are libraries, which count by their
 version. Parts that are looked up by name at run time are not seen here: whoever builds a task
 names their modules as further roots.
 """
@@ -22,11 +23,28 @@ from threading import Lock
 from flexclear.pipeline.core.artifacts.disk import checked, publish, read_checked
 from flexclear.pipeline.core.artifacts.paths import TREE
 
-__all__ = ["TREE", "Sources", "imported", "library_version", "library_versions", "parents", "source_file", "sources_of"]
+__all__ = [
+    "TREE",
+    "Sources",
+    "code_digest",
+    "imported",
+    "library_version",
+    "library_versions",
+    "parents",
+    "source_file",
+    "sources_of",
+]
 
 OWN = ("flexclear", "benchmarks")
-#: what modules import, by name, with the digest of the text that says so: what one `Sources` has learnt no other parses
-KNOWN: dict[str, tuple[str, list[str], list[str]]] = {}
+#: by module: digest of its text, digest of its code, own modules and libraries that it imports
+Known = dict[str, tuple[str, str, list[str], list[str]]]
+#: what one `Sources` has parsed, no other parses
+KNOWN: Known = {}
+#: modules that only word messages, citations and validation errors: no result depends on them
+_SCENE = "flexclear.pipeline.core.scene"
+WORDING = {"flexclear.pipeline.core.citations", f"{_SCENE}.meanings", f"{_SCENE}.mistakes", f"{_SCENE}.oddities"}
+#: packages whose modules' docstrings are titles on pages
+TITLED = ("flexclear.pipeline.post.figures.",)
 #: how often a source is parsed at most, where threads of libraries come between
 ATTEMPTS = 10
 _PARSING = Lock()
@@ -36,8 +54,12 @@ DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtk
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """One source file: digest of its bytes, own modules and libraries that it imports, whether others may lie below."""
+    """One source file. text, digest: digests of its bytes and of its code.
 
+    own, libraries: modules and libraries that it imports.  package: whether others may lie below.
+    """
+
+    text: str
     digest: str
     own: frozenset[str]
     libraries: frozenset[str]
@@ -56,7 +78,7 @@ class Sources:
     root: Path
     memo: Path | None = None
     read: dict[str, Module | None] = field(default_factory=dict, repr=False, compare=False)
-    imports: dict[str, tuple[str, list[str], list[str]]] = field(default_factory=dict, repr=False, compare=False)
+    imports: Known = field(default_factory=dict, repr=False, compare=False)
     next: dict[str, tuple[str, ...]] = field(default_factory=dict, repr=False, compare=False)
     closures: dict[frozenset[str], dict[str, Module]] = field(default_factory=dict, repr=False, compare=False)
     codes: dict[frozenset[str], dict[str, str]] = field(default_factory=dict, repr=False, compare=False)
@@ -72,8 +94,8 @@ class Sources:
             known = dict(self.imports)
             self.closures[wanted] = self._reach(wanted)
             for name, module in self.closures[wanted].items():
-                if self.imports.get(name, [""])[0] != module.digest:
-                    self.imports[name] = (module.digest, sorted(module.own), sorted(module.libraries))
+                if self.imports.get(name, [""])[0] != module.text:
+                    self.imports[name] = (module.text, module.digest, sorted(module.own), sorted(module.libraries))
             if self.memo is not None and self.imports != known:
                 with contextlib.suppress(OSError):
                     publish(self.memo, checked(self.imports))
@@ -88,7 +110,8 @@ class Sources:
         if wanted not in self.codes:
             closure = self.closure(wanted)
             libraries = frozenset().union(*(module.libraries for module in closure.values()))
-            self.codes[wanted] = {f"module {name}": module.digest for name, module in closure.items()} | {
+            counting = {name: module for name, module in closure.items() if name not in WORDING}
+            self.codes[wanted] = {f"module {name}": module.digest for name, module in counting.items()} | {
                 f"library {name}": version for name, version in library_versions(libraries).items()
             }
         return self.codes[wanted]
@@ -124,18 +147,21 @@ class Sources:
         return self.next[name]
 
     def _parse(self, path: Path, name: str) -> Module:
-        source = path.read_bytes()
-        digest = hashlib.sha256(source).hexdigest()
-        if KNOWN.get(name, [""])[0] != digest:
-            own, libraries = imported(source, name, path.name == "__init__.py")
-            KNOWN[name] = (digest, sorted(own), sorted(libraries))
-        _, own_names, library_names = KNOWN[name]
-        return Module(digest, frozenset(own_names), frozenset(library_names), path.name == "__init__.py")
+        source, package = path.read_bytes(), path.name == "__init__.py"
+        text = hashlib.sha256(source).hexdigest()
+        if KNOWN.get(name, [""])[0] != text:
+            tree = _parsed(source)
+            own, libraries = _imported(tree, name, package, deep=True)
+            code = code_digest(tree, docstring=name.startswith(TITLED))
+            KNOWN[name] = (text, code, sorted(own), sorted(libraries))
+        _, code, own_names, library_names = KNOWN[name]
+        return Module(text, code, frozenset(own_names), frozenset(library_names), package)
 
     def _remember(self) -> None:
         """Read the memo, once; one that is damaged is as good as none."""
         if self.memo is not None and not self.imports:
-            self.imports.update(read_checked(self.memo) or {})
+            remembered = read_checked(self.memo) or {}
+            self.imports.update({name: entry for name, entry in remembered.items() if len(entry) == 4})
             KNOWN.update(self.imports)
 
 
@@ -170,9 +196,13 @@ def imported(source: bytes, name: str, package: bool, *, deep: bool = True) -> t
 
     deep: also in functions, which import what only some need.
     """
+    return _imported(_parsed(source), name, package, deep)
+
+
+def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[set[str], set[str]]:
     own: set[str] = set()
     libraries: set[str] = set()
-    for target in _imports(_parsed(source).body, name if package else name.rpartition(".")[0], deep):
+    for target in _imports(tree.body, name if package else name.rpartition(".")[0], deep):
         top = target.partition(".")[0]
         if top in OWN:
             own.add(target)
@@ -181,10 +211,52 @@ def imported(source: bytes, name: str, package: bool, *, deep: bool = True) -> t
     return own, libraries
 
 
+def code_digest(tree: ast.Module, *, docstring: bool = False) -> str:
+    """Digest of what a module does: its syntax tree without docstrings and without the words of raised errors.
+
+    docstring: whether that of the module counts.
+    """
+    words = [ast.get_docstring(tree) or ""] if docstring else []
+    _write_code(tree, words, worded=True)
+    return hashlib.sha256("\0".join(words).encode()).hexdigest()
+
+
+def _write_code(node: ast.AST, words: list[str], worded: bool) -> None:
+    """Append the names, constants and nesting of a syntax tree, in a form that all releases of Python share.
+
+    worded: whether texts count; in a statement that raises an error they do not.
+    """
+    worded = worded and not isinstance(node, ast.Raise)
+    words.append(type(node).__name__)
+    for name in node._fields:
+        value = getattr(node, name, None)
+        if name in ("ctx", "kind", "type_comment", "type_ignores") or value is None or value == []:
+            continue
+        words.append(name)
+        if name == "body" and isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            value = value[1:]
+        for part in value if isinstance(value, list) else [value]:
+            if not worded and (isinstance(part, ast.JoinedStr) or _is_text(part)):
+                words.append("text")
+            elif isinstance(part, ast.AST):
+                _write_code(part, words, worded)
+            else:
+                words.append(repr(part))
+        words.append("]")
+    words.append(")")
+
+
+def _is_text(node: object) -> bool:
+    return isinstance(node, ast.Constant) and isinstance(node.value, str)
+
+
+_DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
+
+
 def _parsed(source: bytes) -> ast.Module:
     """The syntax tree. CPython counts in one place how deep all threads are in theirs, and may find that it is wrong.
 
-    That is so in 3.11 and 3.12 at least (its issue 106905); runs, their twins and members of ensembles are threads.
+    That is so in 3.11 and 3.12 at least (its issue 106905); runs, perturbed runs and members of ensembles are threads.
     """
     for _ in range(ATTEMPTS):
         with contextlib.suppress(SystemError), _PARSING:  # libraries parse as well, and wait for nobody

@@ -62,6 +62,9 @@ class Opened:
     def _left_out(self, name: str) -> bool:
         if name.endswith(CODE) or name.startswith(self.outside) or f"{os.sep}flexclear_kernels_" in name:
             return True
+        # Matplotlib's list of fonts, in a temporary folder where the home folder cannot be written
+        if name.startswith(os.environ.get("MPLCONFIGDIR") or "\0"):
+            return True
         # where modules are looked for there may be archives, which need not be there; editable installs add bare names
         return name in map(os.path.abspath, sys.path)
 
@@ -103,21 +106,15 @@ def ordinary_only() -> Iterator[None]:
 
 @contextmanager
 def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]]:
-    """What `noticed` gives of work that may load compiled kernels, which count by their sources."""
-    with noticed(base, (kernel_root(), *outside)) as found:
-        yield found
+    """Filled at the end: path relative to `base` -> digest, of every file that was opened to be read meanwhile.
 
-
-@contextmanager
-def noticed(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]]:
-    """Filled at the end: place relative to `base` -> digest, of every file that was opened to be read meanwhile.
-
-    outside: folders whose files do not count, beside those of the system, of libraries and of programs' own state.
+    outside: folders whose files do not count, as those of the system, of libraries and of programs' own state do not;
+    nor do compiled kernels, which count by their sources.
     Raises ResourceError when a file changed meanwhile.
     """
     global _current
     _listen()
-    places = (*_system(), *(str(folder) for folder in outside))
+    places = (*_system(), *(str(folder) for folder in (kernel_root(), *outside)))
     found: dict[str, str] = {}
     before, _current = _current, Opened(tuple(f"{place.rstrip(os.sep)}{os.sep}" for place in places))
     seen = _current
@@ -128,8 +125,8 @@ def noticed(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]
     temporary = tempfile.gettempdir()
     for name, then in seen.read.items():
         now = digest(name)
-        if now == ABSENT and name.startswith(temporary):
-            continue  # the task's own, made by a library
+        if name in seen.written or (now == ABSENT and name.startswith(temporary)):
+            continue  # the process's own: made by a task, or by a library for itself
         if now != then:
             raise changed(name)
         found[_place(name, base)] = then

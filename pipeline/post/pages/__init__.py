@@ -5,14 +5,15 @@ from __future__ import annotations
 import html
 import json
 import re
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 
-@cache
 def asset(name: str) -> str:
-    """The text of a file of this folder: ``page.css``, ``page.js``, ``viewer.js``."""
+    """Text of a file of this folder: ``page.css``, ``page.js``, ``viewer.js``.
+
+    Read anew for each page: what a task opens is among the facts of its key.
+    """
     return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
 
