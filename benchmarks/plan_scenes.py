@@ -105,7 +105,7 @@ MECHANISMS = {
     "leg": Mechanism(
         TEMPLATES / "leg" / "leg.toml",
         "ball",
-        {"rod": TEMPLATES / "leg" / "rod.toml"},
+        {"rod": TEMPLATES / "leg" / "leg_rod.toml"},
         {"pose": ("platform.position",), "rate": ("platform.velocity",), "force": ("slide.force", "ball.peak_force")},
     ),
 }

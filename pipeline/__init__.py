@@ -21,10 +21,15 @@ from flexclear.pipeline.core import threads as threads  # before NumPy is loaded
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.core.errors import FlexclearError, InputError, ResourceError, SolverError
     from flexclear.pipeline.core.scene.schema import Scene
 
 __all__ = [
+    "FlexclearError",
+    "InputError",
+    "ResourceError",
     "Scene",
+    "SolverError",
     "compare",
     "cost",
     "edited",
@@ -43,7 +48,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """`Scene`, imported when it is asked for, and the version."""
+    """`Scene` and the errors, imported on demand, and the version."""
+    if name.endswith("Error") and name in __all__:
+        return getattr(import_module("flexclear.pipeline.core.errors"), name)
     if name == "Scene":
         return import_module("flexclear.pipeline.core.scene.schema").Scene
     if name == "__version__":

@@ -15,9 +15,9 @@ first: what is fresh comes from the cache. Examples run as tests. What the datas
 """
 ERRORS = """## Errors
 
-All are `FlexclearError`: `InputError` where something given is wrong (the message names the place, the value, the rule
-and the remedy), `SolverError` where a computation refused or gave up (with the time, the part and the reason), and
-`ResourceError` where the machine lacks memory or disk. The command ends with the exit codes 2, 3 and 4 for them.
+All are `fc.FlexclearError`: `fc.InputError` where something given is wrong (the message names the place, the value, the
+rule and the remedy), `fc.SolverError` where a computation refuses or gives up (with the time, the part and the reason),
+and `fc.ResourceError` where the machine lacks memory or disk. The command ends with the exit codes 2, 3 and 4 for them.
 """
 
 

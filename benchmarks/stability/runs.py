@@ -40,7 +40,7 @@ LEDGER = 1e-4
 #: when a loop is open by more than this [m],
 CLOSURE = 1e-9
 #: or when its platform's speed is off by more than this share of the largest, from that of a run at tighter tolerance,
-#: before its own horizon, which ends where runs from starts a tolerance apart differ by a tenth of that
+#: before its own horizon, which ends where a run and its perturbed run separate by a tenth of that
 DEVIATION = 1e-2
 
 

@@ -182,7 +182,7 @@ def test_a_ledger_that_does_not_close_is_no_result() -> None:
         ({"rtol": 5e-9}, 5e-4),
         ({"rtol": 1e-4}, 1e-3),
         ({"integrator": "generalized-alpha"}, 1e-3),
-        ({"step": 1e-5}, 1.0),
+        ({"step": 1e-5}, 0.1),
     ],
 )
 def test_the_ledger_must_close_as_well_as_the_steps_are_asked_to_be(solver: dict[str, object], share: float) -> None:

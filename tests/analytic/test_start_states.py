@@ -14,7 +14,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.starts import ideal
+from flexclear.pipeline.dynamics.starts import ideal, snapshot
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.test_assembly import loose
 from tests.properties.test_dynamics_start import angles
@@ -131,6 +131,11 @@ def test_a_beam_held_at_an_angle_sags_and_is_let_go_from_there() -> None:
     assert across @ tip == pytest.approx(-sag, rel=1e-4)
     # let go, it keeps its energy: the default tolerance is 1e-10
     assert np.abs(run.energy_error.values).max() < 1e-9 * line * length * G * length
+
+
+def test_what_rounding_leaves_of_a_state_is_zero_in_the_scene_that_begins_there() -> None:
+    """Scenes take no number below 1e-50: a modal rate of 5e-79 comes of rounding alone."""
+    assert snapshot._given(np.array([5e-79, -3e-60, 1e-20, -2.0])) == [0.0, 0.0, 1e-20, -2.0]
 
 
 # Clearance as without ------------------------------------------------------------------------------------------------

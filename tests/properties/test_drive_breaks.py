@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from flexclear.pipeline import load_scene
+from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, jump
 from flexclear.pipeline.dynamics.run.run import engine_of
 
 IDEAL = Path(__file__).parents[2] / "scenes" / "sps4" / "ideal.toml"
@@ -21,3 +23,13 @@ def test_breaks_that_only_rounding_sets_apart_are_one():
     scene = load_scene(IDEAL, {"drive.P1.law": law, "drive.P2.law": law, "time.end": 0.9})
     breaks = engine_of(scene, {}, lambda share, text: None).breaks
     np.testing.assert_allclose(breaks, 0.09 * np.arange(11), atol=1e-15)
+
+
+@pytest.mark.parametrize("end", [0.5, 8.0, 1000.0])
+def test_a_short_motion_in_a_long_run_meets_its_rests(end: float):
+    """A quintic from rest to rest, whose coefficients leave a rate of some 1e-16 at its end."""
+    quintic = Piece(0.1, (0.0, 0.0, 0.0, 10.0 / 0.3**3, -15.0 / 0.3**4, 6.0 / 0.3**5))
+    law = Pieces((Piece(0.0, (0.0,)), quintic, Piece(0.4, (1.0,))))
+    assert jump(law, 0.0, end) is None
+    broken = Pieces((*law.pieces[:2], Piece(0.4, (1.0, 1e-3))))
+    assert jump(broken, 0.0, end) == (0.4, "rate")

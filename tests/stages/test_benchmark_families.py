@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from benchmarks import command_parts, families, faults, log, page
+from benchmarks import command_parts, families, faults, log, page, plan_scenes
 from benchmarks.__main__ import main
 from benchmarks.families import commands, solids
 from benchmarks.family import Case, Family
@@ -46,6 +46,14 @@ def test_make_bench_measures_all_that_stands_on_the_page_of_benchmarks(root: Pat
     recipe = (root / "Makefile").read_text().partition("\nbench:")[2].partition("\n\n")[0]
     named = recipe.partition("-m benchmarks ")[2].split()
     assert sorted(named) == sorted(name for name, family in FAMILIES.items() if family.page == "benchmarks.md")
+
+
+@pytest.mark.parametrize("number", range(len(plan_scenes.ORDER)))
+def test_scenes_of_the_family_of_plans_can_be_drawn(number: int, tmp_path: Path):
+    """They name scenes and recipes that are files of the program."""
+    drawn = plan_scenes.drawn(3, number, tmp_path)
+    assert drawn.told["mechanism"] == plan_scenes.ORDER[number]
+    assert all(Path(body.mesh).is_file() for body in drawn.scene.flexible().values())
 
 
 @pytest.mark.parametrize("name", PAGES)

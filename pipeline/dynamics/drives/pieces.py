@@ -21,6 +21,8 @@ from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.laws import COEFFICIENTS
 
 PACKAGE = "flexclear.pipeline.dynamics.drives"
+#: times at which a piece is evaluated for its size: enough for polynomials of degree 7
+GRID = 17
 Terms = tuple[tuple[float, float, float], ...]  #: amplitude, angular frequency [rad/s], phase at the start [rad]
 
 
@@ -123,5 +125,11 @@ def jump(law: Pieces, start: float, end: float) -> tuple[float, str] | None:
 
 
 def _size(law: Pieces, start: float, end: float, order: int) -> float:
-    """Largest value of a law, or of a derivative, on a grid of times."""
-    return max(abs(law.value(float(t), order)) for t in np.linspace(start, end, 65))
+    """Largest value of a law, or of a derivative, between two times, on a grid of each piece."""
+    until = [*law.starts[1:], inf]
+    spans = [
+        (p, max(p.start, start), min(after, end))
+        for p, after in zip(law.pieces, until, strict=True)
+        if after > start and p.start < end
+    ]
+    return max(abs(p.value(float(t), order)) for p, a, b in spans for t in np.linspace(a, b, GRID))

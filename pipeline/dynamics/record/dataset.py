@@ -134,6 +134,7 @@ def warnings(run: Run) -> list[str]:
         *_flexible_warnings(run),
         *_friction_warnings(run),
         *_step_warnings(run.model, run.trajectory),
+        *ledger.warnings(run.model, run.observed),
     ]
 
 
@@ -200,13 +201,11 @@ def _report(run: Run) -> dict[str, float | int | str]:
         told["switched"] = run.switched
     if redundant:
         told["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
-    doubts = "\n".join(warnings(run))
+    told["warnings"] = "\n".join(warnings(run))
     if run.model.contacts:
         from flexclear.pipeline.dynamics.contact import validity
 
         told["contacts"] = validity.laws(run.model.contacts, run.model.laws)
-    if doubts or run.model.contacts:
-        told["warnings"] = doubts
     return told
 
 

@@ -13,6 +13,7 @@ from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import JointStart, ModalStart, Start
+from flexclear.pipeline.core.units import LARGEST
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.initial import centre_of
 from flexclear.pipeline.dynamics.run.engine import Engine
@@ -35,7 +36,7 @@ def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
         place, frame = model.links[i].places[name], frames[i]
         p = frame["origin"] + frame["axes"] @ place.p + model.mechanism.origin
         quaternion = matrix_to_quaternion(frame["axes"] @ place.R)
-        pose = Pose(position=tuple(p.tolist()), quaternion=tuple(quaternion.tolist()))
+        pose = Pose(position=tuple(_given(p)), quaternion=tuple(_given(quaternion)))
         bodies[name] = body.model_copy(update={"pose": pose})
     given = scene.start.modal if scene.start is not None else {}
     modal = {
@@ -73,7 +74,12 @@ def resting(scene: Scene, contacts: Mapping[str, Clearance]) -> Scene:
 
 def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dict[str, list[float]]:
     """Values of the modes of flexible bodies, by name."""
-    return {str(engine.model.links[i].flexible): values[mine].tolist() for i, mine in numbers.items()}
+    return {str(engine.model.links[i].flexible): _given(values[mine]) for i, mine in numbers.items()}
+
+
+def _given(values: np.ndarray) -> Any:
+    """Computed values as a scene may give them: what rounding leaves below all numbers of scenes is zero."""
+    return np.where(np.abs(values) < 1.0 / LARGEST, 0.0, values).tolist()
 
 
 def _begun(scene: Scene, modal: dict[str, ModalStart]) -> Start:
