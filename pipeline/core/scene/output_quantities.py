@@ -1,6 +1,6 @@
 """What a sweep keeps of each point, by name: a quantity, and what of it.
 
-``platform.velocity.largest`` is ``<quantity>.<reduction>``; quantities are those of `pipeline.core.scene.wanted`. How a
+``platform.velocity.largest`` is ``<quantity>.<reduction>``; quantities are those of `pipeline.core.scene.requested_accuracy`. How a
 series becomes such a number is known to `pipeline.core.quantities`.
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from flexclear.pipeline.core.registry import suggestion
-from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse
+from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity, parse
 
 #: reduction -> what it says of a series
 SERIES = {
