@@ -102,7 +102,7 @@ _lock = threading.Lock()
 def read(function: Callable[..., Any], path: Path, *arguments: Any, limits: Limits | None = None) -> Any:
     """What ``function(path, *arguments)`` gives in the child, as far as `wire` can carry it.
 
-    function: at the top of a module, which the child imports.  Which files were opened is reported to `file_dependencies`.
+    function: at the top of a module, which the child imports.  `file_dependencies` records which files it opened.
     Raises UnreadableError for what cannot be read, or takes more than it may; ResourceError where the machine has
     too little, or a file changes meanwhile.
     """

@@ -1,7 +1,7 @@
 """What a sweep keeps of each point, by name: a quantity, and what of it.
 
-``platform.velocity.largest`` is ``<quantity>.<reduction>``; quantities are those of `pipeline.core.scene.requested_accuracy`. How a
-series becomes such a number is known to `pipeline.core.quantities`.
+``platform.velocity.largest`` is ``<quantity>.<reduction>``; `pipeline.core.scene.requested_accuracy` lists the
+quantities. `pipeline.core.quantities` reduces a series to such a number.
 """
 
 from __future__ import annotations

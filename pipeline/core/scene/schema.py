@@ -103,7 +103,8 @@ class Accuracy(Part):
     """Wanted accuracy of the time integration per quantity, e.g. ``platform.position = "1 um"``.
 
     The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
-    ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.scene.requested_accuracy`.
+    ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities:
+    `pipeline.core.scene.requested_accuracy`.
     quantities: a file writes them without this key.
     allow_missed: what is missed is told either way, and the run kept; without this the command ends with an error.
     by_need: whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step.

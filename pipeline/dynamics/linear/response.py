@@ -1,6 +1,7 @@
 r"""What bending of bodies does to first order along the ideal motion: to places, rates and the forces of joints.
 
-Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that open no joint (`clearance_response`):
+Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that open no joint
+(`clearance_response`):
 
 .. math:: G x + B q = 0, \qquad M\,(\ddot x, \ddot q) + K q = f(t), \qquad M = \sum_b J_b^T M_b J_b
 

@@ -6,8 +6,8 @@ met decide, no clock and no cache, so that equal scenes give equal bytes. Values
 rounding. Friction in ideal joints is solved for by iteration, from what the last evaluation found: that stays with the
 kernels.
 
-Members of an ensemble are evaluated several at once (`run.batched_evaluation`). How many depends on the machine, so the code gives
-the same bits for any number.
+Members of an ensemble are evaluated several at once (`run.batched_evaluation`). How many depends on the
+machine, so the code gives the same bits for any number.
 """
 
 from __future__ import annotations
