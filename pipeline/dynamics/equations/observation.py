@@ -384,7 +384,7 @@ def make_observation(
                     close(h, f, w, n, rows[r, 0], tolerance)
                     break
                 uneven, foreseen = first, False  # as where a step ends
-            kinematics(h, f, w)  # at the accelerations in DU
+            kinematics(data(h, f, w, n))  # at the accelerations in DU
             if tolerance == AS_RECORDED:
                 copy(h, w, out, every, r, 0, True)
             else:

@@ -223,7 +223,7 @@ def make_rates(
         prescribe(d)
         for k in range(d.n_ledger):
             d.ledger_rate[k] = 0.0
-        kinematics(h, f, w)
+        kinematics(d)
         gather_forces(d)
         assemble_mass(d)
         d.evaluation = m.OK
