@@ -1,7 +1,8 @@
 """The decisions of a plan: the error that is wanted is a budget, and what is dropped spends it.
 
 Order of the evidence: bounds and first-order responses along the ideal motion (`dynamics.linear.clearance_response`),
-which cost one run of the ideal mechanism; then runs of variants, rigid ones with clearance and flexible ones without, which are cheap;
+which cost one run of the ideal mechanism; then runs of variants, rigid ones with clearance and flexible ones without,
+which are cheap;
 then, where clearance stays, a loose run of the whole scene to see whether flexible bodies change what it does.
 What is not shown to be small is kept.
 """
