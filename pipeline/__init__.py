@@ -215,7 +215,7 @@ def compare(
 def effects(scene: Scene | str | Path) -> xr.Dataset:
     """What each effect of a scene does to each quantity, taken away and put in, alone and in pairs.
 
-    Variables and meanings: `pipeline.post.influences`.  The quantities are those of `[view] watch`, else of
+    Variables and meanings: `pipeline.post.effect_sizes`.  The quantities are those of `[view] watch`, else of
     `[accuracy]`, else the usual ones.  Raises FlexclearError.
     """
     found: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").workplace())

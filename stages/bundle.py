@@ -17,13 +17,13 @@ from typing import Any
 from flexclear.pipeline.core.artifacts.disk import digest_of, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import TREE, kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError, InputError
-from flexclear.pipeline.core.foreign.checks import require_file
+from flexclear.pipeline.core.external_files.checks import require_file
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import compose, is_file
 from flexclear.pipeline.core.version import version
-from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.workflow import file_dependencies
+from flexclear.pipeline.core.workflow.file_dependencies import note
 from flexclear.pipeline.core.workflow.fingerprint import library_version
-from flexclear.pipeline.core.workflow.opened import note
 from flexclear.stages import run, s1_mesh
 from flexclear.stages.sweep_points import source_digest
 
@@ -107,7 +107,9 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
 def _opened(scene: Path, settings: Sequence[str]) -> list[Path]:
     """The scene, what it extends, recipes, tables, meshes and whatever their readers open."""
     kept, names = [scene], dict[str, str]()
-    with opened.watched(scene.parent, outside=(results_root(), kernel_root(), TREE / "flexclear" / "stages")) as read:
+    with file_dependencies.watched(
+        scene.parent, outside=(results_root(), kernel_root(), TREE / "flexclear" / "stages")
+    ) as read:
         # what is wrong is what the file is made for: each is taken as far as it goes
         with contextlib.suppress(FlexclearError):
             run.loaded(str(scene), settings)

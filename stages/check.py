@@ -16,7 +16,7 @@ from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.file_kinds import RECIPE, SCENE, SWEEP, kind_of_file
 from flexclear.pipeline.core.scene.limits import Limits
 from flexclear.pipeline.core.scene.load import compose, load_scene, read_toml
-from flexclear.pipeline.core.scene.oddities import oddities
+from flexclear.pipeline.core.scene.plausibility import oddities
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.stages import run, s1_mesh, s3_rigid
 from flexclear.stages.graph import Graph

@@ -20,7 +20,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, and `peers`, as of
     `stages.cost_peers`.
     """
-    from flexclear.pipeline.core.scene.wanted import Quantity
+    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
     from flexclear.pipeline.post.cost import causes, price, statistics, work_precision
     from flexclear.pipeline.post.cost.study import Point, assemble
     from flexclear.pipeline.post.plotting.table import files

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.scene.ideal import loose
-from flexclear.pipeline.core.scene.origins import assumed
+from flexclear.pipeline.core.scene.provenance import assumed
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.post.horizon import sentence
 from flexclear.stages import compare, s5_post

@@ -174,7 +174,7 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
 
 def _kinds(owners: dict[str, tuple[str, ...]], name: str) -> set[str]:
     """Kinds of quantities that a part of this name may own."""
-    from flexclear.pipeline.core.scene.wanted import KINDS
+    from flexclear.pipeline.core.scene.requested_accuracy import KINDS
 
     return {kind for kind, of_kind in KINDS.items() if name in owners[of_kind.owner]}
 
@@ -218,9 +218,9 @@ def verify(found: Planned, place: Workplace) -> list[str]:
 
 def beside(found: Planned, place: Workplace) -> xr.Dataset:
     """Distance of the planned run from the full one by quantity, each over members where it has contacts."""
-    from flexclear.pipeline.core import influence
+    from flexclear.pipeline.core import effect_size
     from flexclear.pipeline.core.errors import SolverError
-    from flexclear.pipeline.core.scene.wanted import parse
+    from flexclear.pipeline.core.scene.requested_accuracy import parse
 
     assert found.scene.accuracy is not None
     names = list(found.scene.accuracy.quantities)
@@ -237,12 +237,12 @@ def beside(found: Planned, place: Workplace) -> xr.Dataset:
         if point.refused:
             raise SolverError(f"{found.scene.name}: the {what} run is refused: {point.refused}")
     plan = found.dataset()
-    apart = [influence.influence(two, one, q, MEMBERS) for q in chosen]
+    apart = [effect_size.influence(two, one, q, MEMBERS) for q in chosen]
     result = plan[["wanted"]].copy()
     for k, q in enumerate(chosen):
         want = found.scene.accuracy.quantities[q.name]
         if want.relative is not None:  # what it is relative to is known now
-            result["wanted"][k] = want.relative * influence.size(one, q)
+            result["wanted"][k] = want.relative * effect_size.size(one, q)
     result["error"] = (("quantity",), [i.difference for i in apart])
     result["chance"] = (("quantity",), [i.uncertainty for i in apart])
     return result.assign_attrs(full_evaluations=one.evaluations, planned_evaluations=two.evaluations)

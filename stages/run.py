@@ -16,9 +16,9 @@ from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.errors import InputError, InputErrors, SolverError
 from flexclear.pipeline.core.scene import lines
-from flexclear.pipeline.core.scene.demand import check_run
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
 from flexclear.pipeline.core.scene.references import dangling
+from flexclear.pipeline.core.scene.resource_estimate import check_run
 from flexclear.pipeline.core.workflow.progress import WARNING
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages import export, owner
@@ -153,7 +153,7 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
 
     import_module("flexclear.pipeline.core.artifacts.modal")
     if str(scene).endswith(".nc"):
-        from flexclear.pipeline.core.foreign import dataset
+        from flexclear.pipeline.core.external_files import dataset
 
         path = Path(str(scene))
         return xr.DataTree.from_dict({path.stem: dataset.read(path)}, name=path.absolute().parent.name)

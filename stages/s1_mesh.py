@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import module_of
-from flexclear.pipeline.core.scene import origins
+from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.file_kinds import RECIPE, require_kind
 from flexclear.pipeline.core.scene.limits import Limits, check_cells
 from flexclear.pipeline.core.scene.load import is_file, read_toml
-from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.workflow import file_dependencies
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -42,17 +42,17 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
         if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
     sources(recipe)
-    return {"recipe": origins.without(table | changes)}
+    return {"recipe": provenance.without(table | changes)}
 
 
 def sources(recipe: Path, place: str = "") -> dict[str, str]:
     """Where the values of a recipe come from: place of the part or value -> text; InputError for what is no text."""
     table = read_toml(recipe)
-    wrong = origins.mistaken(table)
+    wrong = provenance.mistaken(table)
     if wrong is not None:
         problem = "expected text, or a table of texts by key"
         raise InputError(f"{recipe} [{wrong}]", problem, 'write source = "Table 2"')
-    return origins.told(table, place)
+    return provenance.told(table, place)
 
 
 def check_size(recipe: Path, limits: Limits, edits: Mapping[str, Any] | None = None) -> None:
@@ -89,7 +89,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     folder = Path(params.get("folder", "."))
     for path in _files(params["recipe"], folder):
-        opened.note(path)  # some readers are not written in Python
+        file_dependencies.note(path)  # some readers are not written in Python
 
     part = kind.of_recipe(params["recipe"])
     result = part.build(params["recipe"], folder)

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.paths import results_root
-from flexclear.pipeline.core.scene import origins
+from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.appearance import UNSEEN
-from flexclear.pipeline.core.scene.demand import check_run
+from flexclear.pipeline.core.scene.resource_estimate import check_run
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.stages import s3_rigid
 
@@ -37,7 +37,7 @@ def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> d
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
     for body in scene.recipes():
         table["body"][body]["mesh"] = ""  # what was made of it comes as a bundle
-    return {"scene": origins.without(table)}
+    return {"scene": provenance.without(table)}
 
 
 def modules(scene: Scene) -> tuple[str, ...]:

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.artifacts.points import Point
     from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.core.scene.wanted import Quantity
 
 #: settings of a scene that a watched run does not look at
 UNSEEN = ("accuracy", "ensemble", "sections", "view")
@@ -56,8 +56,8 @@ def _members(scene: Scene, members: int) -> int:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """One point as a dataset; refusals of the solver are in it, since they, too, say what an effect does."""
     from flexclear.pipeline.core.artifacts.points import batch
-    from flexclear.pipeline.core.influence import kept
-    from flexclear.pipeline.core.scene.wanted import Quantity
+    from flexclear.pipeline.core.effect_size import kept
+    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 
     scene = s4_simulate.rebuild(params["simulate"], inputs)
     chosen = [Quantity(*pair) for pair in params["quantities"]]
@@ -68,7 +68,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int) -> Point:
     """The run of a scene, in this process; `members` as told by the caller, none where there is no contact."""
-    from flexclear.pipeline.core.influence import kept, members_apart
+    from flexclear.pipeline.core.effect_size import kept, members_apart
     from flexclear.pipeline.dynamics.record.point import Runner
 
     return Runner(bundles, kept(scene.owners(), chosen), _members(scene, members)).run(members_apart(scene))
@@ -77,6 +77,6 @@ def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quan
 def point(stored: xr.Dataset, scene: Scene, chosen: Sequence[Quantity]) -> Point:
     """The point in an artifact of `run`."""
     from flexclear.pipeline.core.artifacts.points import unpacked
-    from flexclear.pipeline.core.influence import kept
+    from flexclear.pipeline.core.effect_size import kept
 
     return unpacked(stored, kept(scene.owners(), chosen))["point"]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.scene.origins import assumed
+from flexclear.pipeline.core.scene.provenance import assumed
 from flexclear.pipeline.core.workflow.task import given_arrays
 from flexclear.stages import s1_mesh
 

@@ -19,7 +19,7 @@ def params(scene: Scene) -> dict[str, Any]:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """PNG and SVG by file name; inputs are ``run`` and ``post``."""
-    from flexclear.pipeline.core.scene.wanted import Quantity
+    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
     from flexclear.pipeline.post.overview import figures
 
     progress(None, "figures")

@@ -17,7 +17,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     params: `labels` of the runs, the reference first; `quantities` (owner, kind).  inputs: ``run<k>``, and ``tight<k>``
     where there is one.
     """
-    from flexclear.pipeline.core.scene.wanted import Quantity
+    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
     from flexclear.pipeline.post.overview import comparison, overlay
     from flexclear.pipeline.post.plotting.table import files
 

@@ -13,15 +13,15 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.core.scene.wanted import Quantity
 
 Names = frozenset[str]
 
 
 def variants_of(effects: Sequence[Effect]) -> list[Names]:
     """The variants that are needed, by the effects that they lack."""
-    from flexclear.pipeline.post.influences import variants as needed
+    from flexclear.pipeline.post.effect_sizes import variants as needed
 
     return needed(effects)
 
@@ -58,23 +58,23 @@ def _variant(scene: Scene, effects: Sequence[Effect], gone: Names) -> Scene:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``effects.nc``, its table and its chart.  params: see `task`.  inputs: ``variant<k>``, as of `s4_watched`."""
-    from flexclear.pipeline.core import influence
+    from flexclear.pipeline.core import effect_size
     from flexclear.pipeline.core.artifacts.points import unpacked
-    from flexclear.pipeline.core.scene.wanted import Quantity
-    from flexclear.pipeline.post import influences
+    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.post import effect_sizes
     from flexclear.pipeline.post.plotting.table import files
 
     effects = [Effect(*three) for three in params["effects"]]
     chosen = [Quantity(*pair) for pair in params["quantities"]]
     points = {}
     for k, gone in enumerate(params["variants"]):
-        kept = influence.kept(params["owners"][k], chosen)
+        kept = effect_size.kept(params["owners"][k], chosen)
         points[frozenset(gone)] = unpacked(inputs[f"variant{k}"], kept)["point"]
     progress(None, "comparing")
-    found = influences.assemble(effects, chosen, points, params["members"], params["units"])
+    found = effect_sizes.assemble(effects, chosen, points, params["members"], params["units"])
     title = f"What each effect does: {params['title']}"
-    result: dict[str, Any] = {"nc": found} | files("effects", influences.table(found))
-    return result | influences.chart("effects", found, title)
+    result: dict[str, Any] = {"nc": found} | files("effects", effect_sizes.table(found))
+    return result | effect_sizes.chart("effects", found, title)
 
 
 def page(scene: Scene, words: str, picture: bytes) -> bytes:

@@ -105,7 +105,7 @@ def _static(body: FlexibleBody) -> int | None:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``plan.nc`` with all decisions, the table of them and the chart; inputs are bundles, as of `task`."""
     from flexclear.pipeline.post import plan as shown
-    from flexclear.pipeline.post.influences import chart
+    from flexclear.pipeline.post.effect_sizes import chart
     from flexclear.pipeline.post.plotting.table import files
 
     found = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])

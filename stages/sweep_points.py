@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.point import Runner
-    from flexclear.pipeline.dynamics.run.crew import Place
+    from flexclear.pipeline.dynamics.run.batched_evaluation import Place
 
 #: runners that a worker keeps
 RUNNERS = 8
@@ -45,7 +45,7 @@ def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
     """The scene of a family and what runs its points; kept by a worker, since it holds the compiled functions."""
     import pickle
 
-    from flexclear.pipeline.core.scene.kept import parse_kept
+    from flexclear.pipeline.core.scene.output_quantities import parse_kept
     from flexclear.pipeline.dynamics.record.point import Runner
     from flexclear.stages.s4_simulate import bundles, rebuild
 

@@ -20,7 +20,7 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.run import engines, follow
 from flexclear.pipeline.dynamics.run.start import consistent_start
-from flexclear.pipeline.post.influences import written
+from flexclear.pipeline.post.effect_sizes import written
 
 SCENE, RIGID = "sps4/far_csj_cb", "sps4/csj"
 #: what is asked for

@@ -19,11 +19,11 @@ import numpy as np
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Measured, Record
 from benchmarks.page import Columns, short, table
 from benchmarks.plan_scenes import drawn
-from flexclear.pipeline.core import influence
+from flexclear.pipeline.core import effect_size
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.requested_accuracy import parse
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.wanted import parse
 
 SEED, SCENES = 9, 60
 #: starts of runs with contacts
@@ -79,9 +79,9 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
         return {**told, "verdict": WRONG if two.refused else REFUSED, "reason": one.refused or two.refused}
     shares, chances = {}, {}
     for q in chosen:
-        apart = influence.influence(two, one, q, MEMBERS)
+        apart = effect_size.influence(two, one, q, MEMBERS)
         asked = made.told["wanted"][q.name]
-        wanted = asked["absolute"] if "absolute" in asked else asked["relative"] * influence.size(one, q)
+        wanted = asked["absolute"] if "absolute" in asked else asked["relative"] * effect_size.size(one, q)
         shares[q.name], chances[q.name] = apart.difference / wanted, apart.uncertainty / wanted
     worst = max(shares.values())
     return {

@@ -1,4 +1,4 @@
-"""Quantities of interest (`pipeline.core.scene.wanted`) read from a run, and compared between two runs.
+"""Quantities of interest (`pipeline.core.scene.requested_accuracy`) read from a run, and compared between two runs.
 
 Series are compared at the regular output times that both runs have, never interpolated.
 """
@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.pipeline.core.algebra import rotation_between
-from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
+from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -170,7 +170,7 @@ def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
 
 
 def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
-    """What is kept of a series (`pipeline.core.scene.kept`); shape () or (components,).
+    """What is kept of a series (`pipeline.core.scene.output_quantities`); shape () or (components,).
 
     time: shape (n,), increasing; its steps are the weights of means.  values: shape (n, components).
     """

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
-    from flexclear.pipeline.dynamics.run.pace import Judges
+    from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
 __all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate", "simulated"]
 
@@ -65,7 +65,7 @@ def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
 
     if not scene.by_need():
         return of(deliver(scene, compared, progress))
-    from flexclear.pipeline.dynamics.run.suited import suit
+    from flexclear.pipeline.dynamics.run.method_selection import suit
 
     return of(deliver(scene, compared, progress, suit(scene, bundles)))
 

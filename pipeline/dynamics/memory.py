@@ -48,6 +48,9 @@ from flexclear.pipeline.dynamics.kernels import field_reader, kernel, row_reader
 _place = count()
 #: tables in h, f and w, in their order there
 TABLES: dict[str, list[Any]] = {"h": [], "f": [], "w": []}
+#: places in the header of h by the names that kernels use (`fields`): of sizes, and of stretches of w
+SIZES: dict[str, int] = {}
+STRETCHES: dict[str, int] = {}
 #: rows of tables and layouts as NumPy has them, by the class of what declares them
 _ROWS: dict[type, np.dtype[Any]] = {}
 
@@ -55,6 +58,14 @@ _ROWS: dict[type, np.dtype[Any]] = {}
 def _places(number: int) -> list[int]:
     """The next places of the header of h."""
     return [next(_place) for _ in range(number)]
+
+
+def _named(kind: dict[str, int], declared: str) -> list[int]:
+    """The next places of the header of h, which join those of their kind by name."""
+    names = declared.split()
+    found = _places(len(names))
+    kind.update(zip(names, found, strict=True))
+    return found
 
 
 def _fields(declared: str) -> dict[str, tuple[int, ...]]:
@@ -132,7 +143,13 @@ class Room:
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
     MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES, N_RUBBING, N_BEARINGS, RUBBING_SLOT,
     N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES,
-) = _places(34)
+) = _named(
+    SIZES,
+    "n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger n_pairs "
+    "n_known_pairs n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
+    "n_loads n_internal load_slot n_couplings n_surfaces n_rubbing n_bearings rubbing_slot n_worn wear_slot n_bodies "
+    "n_frames",
+)
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 #: RATES: of what the steps evaluate with, EVALUATE's or code for this wiring alone (`specialise`)
@@ -225,9 +242,9 @@ BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("mass com:3 inertia:6 axes:3x3"), nu
 #: a frame in world axes; the velocity is that of its origin
 _FRAME = "origin:3 axes:3x3 omega:3 velocity:3 alpha:3 acceleration:3"
 FRAME = layout(_FRAME)
-X, U, DU = _places(3)
+X, U, DU = _named(STRETCHES, "x u du")
 #: as X and U, but of coordinates: those of moving shapes
-INTERFACE_X, INTERFACE_U = _places(2)
+INTERFACE_X, INTERFACE_U = _named(STRETCHES, "interface_x interface_u")
 LINK_FRAMES, SITE_FRAMES = work(_FRAME), work(_FRAME)
 #: the motion subspace S of one joint: a twist per freedom, axes of its first frame
 SUBSPACE = work("angular:3 linear:3")
@@ -236,15 +253,19 @@ OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")
 COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
 #: MODAL: P (9n), V (9n), forces on the modes (n), and their spin (3n) as eigenmodes and in the interface basis
-BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _places(9)
+BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _named(
+    STRETCHES, "bias modal_bias modal scratch mass force residual residual_rate gamma"
+)
 #: wrenches of the closure rows; then, of the couplings, those on their first joints
 ROWS = work("moment:3 force:3")
 #: ROW_SCALE: per kept row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
 #: room for all rows, that of the last evaluation, which may be a trial far away
-JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _places(6)
+JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _named(
+    STRETCHES, "jacobian spread schur row_scale pivot multiplier"
+)
 #: per kept row its distance from those before it, at the end of the step, at its start, and the most that it has been,
 #: each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
-INDEPENDENCE, COLLOCATION = _places(2)
+INDEPENDENCE, COLLOCATION = _named(STRETCHES, "independence collocation")
 COLLOCATION_ROWS = 13
 #: smallest pivot of J M^-1 J^T as share of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
@@ -267,16 +288,20 @@ BENDS = work("sliding:3 along about one_end:2 other_end:2")
 #: frame's origin, force
 REACTIONS = work("moment:3 force:3")
 #: of the bearings' loads: slopes of their equations, and residuals; of the closures: multipliers without friction
-BEARING_SLOPES, BEARING_RESIDUALS, SMOOTH_MULTIPLIER = _places(3)
-INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _places(10)
-MAGNITUDE, CORRECTION, LATCHED = _places(3)
+BEARING_SLOPES, BEARING_RESIDUALS, SMOOTH_MULTIPLIER = _named(
+    STRETCHES, "bearing_slopes bearing_residuals smooth_multiplier"
+)
+INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _named(
+    STRETCHES, "internal drive_force ledger_rate position_rate y y_new y_stage slopes dense memory"
+)
+MAGNITUDE, CORRECTION, LATCHED = _named(STRETCHES, "magnitude correction latched")
 #: what the stepper watches of a contact, at the start (0) and at the end (1) of the step; trend: rate of the force;
 #: slip_rate: rate of the sliding speed, 0 where it is not known; event_row: of its last closing; mode0, latched0: mode
 #: and impact rate that hold within the step
 WATCH = work(
     "gap0 rate0 force0 slip0 trend0 gap1 rate1 force1 slip1 trend1 event_row mode0 latched0 slip_rate0 slip_rate1"
 )
-CONTROL = next(_place)
+(CONTROL,) = _named(STRETCHES, "control")
 HEADER = next(_place)
 
 # the ledger before the contacts' slots (three deflections of each contact with bristles come after them):
@@ -315,9 +340,27 @@ REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(22, 27)
     PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, INTEGERS,
 ) = range(22)
 # fmt: on
+#: what an evaluation reads and reports there, by the names that kernels use (`fields`)
+REPORTS = {"evaluation": EVALUATION, "state": STATE, "abridged": ABRIDGED}
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
 NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER, SINGULAR_AHEAD = range(8, 14)
+
+# Names of tables for kernels (`fields`) -------------------------------------------------------------------------------
+NAMED: dict[str, Any] = {
+    name.lower(): value for name, value in list(globals().items()) if type(value).__name__ == "Table"
+}
+_ARRAYS = {table.place: array for array, tables in TABLES.items() for table in tables}
+ARRAYS = {name: _ARRAYS[table.place] for name, table in NAMED.items()}
+#: shapes of fields that are tuples, and how many numbers these have
+TUPLES: dict[tuple[int, ...], int] = {(3,): 3, (3, 3): 9}
+
+
+def row_fields(name: str) -> dict[str, tuple[int, tuple[int, ...]]]:
+    """Offset and shape of each field in a row of the table `name`."""
+    rows: Any = row_type(NAMED[name])
+    return {field: (rows.fields[field][1] // rows[field].base.itemsize, rows[field].shape) for field in rows.names}
+
 
 # The record ----------------------------------------------------------------------------------------------------------
 #: a row of the event table; speed: rate of penetration at a closing, minus it at an opening [m/s]

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.decisions import EVIDENCE, Plan
-from flexclear.pipeline.post.influences import written
+from flexclear.pipeline.post.effect_sizes import written
 from flexclear.pipeline.post.plotting.table import Table
 
 

@@ -17,7 +17,7 @@ from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.record.dataset import recorded
-from flexclear.pipeline.dynamics.run.pace import Judge, Judges
+from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges
 from flexclear.pipeline.dynamics.run.run import integrate
 from tests.analytic import change_points as cp
 from tests.analytic.mechanism_runs import TREE, bundles

@@ -21,7 +21,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.dynamics.compile import stacks
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
-from flexclear.pipeline.dynamics.run import crew, specialised, trajectory
+from flexclear.pipeline.dynamics.run import batched_evaluation, specialised, trajectory
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.post import derive
 from tests.analytic.mechanism_runs import TREE, run
@@ -75,13 +75,13 @@ def test_members_are_the_same_to_the_last_bit_however_many_are_evaluated_at_once
     monkeypatch.setattr(cores, "cores", lambda: 1)
     monkeypatch.setattr(specialised, "LANES", (lanes,))
     known, made = six(), list[int]()
-    proper = crew.Crew
+    proper = batched_evaluation.Crew
 
-    def noted(kept: bytes, code: crew.Code, width: int) -> crew.Crew:
+    def noted(kept: bytes, code: batched_evaluation.Code, width: int) -> batched_evaluation.Crew:
         made.append(width)
         return proper(kept, code, width)
 
-    monkeypatch.setattr(crew, "Crew", noted)
+    monkeypatch.setattr(batched_evaluation, "Crew", noted)
     assert dynamics.ensemble(scene(members=6), {}, silent).identical(known)
     assert made == ([lanes] if stacks.supported() and not INTERPRETED else [])
 

@@ -8,7 +8,7 @@ import xarray as xr
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.dynamics.run import pace, trajectory
+from flexclear.pipeline.dynamics.run import progress_rate, trajectory
 from tests.analytic.mechanism_runs import TREE
 
 ROLLING, END = "checks/socket_rolling.toml", "3 ms"
@@ -30,8 +30,8 @@ def run(told: list[str] | None = None, end: str = END, **solver: object) -> xr.D
 def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Crawling is looked for early, so that a short run shows what otherwise takes millions of evaluations."""
     monkeypatch.setattr(trajectory, "SLICE", 200)
-    monkeypatch.setattr(pace, "TRIAL", LOOK)
-    monkeypatch.setattr(pace, "HOPELESS", HOPELESS)
+    monkeypatch.setattr(progress_rate, "TRIAL", LOOK)
+    monkeypatch.setattr(progress_rate, "HOPELESS", HOPELESS)
 
 
 @pytest.mark.usefixtures("impatient")
@@ -59,7 +59,7 @@ def test_an_explicit_method_that_crawls_hands_over_where_it_is(integrator: str, 
 @pytest.mark.usefixtures("impatient")
 def test_the_limit_of_evaluations_makes_it_hand_over_earlier(monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that could not end within its limit is not followed up to it."""
-    monkeypatch.setattr(pace, "HOPELESS", 10_000_000)
+    monkeypatch.setattr(progress_rate, "HOPELESS", 10_000_000)
     assert "switched" not in run().attrs
     assert "switched" in run(evaluations=2500).attrs
 

@@ -12,12 +12,12 @@ import xarray as xr
 
 from flexclear.pipeline import dynamics, load_scene
 from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.scene.requested_accuracy import parse
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.wanted import parse
 from flexclear.pipeline.dynamics.effects import schemes
 from flexclear.pipeline.dynamics.run.accuracy import FINER, Attempt, Search
-from flexclear.pipeline.dynamics.run.pace import Look, limited, pace
-from flexclear.pipeline.dynamics.run.suited import Rates, Suit
+from flexclear.pipeline.dynamics.run.method_selection import Rates, Suit
+from flexclear.pipeline.dynamics.run.progress_rate import Look, limited, pace
 from tests.analytic.mechanism_runs import TREE, bundles
 
 RINGING = TREE / "scenes" / "sps4" / "far_cb.toml"

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.artifacts.store import write_dataset
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Modes
-from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.workflow import file_dependencies
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.stages import s1_mesh, s2_modes, s3_bundle
@@ -63,15 +63,15 @@ def test_files_of_a_recipe_count_by_their_content(tmp_path: Path) -> None:
         '[shape]\ntype = "matrices"\nunits = "m-kg-s"\nfile = "body.npz"\n[frames]\nfoot = { nodes = [1, 2, 3] }\n'
     )
     params = s1_mesh.params(recipe)
-    with opened.watched(tmp_path) as read:
+    with file_dependencies.watched(tmp_path) as read:
         made = s1_mesh.run({**params, "folder": str(tmp_path)}, {}, silent)["nc"]
     again = stored(made, tmp_path / "mesh.nc")
     assert of_mesh(again).assemble(again).size == 36
     assert s1_mesh.params(recipe) == params
-    assert opened.digests(["body.npz"], tmp_path) == {"body.npz": read["body.npz"]}
+    assert file_dependencies.digests(["body.npz"], tmp_path) == {"body.npz": read["body.npz"]}
     with (tmp_path / "body.npz").open("ab") as file:
         file.write(b"\0")
-    assert opened.digests(["body.npz"], tmp_path) != {"body.npz": read["body.npz"]}
+    assert file_dependencies.digests(["body.npz"], tmp_path) != {"body.npz": read["body.npz"]}
     (tmp_path / "body.npz").unlink()
     with pytest.raises(InputError, match=r"there is no file .*body\.npz"):
         s1_mesh.params(recipe)

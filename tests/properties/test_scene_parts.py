@@ -13,8 +13,8 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
 from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.requested_accuracy import parse
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.wanted import parse
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.model.driving import unit_of

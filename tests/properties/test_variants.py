@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.effect_size import chance, influence
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.influence import chance, influence
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.wanted import Quantity
-from flexclear.pipeline.post.influences import closed
-from flexclear.pipeline.post.influences import variants as needed
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.post.effect_sizes import closed
+from flexclear.pipeline.post.effect_sizes import variants as needed
 from flexclear.stages.new import write
 
 

@@ -22,7 +22,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import cores, journal, schedule, stopping
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.pipeline.dynamics.run import pace, pieces, specialised, trajectory
+from flexclear.pipeline.dynamics.run import pieces, progress_rate, specialised, trajectory
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.post import derive
@@ -135,8 +135,8 @@ def test_a_run_that_is_killed_before_and_after_it_was_handed_over_goes_on_to_the
     straight_from: int, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A rolling ball: dop853 hands over to radau at 1000 evaluations, in a contact; its twin does so, too."""
-    monkeypatch.setattr(pace, "TRIAL", 1000)
-    monkeypatch.setattr(pace, "HOPELESS", 1100)
+    monkeypatch.setattr(progress_rate, "TRIAL", 1000)
+    monkeypatch.setattr(progress_rate, "HOPELESS", 1100)
     monkeypatch.setattr(specialised, "MANY", straight_from)
     made: list[bool] = []
     proper = specialised._make

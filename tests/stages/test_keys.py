@@ -325,7 +325,7 @@ def test_docstrings_count_where_they_are_titles():
     [
         ("core/system.py", ('"""', '"""More words. ')),
         ("core/registry.py", ('"""', '"""More words. ')),
-        ("core/scene/mistakes.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
+        ("core/scene/validation_errors.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
         ("core/citations.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
     ],
 )

@@ -13,9 +13,9 @@ import pytest
 
 from flexclear.pipeline.core import machine
 from flexclear.pipeline.core.errors import InputError, ResourceError
-from flexclear.pipeline.core.scene.demand import check_run, row
 from flexclear.pipeline.core.scene.limits import check_cells
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
+from flexclear.pipeline.core.scene.resource_estimate import check_run, row
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.stages import cost, s4_simulate, sections
 from flexclear.stages.__main__ import main

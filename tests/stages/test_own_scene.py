@@ -16,7 +16,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.json_schema import scene_schema
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.oddities import oddities
+from flexclear.pipeline.core.scene.plausibility import oddities
 from flexclear.stages import run
 from flexclear.stages.__main__ import main
 from flexclear.stages.as_json import as_json

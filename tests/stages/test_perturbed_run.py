@@ -20,7 +20,7 @@ from flexclear.pipeline.core.quantities import LASTING
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import cores, journal, stopping
-from flexclear.pipeline.dynamics.run import horizon, pace, specialised, trajectory
+from flexclear.pipeline.dynamics.run import horizon, progress_rate, specialised, trajectory
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.horizon import Pair, PerturbedRun
 from flexclear.pipeline.dynamics.run.run import engine_of, follow
@@ -114,8 +114,8 @@ def test_a_run_and_its_twin_that_are_both_handed_over_are_the_same_side_by_side(
 ) -> None:
     """A rolling ball: dop853 hands over to radau at 1000 evaluations, in a contact.  Only one thread tells of it."""
     monkeypatch.setattr(specialised, "MANY", straight_from)
-    monkeypatch.setattr(pace, "TRIAL", 1000)
-    monkeypatch.setattr(pace, "HOPELESS", 1100)
+    monkeypatch.setattr(progress_rate, "TRIAL", 1000)
+    monkeypatch.setattr(progress_rate, "HOPELESS", 1100)
     monkeypatch.setattr(trajectory, "SLICE", 100)
     scene, told = check(root, "socket_rolling", **{"time.end": 3e-3}), set[int]()
     expected = alone(scene, monkeypatch)

@@ -13,15 +13,15 @@ import xarray as xr
 from scipy.optimize import brentq
 
 import flexclear as fc
+from flexclear.pipeline.core.effect_size import Influence
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.influence import Influence
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.coupling import uncoupled
 from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.wanted import Quantity
-from flexclear.pipeline.dynamics.linear.play import RANK, Bounds, bounds, lever_of
+from flexclear.pipeline.dynamics.linear.clearance_response import RANK, Bounds, bounds, lever_of
 from flexclear.pipeline.dynamics.linear.response import Response, first_excited, response, vibration
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement

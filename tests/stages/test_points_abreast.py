@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.kept import parse_kept
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
+from flexclear.pipeline.core.scene.output_quantities import parse_kept
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.dynamics.compile import stacks
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.record import point as points_of
 from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.pipeline.dynamics.run import alike, crew
+from flexclear.pipeline.dynamics.run import alike, batched_evaluation
 from flexclear.stages import sweep_engine, sweep_points
 
 SIDE_BY_SIDE = stacks.supported() and not INTERPRETED
@@ -49,13 +49,13 @@ def assert_same(found: Sequence[Point], known: Sequence[Point]) -> None:
 @pytest.fixture
 def evaluations_abreast(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many engines each crew lets step side by side."""
-    proper, made = crew.Crew, list[int]()
+    proper, made = batched_evaluation.Crew, list[int]()
 
-    def noted(kept: bytes, code: crew.Code, lanes: int) -> crew.Crew:
+    def noted(kept: bytes, code: batched_evaluation.Code, lanes: int) -> batched_evaluation.Crew:
         made.append(lanes)
         return proper(kept, code, lanes)
 
-    monkeypatch.setattr(crew, "Crew", noted)
+    monkeypatch.setattr(batched_evaluation, "Crew", noted)
     return made
 
 

@@ -14,9 +14,9 @@ import pytest
 
 from flexclear.pipeline.core import system
 from flexclear.pipeline.core.errors import InputError, ResourceError
-from flexclear.pipeline.core.foreign import apart, mesh, wire
-from flexclear.pipeline.core.foreign.apart import Limits, UnreadableError
-from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.external_files import apart, mesh, wire
+from flexclear.pipeline.core.external_files.apart import Limits, UnreadableError
+from flexclear.pipeline.core.workflow import file_dependencies
 from flexclear.pipeline.post.render import shape_files
 from tests.stages import bad_readers
 
@@ -102,19 +102,19 @@ def test_a_surface_that_unpacks_without_end_is_refused(tmp_path: Path) -> None:
 def test_what_the_child_opens_counts(tmp_path: Path) -> None:
     """Also companions that only the reader knows; a file that it found in another state than this process is told."""
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 1 1\nv 0 0 1\nf 1 2 3\n")
-    with opened.watched(tmp_path) as read:
+    with file_dependencies.watched(tmp_path) as read:
         mesh.read(tmp_path / "a.obj")
-    assert read == opened.digests(["a.obj"], tmp_path)
-    with opened.watched(tmp_path):
+    assert read == file_dependencies.digests(["a.obj"], tmp_path)
+    with file_dependencies.watched(tmp_path):
         (tmp_path / "a.obj").read_bytes()
         with pytest.raises(ResourceError, match="changed while it was read"):
-            opened.told({"a.obj": "another digest"}, tmp_path)
+            file_dependencies.told({"a.obj": "another digest"}, tmp_path)
 
 
 COMMAND = """
 import sys
 from pathlib import Path
-from flexclear.pipeline.core.foreign import apart
+from flexclear.pipeline.core.external_files import apart
 from tests.stages import bad_readers
 print(apart.read(bad_readers.number, Path(sys.argv[1])), flush=True)
 apart.read(bad_readers.turns, Path(sys.argv[1]))

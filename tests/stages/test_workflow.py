@@ -62,7 +62,8 @@ def test_equal_results_stop_the_chain(project: Project):
     """A new title of nothing else: simulate runs again after an edit, post has the same input."""
     project.run("run", "tiny/ideal")
     project.calls()
-    project.edit(
+    first = "from __future__ import annotations\n"
+    project.edit("stages/s4_simulate.py", first, first + "\nEDITED = 1\n")
         "stages/s4_simulate.py",
         "from __future__ import annotations\n",
         "from __future__ import annotations\n\nEDITED = 1\n",

@@ -11,8 +11,8 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION, RUN
 from flexclear.pipeline.core.scene.design import Axis, Design
-from flexclear.pipeline.core.scene.kept import Kept
-from flexclear.pipeline.core.scene.wanted import KINDS
+from flexclear.pipeline.core.scene.output_quantities import Kept
+from flexclear.pipeline.core.scene.requested_accuracy import KINDS
 from flexclear.pipeline.core.units import udunits
 
 Values = dict[str, np.ndarray]

@@ -186,7 +186,7 @@ class Part(BaseModel):
     @classmethod
     def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """The schema, with the meanings of keys that the docstring tells."""
-        from flexclear.pipeline.core.scene.meanings import meanings  # reads docstrings, which only schemas need
+        from flexclear.pipeline.core.scene.key_descriptions import meanings  # reads docstrings, which only schemas need
 
         found = handler(core)
         properties = handler.resolve_ref_schema(found).get("properties", {})

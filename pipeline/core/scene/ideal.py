@@ -9,8 +9,8 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.appearance import UNSEEN
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.requested_accuracy import parse
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.wanted import parse
 
 #: effects that can be taken away, and how a scene without them is called
 EFFECTS = {"clearance": "without clearance", "flexibility": "rigid"}

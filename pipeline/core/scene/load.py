@@ -19,9 +19,9 @@ from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.fields import LONGEST_NAME
 from flexclear.pipeline.core.scene.file_kinds import SCENE, require_kind
 from flexclear.pipeline.core.scene.limits import check_parts
-from flexclear.pipeline.core.scene.mistakes import input_errors
 from flexclear.pipeline.core.scene.not_toml import not_toml
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.validation_errors import input_errors
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")

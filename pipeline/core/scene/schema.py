@@ -6,7 +6,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from flexclear.pipeline.core import portable
-from flexclear.pipeline.core.scene import origins
+from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.clearance import (
     CONTACTS,
     BallOnPlane,
@@ -29,10 +29,10 @@ from flexclear.pipeline.core.scene.parts import (
     MeshedRigidBody,
     RigidBody,
 )
+from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity, parse, usual
 from flexclear.pipeline.core.scene.solver import PlainIntegrator, Solver
 from flexclear.pipeline.core.scene.start import Start
 from flexclear.pipeline.core.scene.stops import Stop
-from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse, usual
 from flexclear.pipeline.core.units import quantity
 
 Positive = Field(gt=0.0)
@@ -103,7 +103,8 @@ class Accuracy(Part):
     """Wanted accuracy of the time integration per quantity, e.g. ``platform.position = "1 um"``.
 
     The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
-    ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities: `pipeline.core.scene.wanted`.
+    ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities:
+    `pipeline.core.scene.requested_accuracy`.
     quantities: a file writes them without this key.
     allow_missed: what is missed is told either way, and the run kept; without this the command ends with an error.
     by_need: whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step.
@@ -423,9 +424,9 @@ class Scene(Part):
 
     def sources(self) -> dict[str, str]:
         """Where each value comes from: ``part.key`` (or ``part``) -> text."""
-        found = origins.told(self.model_dump())
+        found = provenance.told(self.model_dump())
         return {place or "scene": text for place, text in found.items()}
 
     def assumptions(self) -> dict[str, str]:
         """The sources that say ``assumed: why``."""
-        return origins.assumed(self.sources())
+        return provenance.assumed(self.sources())

@@ -11,7 +11,7 @@ from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_vali
 from flexclear.pipeline.core.scene.fields import Part
 from flexclear.pipeline.core.scene.file_kinds import SWEEP, require_kind
 from flexclear.pipeline.core.scene.load import read_toml
-from flexclear.pipeline.core.scene.mistakes import input_errors
+from flexclear.pipeline.core.scene.validation_errors import input_errors
 from flexclear.pipeline.core.units import any_quantity
 
 #: points of one sweep; more are several sweeps
@@ -121,7 +121,7 @@ class Sweep(Part):
     scene: a scene file, or the name of one below scenes/.  set: changes of the scene that hold at all points.
     vary: parameters by name; the name is a place of the scene unless `places` says which ones.
     combine: every value with every other (grid), or the first values, the second ones and so on (list).
-    keep: what is kept of each point, see `pipeline.core.scene.kept`.
+    keep: what is kept of each point, see `pipeline.core.scene.output_quantities`.
     members: starts of each point that differ by a hair (`[ensemble]` of the scene); mean and deviation are kept.
     error: run each point at a hundredth of its tolerance as well, and keep the differences.
     title: what it is, in a line.  description: more words.  sample: points spread over all parameters, instead of a

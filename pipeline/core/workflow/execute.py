@@ -9,7 +9,7 @@ from importlib import import_module
 from flexclear.pipeline.core import threads
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.workflow import journal, opened
+from flexclear.pipeline.core.workflow import file_dependencies, journal
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import ARRAYS, Task, facts, in_order, key, reasons
 
@@ -55,7 +55,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             with (
                 threads.one(),
                 journal.kept(begun.parent, begun.stem) as kept,
-                opened.watched(task.base, outside=(store.root,)) as read,
+                file_dependencies.watched(task.base, outside=(store.root,)) as read,
             ):
                 product = run({**task.params, **task.context}, data, progress)
             known |= _noted(task, plain, read, store)
@@ -106,7 +106,7 @@ def _with_files(task: Task, known: Mapping[str, str], store: Store) -> tuple[Map
     names = store.names(task.stage, plain)
     if not names:
         return known, plain
-    whole = {**known, **opened.facts(opened.digests(names, task.base))}
+    whole = {**known, **file_dependencies.facts(file_dependencies.digests(names, task.base))}
     return whole, key(whole)
 
 
@@ -115,4 +115,4 @@ def _noted(task: Task, plain: str, read: Mapping[str, str], store: Store) -> dic
     names = set(store.names(task.stage, plain))
     if not names >= read.keys():
         store.keep_names(task.stage, plain, sorted(names | read.keys()))
-    return opened.facts(opened.digests(names - read.keys(), task.base) | dict(read))
+    return file_dependencies.facts(file_dependencies.digests(names - read.keys(), task.base) | dict(read))

@@ -42,7 +42,12 @@ Known = dict[str, tuple[str, str, list[str], list[str]]]
 KNOWN: Known = {}
 #: modules that only word messages, citations and validation errors: no result depends on them
 _SCENE = "flexclear.pipeline.core.scene"
-WORDING = {"flexclear.pipeline.core.citations", f"{_SCENE}.meanings", f"{_SCENE}.mistakes", f"{_SCENE}.oddities"}
+WORDING = {
+    "flexclear.pipeline.core.citations",
+    f"{_SCENE}.key_descriptions",
+    f"{_SCENE}.validation_errors",
+    f"{_SCENE}.plausibility",
+}
 #: packages whose modules' docstrings are titles on pages
 TITLED = ("flexclear.pipeline.post.figures.",)
 #: how often a source is parsed at most, where threads of libraries come between

@@ -15,6 +15,7 @@ from llvmlite import ir
 from numba import carray, cfunc, types
 from numba.extending import intrinsic
 
+import flexclear.pipeline.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.files import compiles, interpreted
 from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, looked_at

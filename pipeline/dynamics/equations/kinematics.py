@@ -8,31 +8,31 @@ from typing import Any
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import choose
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at9, cross, product, put, put9, scale, turn
+from flexclear.pipeline.dynamics.vectors import ZERO, add, cross, product, scale, turn
 
 
 @kernel
-def _store(w, o, p, R, omega, v, alpha, a):
-    put(w, o + m.FRAME.origin, p)
-    put9(w, o + m.FRAME.axes, R)
-    put(w, o + m.FRAME.omega, omega)
-    put(w, o + m.FRAME.velocity, v)
-    put(w, o + m.FRAME.alpha, alpha)
-    put(w, o + m.FRAME.acceleration, a)
+def _store(frame, p, R, omega, v, alpha, a):
+    frame.origin, frame.axes = p, R
+    frame.omega, frame.velocity = omega, v
+    frame.alpha, frame.acceleration = alpha, a
 
 
 @kernel
-def rigid_site(h, f, w, s):
+def rigid_site(d, s):
     """Motion of a site from that of its rigid link."""
-    o, numbers = m.LINK_FRAMES.row(h, m.SITES.link(h, s)), m.SITE_NUMBERS.row(h, s)
-    R = at9(w, o + m.FRAME.axes)
-    omega, alpha = at(w, o + m.FRAME.omega), at(w, o + m.FRAME.alpha)
-    arm = turn(R, at(f, numbers))
+    frame, site = d.link_frames[d.sites[s].link], d.site_numbers[s]
+    R, omega, alpha = frame.axes, frame.omega, frame.alpha
+    arm = turn(R, site.origin)
     swing = cross(omega, arm)
-    v = add(at(w, o + m.FRAME.velocity), swing)
-    a = add(at(w, o + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, swing)))
-    p = add(at(w, o + m.FRAME.origin), arm)
-    _store(w, m.SITE_FRAMES.row(h, s), p, product(R, at9(f, numbers + 3)), omega, v, alpha, a)
+    v = add(frame.velocity, swing)
+    a = add(frame.acceleration, add(cross(alpha, arm), cross(omega, swing)))
+    _store(d.site_frames[s], add(frame.origin, arm), product(R, site.axes), omega, v, alpha, a)
+
+
+@kernel
+def no_port(h, f, w, s):
+    """No body is flexible."""
 
 
 @kernel
@@ -47,7 +47,7 @@ def rigid_inboard(h, f, w, i, p, R, omega, v, alpha, a):
 
 
 def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
-    """The kernel kinematics(h, f, w) that moves everything.
+    """The kernel kinematics(d) that moves everything.
 
     joints: modules of the joint types present.  flexible: kernels of the flexible bodies (`bodies.flexible`); their
     `deform` is called first, their
@@ -57,59 +57,59 @@ def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
     position_rate = choose(tuple(joint.position_rate for joint in joints))
     deform = undeformed if flexible is None else flexible.deform
     inboard = rigid_inboard if flexible is None else flexible.inboard
-    port_site = rigid_site if flexible is None else flexible.site
+    port_site = no_port if flexible is None else flexible.site
 
     @kernel
-    def place(h, f, w, i):
+    def place(d, i):
         """Link i from its inboard site, which must be up to date.
 
         The relative twist is S u in the axes of the joint's first frame F, its rate S u' + bias.
         """
-        s, S, c0, n = m.SITE_FRAMES.row(h, i - 1), h[m.SUBSPACE.place], m.LINKS.c0(h, i), m.LINKS.n_speeds(h, i)
-        kind, x, u, du = m.LINKS.joint(h, i), h[m.X] + m.LINKS.q0(h, i), h[m.U] + c0, h[m.DU] + c0
-        R_FG, p_FG, bias_angular, bias_linear = joint_motion(kind, w, x, u, S)
-        position_rate(kind, w, x, u, h[m.POSITION_RATE] + m.LINKS.q0(h, i))
-        F, omega_F, alpha_F = at9(w, s + m.FRAME.axes), at(w, s + m.FRAME.omega), at(w, s + m.FRAME.alpha)
+        link, base = d.links[i], d.site_frames[i - 1]
+        c0, x = link.c0, d.h[m.X] + link.q0
+        R_FG, p_FG, bias_angular, bias_linear = joint_motion(link.joint, d.w, x, d.h[m.U] + c0, d.h[m.SUBSPACE.place])
+        position_rate(link.joint, d.w, x, d.h[m.U] + c0, d.h[m.POSITION_RATE] + link.q0)
+        F, omega_F, alpha_F = base.axes, base.omega, base.alpha
         arm = turn(F, p_FG)
-        p, swing = add(at(w, s + m.FRAME.origin), arm), cross(omega_F, arm)
+        p, swing = add(base.origin, arm), cross(omega_F, arm)
         turning, sliding, growing, speeding = ZERO, ZERO, turn(F, bias_angular), turn(F, bias_linear)
-        for k in range(n):
-            o, rate, second = m.COLUMNS.row(h, c0 + k), w[u + k], w[du + k]
-            angular, linear = turn(F, at(w, S + 6 * k)), turn(F, at(w, S + 6 * k + 3))
-            put(w, o, angular)
-            put(w, o + 3, add(linear, cross(p, angular)))
+        for k in range(link.n_speeds):
+            column, rate, second = d.columns[c0 + k], d.u[c0 + k], d.du[c0 + k]
+            angular, linear = turn(F, d.subspace[k].angular), turn(F, d.subspace[k].linear)
+            column.angular, column.linear = angular, add(linear, cross(p, angular))
             turning, sliding = add(turning, scale(rate, angular)), add(sliding, scale(rate, linear))
             growing, speeding = add(growing, scale(second, angular)), add(speeding, scale(second, linear))
-        v = add(at(w, s + m.FRAME.velocity), add(swing, sliding))
+        v = add(base.velocity, add(swing, sliding))
         alpha = add(alpha_F, add(growing, cross(omega_F, turning)))
-        a = add(at(w, s + m.FRAME.acceleration), add(cross(alpha_F, arm), cross(omega_F, swing)))
+        a = add(base.acceleration, add(cross(alpha_F, arm), cross(omega_F, swing)))
         a = add(a, add(scale(2.0, cross(omega_F, sliding)), speeding))
         omega, R = add(omega_F, turning), product(F, R_FG)
-        if m.LINKS.flex(h, i) >= 0:
-            p, R, omega, v, alpha, a = inboard(h, f, w, i, p, R, omega, v, alpha, a)
-        _store(w, m.LINK_FRAMES.row(h, i), p, R, omega, v, alpha, a)
+        if link.flex >= 0:
+            p, R, omega, v, alpha, a = inboard(d.h, d.f, d.w, i, p, R, omega, v, alpha, a)
+        _store(d.link_frames[i], p, R, omega, v, alpha, a)
 
     @kernel
-    def locate(h, f, w, s):
+    def locate(d, s):
         """Site s from its link."""
-        if m.SITES.port(h, s) >= 0:
-            port_site(h, f, w, s)
+        if d.sites[s].port >= 0:
+            port_site(d.h, d.f, d.w, s)
         else:
-            rigid_site(h, f, w, s)
+            rigid_site(d, s)
 
     @kernel
-    def kinematics(h, f, w):
+    def kinematics(d):
         """All links and sites: positions from X, velocities from U, accelerations from DU.
 
         With the known part of the accelerations in DU this gives the acceleration bias; with the
         whole of them, the accelerations. Gravity is an upward acceleration of the ground.
         """
-        put(w, m.LINK_FRAMES.row(h, 0) + m.FRAME.acceleration, scale(-1.0, at(f, h[m.GRAVITY.place])))
-        deform(h, f, w)
-        for i in range(1, h[m.N_LINKS]):
-            locate(h, f, w, i - 1)
-            place(h, f, w, i)
-        for s in range(h[m.N_LINKS] - 1, h[m.N_SITES]):
-            locate(h, f, w, s)
+        ground = d.link_frames[0]
+        ground.acceleration = scale(-1.0, d.gravity[0].acceleration)
+        deform(d.h, d.f, d.w)
+        for i in range(1, d.n_links):
+            locate(d, i - 1)
+            place(d, i)
+        for s in range(d.n_links - 1, d.n_sites):
+            locate(d, s)
 
     return kinematics

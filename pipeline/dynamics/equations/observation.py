@@ -15,6 +15,7 @@ from flexclear.pipeline.dynamics.equations.named_bodies import OF_BODIES, SIZE, 
 from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
 from flexclear.pipeline.dynamics.equations.projection import BLIND, keep_scales, largest, widest
 from flexclear.pipeline.dynamics.equations.right_hand_side import make_forces, nothing, spread_state
+from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import accumulate, at, dot
 
@@ -266,7 +267,7 @@ def make_observation(
 
         Wrenches of closures are stored from out[o] on.
         """
-        forces(h, f, w, n)
+        forces(data(h, f, w, n))
         modal_inertia(h, f, w, n)
         closure_wrenches(h, w, out, o)
         for i in range(h[m.N_LINKS] - 1, 0, -1):
@@ -293,8 +294,9 @@ def make_observation(
     def place(h, f, w, n, t):
         """Positions and speeds of the state in Y."""
         laws(h, f, w, n, t)
-        spread_state(h, w, h[m.Y])
-        prescribe(h, w)
+        d = data(h, f, w, n)
+        spread_state(d, h[m.Y])
+        prescribe(d)
 
     @kernel
     def copy(h, w, out, every, r, column, frames):
@@ -382,7 +384,7 @@ def make_observation(
                     close(h, f, w, n, rows[r, 0], tolerance)
                     break
                 uneven, foreseen = first, False  # as where a step ends
-            kinematics(h, f, w)  # at the accelerations in DU
+            kinematics(data(h, f, w, n))  # at the accelerations in DU
             if tolerance == AS_RECORDED:
                 copy(h, w, out, every, r, 0, True)
             else:

@@ -14,13 +14,13 @@ def no_harmonics(h, f, w, law, piece, s):
 
 
 @kernel
-def prescribe(h, w):
+def prescribe(d):
     """Prescribed coordinates, speeds and accelerations from their laws, which are the first ones."""
-    for d in range(h[m.N_DRIVES]):
-        law = m.LAW.row(h, d)
-        w[h[m.X] + h[m.NQ] + d] = w[law]
-        w[h[m.U] + h[m.NV] + d] = w[law + 1]
-        w[h[m.DU] + h[m.NV] + d] = w[law + 2]
+    for k in range(d.n_drives):
+        law = d.law[k]
+        d.x[d.nq + k] = law.value
+        d.u[d.nv + k] = law.rate
+        d.du[d.nv + k] = law.second_rate
 
 
 def make_laws(harmonics: Callable | None = None) -> Callable:

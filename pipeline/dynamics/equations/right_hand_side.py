@@ -15,8 +15,9 @@ from flexclear.pipeline.dynamics.bodies.rigid import carry
 from flexclear.pipeline.dynamics.equations.envelope import backward, factor, forward
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
 from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
+from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import accumulate, at, dot6
+from flexclear.pipeline.dynamics.vectors import ZERO, add, dot
 
 #: pivots of M below this share of their diagonal mean a coordinate that moves no mass
 MASSLESS_PIVOT = 1e-15
@@ -58,50 +59,64 @@ def no_known_forces(h, w):
 
 
 @kernel
-def spread_state(h, w, y):
+def spread_state(d, y):
     """Positions, speeds and internal states from the state at place y; no accelerations yet."""
-    for k in range(h[m.NQ]):
-        w[h[m.X] + k] = w[y + k]
-    for k in range(h[m.NV]):
-        w[h[m.U] + k] = w[y + h[m.NQ] + k]
-        w[h[m.DU] + k] = 0.0
-    for k in range(h[m.N_INTERNAL]):
-        w[h[m.INTERNAL] + k] = w[y + h[m.NQ] + h[m.NV] + h[m.N_LEDGER] - h[m.N_INTERNAL] + k]
+    for k in range(d.nq):
+        d.x[k] = d.w[y + k]
+    for k in range(d.nv):
+        d.u[k] = d.w[y + d.nq + k]
+        d.du[k] = 0.0
+    for k in range(d.n_internal):
+        d.internal[k] = d.w[y + d.nq + d.nv + d.n_ledger - d.n_internal + k]
 
 
 @kernel
-def gather(h, w, i):
+def copy_inertia(d):
+    """Inertia of each link's tree, to which the links beyond are still to be added."""
+    for i in range(d.n_links):
+        tree, own = d.inertia[i], d.own[i]
+        tree.mass, tree.moment = own.mass, own.moment
+        for e in range(6):
+            tree.inertia[e] = own.inertia[e]
+
+
+@kernel
+def gather(d, i):
     """Force and momentum of link i's coordinates; then take its subtree to its parent."""
-    o = m.WRENCH.row(h, i)
-    first = m.LINKS.c0(h, i)
-    for k in range(first, first + m.LINKS.n_speeds(h, i)):
-        carry(h, w, i, k)
-        w[h[m.BIAS] + k] = dot6(w, m.COLUMNS.row(h, k), w, o)
-    parent = m.LINKS.parent(h, i)
-    up, tree = m.WRENCH.row(h, parent), m.INERTIA.row(h, parent)
-    accumulate(w, up, at(w, o))
-    accumulate(w, up + 3, at(w, o + 3))
-    for e in range(m.INERTIA.size):
-        w[tree + e] += w[m.INERTIA.row(h, i) + e]
+    link, wrench = d.links[i], d.wrench[i]
+    for k in range(link.c0, link.c0 + link.n_speeds):
+        carry(d.h, d.w, i, k)
+        column = d.columns[k]
+        d.bias[k] = dot(column.angular, wrench.moment) + dot(column.linear, wrench.force)
+    above = d.wrench[link.parent]
+    above.moment = add(above.moment, wrench.moment)
+    above.force = add(above.force, wrench.force)
+    tree, branch = d.inertia[link.parent], d.inertia[i]
+    tree.mass += branch.mass
+    tree.moment = add(tree.moment, branch.moment)
+    for e in range(6):
+        tree.inertia[e] += branch.inertia[e]
 
 
 @kernel
-def assemble_mass(h, w):
+def assemble_mass(d):
     """Mass matrix in its envelope, from momenta and columns."""
-    for p in range(h[m.N_PAIRS]):
-        momentum, column = m.MOMENTA.row(h, m.PAIRS.momentum(h, p)), m.COLUMNS.row(h, m.PAIRS.column(h, p))
-        w[h[m.MASS] + m.PAIRS.entry(h, p)] += dot6(w, momentum, w, column)
+    for p in range(d.n_pairs):
+        pair = d.pairs[p]
+        momentum, column = d.momenta[pair.momentum], d.columns[pair.column]
+        d.mass[pair.entry] += dot(momentum.angular, column.angular) + dot(momentum.linear, column.linear)
 
 
 @kernel
-def drive_forces(h, w):
+def drive_forces(d):
     """Forces that the prescribed coordinates need: their rows of the equations of motion."""
-    for d in range(h[m.N_DRIVES]):
-        w[h[m.DRIVE_FORCE] + d] = w[h[m.BIAS] + h[m.NV] + d]
-    for p in range(h[m.N_KNOWN_PAIRS]):
-        momentum, column = m.MOMENTA.row(h, m.KNOWN_PAIRS.momentum(h, p)), m.COLUMNS.row(h, m.KNOWN_PAIRS.column(h, p))
-        acceleration = w[h[m.DU] + m.KNOWN_PAIRS.coordinate(h, p)]
-        w[h[m.DRIVE_FORCE] + m.KNOWN_PAIRS.drive(h, p)] += dot6(w, momentum, w, column) * acceleration
+    for k in range(d.n_drives):
+        d.drive_force[k] = d.bias[d.nv + k]
+    for p in range(d.n_known_pairs):
+        pair = d.known_pairs[p]
+        momentum, column = d.momenta[pair.momentum], d.columns[pair.column]
+        inertia = dot(momentum.angular, column.angular) + dot(momentum.linear, column.linear)
+        d.drive_force[pair.drive] += inertia * d.du[pair.coordinate]
 
 
 def make_forces(
@@ -110,23 +125,23 @@ def make_forces(
     loads: Callable | None = None,
     stops: Callable | None = None,
 ) -> Callable:
-    """The kernel forces(h, f, w, n): inertia and applied forces of all links, before the tree gathers them."""
+    """The kernel forces(d): inertia and applied forces of all links, before the tree gathers them."""
     flexible_inertia = nothing if flexible is None else flexible.inertia
     contact_forces = nothing if contacts is None else contacts
     applied = nothing if loads is None else loads
     stop_forces = nothing if stops is None else stops
 
     @kernel
-    def forces(h, f, w, n):
-        for e in range(6):
-            w[m.WRENCH.row(h, 0) + e] = 0.0
-        for i in range(1, h[m.N_LINKS]):
-            if m.LINKS.flex(h, i) < 0:
-                rigid.inertia(h, f, w, i)
-        flexible_inertia(h, f, w, n)
-        contact_forces(h, f, w, n)
-        applied(h, f, w, n)
-        stop_forces(h, f, w, n)
+    def forces(d):
+        ground = d.wrench[0]
+        ground.moment, ground.force = ZERO, ZERO
+        for i in range(1, d.n_links):
+            if d.links[i].flex < 0:
+                rigid.inertia(d.h, d.f, d.w, i)
+        flexible_inertia(d.h, d.f, d.w, d.n)
+        contact_forces(d.h, d.f, d.w, d.n)
+        applied(d.h, d.f, d.w, d.n)
+        stop_forces(d.h, d.f, d.w, d.n)
 
     return forces
 
@@ -173,60 +188,59 @@ def make_rates(
     rub, rub_drives = (nothing, no_known_forces) if friction is None else friction
 
     @kernel
-    def gather_forces(h, f, w, n):
+    def gather_forces(d):
         """Forces of all parts, then the tree from its leaves to the ground."""
-        for k in range(h[m.MASS], h[m.MASS] + h[m.MASS_SIZE]):
-            w[k] = 0.0
-        forces(h, f, w, n)
-        modal_mass(h, f, w)
-        for i in range(h[m.N_LINKS]):
-            for e in range(m.INERTIA.size):
-                w[m.INERTIA.row(h, i) + e] = w[m.OWN.row(h, i) + e]
-        for i in range(h[m.N_LINKS] - 1, 0, -1):
-            port_load(h, w, i)
-            gather(h, w, i)
-        modal(h, w)
+        for k in range(d.mass_size):
+            d.mass[k] = 0.0
+        forces(d)
+        modal_mass(d.h, d.f, d.w)
+        copy_inertia(d)
+        for i in range(d.n_links - 1, 0, -1):
+            port_load(d.h, d.w, i)
+            gather(d, i)
+        modal(d.h, d.w)
 
     @kernel
-    def store_rates(h, f, w, dy):
+    def store_rates(d, dy):
         """Positions' rates, accelerations, and the ledger's powers."""
         power = 0.0
-        for d in range(h[m.N_DRIVES]):
-            power += w[h[m.DRIVE_FORCE] + d] * w[h[m.U] + h[m.NV] + d]
-        w[h[m.LEDGER_RATE] + m.DRIVE_WORK] = power
-        for k in range(h[m.NQ]):
-            w[dy + k] = w[h[m.POSITION_RATE] + k]
-        for k in range(h[m.NV]):
-            w[dy + h[m.NQ] + k] = w[h[m.DU] + k]
-        modal_rates(h, f, w, dy)
-        for k in range(h[m.N_LEDGER]):
-            w[dy + h[m.NQ] + h[m.NV] + k] = w[h[m.LEDGER_RATE] + k]
+        for k in range(d.n_drives):
+            power += d.drive_force[k] * d.u[d.nv + k]
+        d.ledger_rate[m.DRIVE_WORK] = power
+        for k in range(d.nq):
+            d.w[dy + k] = d.position_rate[k]
+        for k in range(d.nv):
+            d.w[dy + d.nq + k] = d.du[k]
+        modal_rates(d.h, d.f, d.w, dy)
+        for k in range(d.n_ledger):
+            d.w[dy + d.nq + d.nv + k] = d.ledger_rate[k]
 
     @kernel
     def rates(h, f, w, n, y, dy):
-        n[m.STATE], n[m.ABRIDGED] = y, 0
-        spread_state(h, w, y)
-        prescribe(h, w)
-        for k in range(h[m.N_LEDGER]):
-            w[h[m.LEDGER_RATE] + k] = 0.0
-        kinematics(h, f, w)
-        gather_forces(h, f, w, n)
-        assemble_mass(h, w)
-        n[m.EVALUATION] = m.OK
-        if not factor(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], MASSLESS_PIVOT):
-            n[m.EVALUATION] = m.NOT_POSITIVE
+        d = data(h, f, w, n)
+        d.state, d.abridged = y, 0
+        spread_state(d, y)
+        prescribe(d)
+        for k in range(d.n_ledger):
+            d.ledger_rate[k] = 0.0
+        kinematics(d)
+        gather_forces(d)
+        assemble_mass(d)
+        d.evaluation = m.OK
+        if not factor(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, MASSLESS_PIVOT):
+            d.evaluation = m.NOT_POSITIVE
             return
-        for k in range(h[m.NV]):
-            w[h[m.FORCE] + k] = -w[h[m.BIAS] + k]
-        forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
+        for k in range(d.nv):
+            d.force[k] = -d.bias[k]
+        forward(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, h[m.FORCE])
         close(h, f, w, n)
-        backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
-        for k in range(h[m.NV]):
-            w[h[m.DU] + k] = w[h[m.FORCE] + k]
+        backward(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, h[m.FORCE])
+        for k in range(d.nv):
+            d.du[k] = d.force[k]
         rub(h, f, w, n)
-        drive_forces(h, w)
+        drive_forces(d)
         known_forces(h, w)
         rub_drives(h, w)
-        store_rates(h, f, w, dy)
+        store_rates(d, dy)
 
     return rates

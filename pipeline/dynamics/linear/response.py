@@ -1,6 +1,7 @@
 r"""What bending of bodies does to first order along the ideal motion: to places, rates and the forces of joints.
 
-Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that open no joint (`play`):
+Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that open no joint
+(`clearance_response`):
 
 .. math:: G x + B q = 0, \qquad M\,(\ddot x, \ddot q) + K q = f(t), \qquad M = \sum_b J_b^T M_b J_b
 
@@ -25,8 +26,8 @@ import scipy.linalg
 import xarray as xr
 
 from flexclear.pipeline.core.scene.parts import RigidBody
-from flexclear.pipeline.core.scene.wanted import Quantity
-from flexclear.pipeline.dynamics.linear import play
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.dynamics.linear import clearance_response
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
@@ -73,7 +74,7 @@ def response(
     model, time = run.model, run.trajectory.time
     motions = Motions(model, run.observed)
     unknown = Response(np.nan, np.nan, np.nan, {q.name: np.inf for q in chosen})
-    if not bundles or not play.is_whole(model):
+    if not bundles or not clearance_response.is_whole(model):
         return unknown
     once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both its sides
     time, every = time[once], slice(0, len(time))
@@ -81,11 +82,13 @@ def response(
         n for n, joint in model.scene.joint.items() if any(end.partition(".")[0] in bundles for end in joint.between)
     ]
     loads = joint_wrenches(motions, held)
-    forces = np.hstack([play.modal_forces(model, motions, n, b, loads, every)[once] for n, b in bundles.items()])
+    forces = np.hstack(
+        [clearance_response.modal_forces(model, motions, n, b, loads, every)[once] for n, b in bundles.items()]
+    )
     joints, found = constraints(model.mechanism), list[Response]()
     for row in np.unique(np.linspace(0, len(once) - 1, LOOKS).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
-        assembled = _assembled(model, play.lever_of(model, joints, poses), poses, bundles)
+        assembled = _assembled(model, clearance_response.lever_of(model, joints, poses), poses, bundles)
         if assembled is None:
             return unknown
         found.append(_at(assembled, forces, time, chosen))
@@ -106,7 +109,7 @@ class _Assembled:
 
     model: Model
     poses: Sequence[Placement]
-    lever: play.Lever
+    lever: clearance_response.Lever
     omega: np.ndarray
     modes: np.ndarray
     free: np.ndarray
@@ -115,12 +118,12 @@ class _Assembled:
 
     def moved(self, body: str, *, turning: bool) -> np.ndarray:
         """Motion of a body per (x, q), shape (3, 6 (links - 1) + n)."""
-        shown = play.shown(self.model, self.poses, body, turning=turning)
+        shown = clearance_response.shown(self.model, self.poses, body, turning=turning)
         return np.hstack([shown, self.own[body][0 if turning else 1]])
 
 
 def _assembled(
-    model: Model, lever: play.Lever, poses: Sequence[Placement], bundles: Mapping[str, xr.Dataset]
+    model: Model, lever: clearance_response.Lever, poses: Sequence[Placement], bundles: Mapping[str, xr.Dataset]
 ) -> _Assembled | None:
     """The elastic mechanism in a pose; None where no motion is left."""
     first = np.concatenate([[0], np.cumsum([int(b.sizes["mode"]) for b in bundles.values()])])
@@ -128,10 +131,10 @@ def _assembled(
     own = {name: (np.zeros((3, first[-1])), np.zeros((3, first[-1]))) for name in model.scene.body}
     for k, (name, bundle) in enumerate(bundles.items()):
         mine = slice(first[k], first[k + 1])
-        opened[:, mine], carried = play.openings(model, poses, lever, name, bundle)
+        opened[:, mine], carried = clearance_response.openings(model, poses, lever, name, bundle)
         for body in own.keys() & carried.keys() - {name}:
             own[body][0][:, mine] = carried[body].turn
-            own[body][1][:, mine] = carried[body].shift_of(play.centre(model, poses, body))
+            own[body][1][:, mine] = carried[body].shift_of(clearance_response.centre(model, poses, body))
     Z = scipy.linalg.null_space(np.hstack([lever.gradient.toarray(), opened]), rcond=FOLLOWED)
     M, momenta = _mass(model, poses, bundles, first, own)
     K = scipy.linalg.block_diag(*(b["modal_stiffness"].values for b in bundles.values()))
@@ -164,14 +167,14 @@ def _mass(
             model.mechanism.links[model.mechanism.link_of[name]].places[name]
         )
         inertia = place.R @ np.array(body.inertia) @ place.R.T
-        rigid = [play.shown(model, poses, name, turning=turning) for turning in (True, False)]
+        rigid = [clearance_response.shown(model, poses, name, turning=turning) for turning in (True, False)]
         turn, shift = (np.hstack(parts) for parts in zip(rigid, own[name], strict=True))
         spin, push = inertia @ turn, body.mass * shift
         M += turn.T @ spin + shift.T @ push
         if name in bundles:
             k = list(bundles).index(name)
             mine = slice(m + first[k], m + first[k + 1])
-            push_q, spin_q = _momenta(bundles[name], place, play.centre(model, poses, name))
+            push_q, spin_q = _momenta(bundles[name], place, clearance_response.centre(model, poses, name))
             across = turn.T @ spin_q + shift.T @ push_q
             M[:, mine] += across
             M[mine, :] += across.T

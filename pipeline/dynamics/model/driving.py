@@ -10,8 +10,8 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import lookup, suggestion
 from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
 from flexclear.pipeline.dynamics.effects import JOINTS
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 

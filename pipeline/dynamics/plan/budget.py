@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from flexclear.pipeline.core.decisions import PILOT, Decision
-from flexclear.pipeline.core.influence import Influence
+from flexclear.pipeline.core.effect_size import Influence
 from flexclear.pipeline.core.scene.variants import Effect
-from flexclear.pipeline.dynamics.linear.play import OF_POSE
-from flexclear.pipeline.dynamics.plan.pilots import Pilots
+from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE
+from flexclear.pipeline.dynamics.plan.screening_runs import Pilots
 
 #: share of what is wanted that dropped effects may use up together; the rest is for what is not estimated
 BUDGET = 0.75

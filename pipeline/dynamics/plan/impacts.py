@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.influence import Influence
+from flexclear.pipeline.core.effect_size import Influence
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
-from flexclear.pipeline.dynamics.plan.pilots import MEMBERS
+from flexclear.pipeline.dynamics.plan.screening_runs import MEMBERS
 from flexclear.pipeline.dynamics.run.ledger import CHOSEN
 
 #: where members part, fewer modes are only trusted that were seen over this part of the time

@@ -1,7 +1,8 @@
 """The decisions of a plan: the error that is wanted is a budget, and what is dropped spends it.
 
-Order of the evidence: bounds and first-order responses along the ideal motion (`dynamics.linear.play`), which cost one
-run of the ideal mechanism; then runs of variants, rigid ones with clearance and flexible ones without, which are cheap;
+Order of the evidence: bounds and first-order responses along the ideal motion (`dynamics.linear.clearance_response`),
+which cost one run of the ideal mechanism; then runs of variants, rigid ones with clearance and flexible ones without,
+which are cheap;
 then, where clearance stays, a loose run of the whole scene to see whether flexible bodies change what it does.
 What is not shown to be small is kept.
 """
@@ -17,17 +18,17 @@ from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.decisions import BOUND, NONE, PILOT, RESPONSE, Mesh, Plan
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
+from flexclear.pipeline.core.scene.requested_accuracy import KINDS, parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
-from flexclear.pipeline.core.scene.wanted import KINDS, parse
-from flexclear.pipeline.dynamics.linear.play import OF_POSE, bounds
+from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE, bounds
 from flexclear.pipeline.dynamics.linear.response import Response, response
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.impacts import bent, quickest
-from flexclear.pipeline.dynamics.plan.pilots import BEGINNING, MEMBERS, RTOL, Pilots
+from flexclear.pipeline.dynamics.plan.requested_accuracy import wanted_in
+from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, Pilots
 from flexclear.pipeline.dynamics.plan.tolerance import DEFAULT, no_dearer, smooth
-from flexclear.pipeline.dynamics.plan.wanted import wanted_in
 from flexclear.pipeline.dynamics.run.run import Run, integrate
 
 #: what bounds of clearances, which hold whatever happens, may use up of the budget

@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
-from flexclear.pipeline.dynamics.plan.pilots import MEMBERS, RTOL, SMOOTH, SMOOTH_RTOL, Pilots
+from flexclear.pipeline.dynamics.plan.screening_runs import MEMBERS, RTOL, SMOOTH, SMOOTH_RTOL, Pilots
 
 #: share of what is wanted that the integration may err by
 SHARE = 0.15

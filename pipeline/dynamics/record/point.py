@@ -15,8 +15,8 @@ from flexclear.pipeline.core.artifacts.points import Point, Values
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
-from flexclear.pipeline.core.scene.kept import OF_CONTACTS, Kept
 from flexclear.pipeline.core.scene.load import with_numbers
+from flexclear.pipeline.core.scene.output_quantities import OF_CONTACTS, Kept
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.alike import engines_alike
-from flexclear.pipeline.dynamics.run.crew import Crews, Place, crews
+from flexclear.pipeline.dynamics.run.batched_evaluation import Crews, Place, crews
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed

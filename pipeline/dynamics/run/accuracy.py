@@ -1,6 +1,6 @@
 """A run whose time integration is as accurate as the scene asks: tolerances are tried, errors estimated.
 
-Where the scene names no integrator, each run is made with the one that is foreseen to be cheapest (`suited`).
+Where the scene names no integrator, each run is made with the one that is foreseen to be cheapest (`method_selection`).
 
 The error of a run is estimated by the same run at a hundred times tighter tolerance: an adaptive method
 whose tolerance is proportional to its error (tolerance proportionality) then overestimates its distance to the
@@ -23,12 +23,12 @@ from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity, parse
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.wanted import Quantity, parse
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.pace import Judges
-    from flexclear.pipeline.dynamics.run.suited import Suit
+    from flexclear.pipeline.dynamics.run.method_selection import Suit
+    from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
 #: the estimate compares with a run at this share of the tolerance
 FINER = 1e-2

@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.crew import Crew, Place
+from flexclear.pipeline.dynamics.run.batched_evaluation import Crew, Place
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 
 #: two breaks nearer than this share of the run are the same instant, written or summed up in two ways

@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.folder import processor
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.pace import Look
+from flexclear.pipeline.dynamics.run.progress_rate import Look
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.collocation import Collocation

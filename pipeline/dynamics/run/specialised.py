@@ -6,8 +6,8 @@ met decide, no clock and no cache, so that equal scenes give equal bytes. Values
 rounding. Friction in ideal joints is solved for by iteration, from what the last evaluation found: that stays with the
 kernels.
 
-Members of an ensemble are evaluated several at once (`run.crew`). How many depends on the machine, so the code gives
-the same bits for any number.
+Members of an ensemble are evaluated several at once (`run.batched_evaluation`). How many depends on the
+machine, so the code gives the same bits for any number.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.compile import functions, stacks
 from flexclear.pipeline.dynamics.effects import Parts
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.model import selection
-from flexclear.pipeline.dynamics.run.crew import Code, Crew, Crews, Place, crews
+from flexclear.pipeline.dynamics.run.batched_evaluation import Code, Crew, Crews, Place, crews
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring, wiring

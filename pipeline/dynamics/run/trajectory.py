@@ -16,8 +16,8 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.run import refusal, singular
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.pace import Judge, crawls, look
 from flexclear.pipeline.dynamics.run.pieces import Handover, Piece, Selections, Tape, piece
+from flexclear.pipeline.dynamics.run.progress_rate import Judge, crawls, look
 from flexclear.pipeline.dynamics.run.reach import require_shallow
 from flexclear.pipeline.dynamics.run.specialised import settle
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping

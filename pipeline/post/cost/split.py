@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 from flexclear.pipeline.post.cost.statistics import relative_error
 from flexclear.pipeline.post.cost.study import Point, believed, relative
 

@@ -15,7 +15,7 @@ import xarray as xr
 
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 
 #: groups of points and the factors that span each
 GROUPS: dict[str, tuple[str, ...]] = {

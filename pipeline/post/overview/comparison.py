@@ -16,7 +16,7 @@ import xarray as xr
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 from flexclear.pipeline.post.horizon import sentence
 from flexclear.pipeline.post.overview.curves import curves, has, measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table

@@ -10,7 +10,7 @@ import xarray as xr
 
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.algebra import first_largest
-from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 from flexclear.pipeline.post.rotations import Turning, turning
 
 #: factor and unit of smaller and larger values, largest first
@@ -69,7 +69,7 @@ SHORT = 4.0
 
 def has(run: xr.Dataset, quantity: Quantity) -> bool:
     """Whether a run holds this quantity."""
-    from flexclear.pipeline.core.scene.wanted import KINDS
+    from flexclear.pipeline.core.scene.requested_accuracy import KINDS
 
     kind = KINDS[quantity.kind]
     return kind.owner in run.coords and quantity.owner in run[kind.owner].values

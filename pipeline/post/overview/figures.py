@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
-from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 from flexclear.pipeline.post.overview.curves import by_unit, impacts, measured, turned_by
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.series import derive, parameters

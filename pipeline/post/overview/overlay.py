@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.scene.wanted import Quantity
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 from flexclear.pipeline.post.overview.curves import Curve, curves, has, scaled
 from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style

@@ -22,7 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexclear.pipeline.core import machine
-from flexclear.pipeline.core.foreign import apart
+from flexclear.pipeline.core.external_files import apart
 
 #: what a file holds is in memory so many times while it is checked and brought into SI units
 COPIES = 4.0

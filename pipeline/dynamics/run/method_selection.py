@@ -24,7 +24,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import refusal
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.pace import Judge, Judges, Look, Panel, limited, pace
+from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges, Look, Panel, limited, pace
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.start import consistent_start
 

@@ -21,13 +21,13 @@ from typing import Any
 
 from flexclear.pipeline.core import machine
 from flexclear.pipeline.core.errors import ResourceError
-from flexclear.pipeline.core.foreign import wire
-from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.external_files import wire
+from flexclear.pipeline.core.workflow import file_dependencies
 
 # started by a command, since multiprocessing would run the user's script again in the child
 COMMAND = """import json, sys
 sys.path[:] = json.loads(sys.argv[1])
-from flexclear.pipeline.core.foreign.child import main
+from flexclear.pipeline.core.external_files.child import main
 main()
 """
 #: memory of a reader [B]: so much, and so many times the size of its file; archives and text grow a hundredfold
@@ -102,7 +102,7 @@ _lock = threading.Lock()
 def read(function: Callable[..., Any], path: Path, *arguments: Any, limits: Limits | None = None) -> Any:
     """What ``function(path, *arguments)`` gives in the child, as far as `wire` can carry it.
 
-    function: at the top of a module, which the child imports.  Which files were opened is told to `opened`.
+    function: at the top of a module, which the child imports.  `file_dependencies` records which files it opened.
     Raises UnreadableError for what cannot be read, or takes more than it may; ResourceError where the machine has
     too little, or a file changes meanwhile.
     """
@@ -122,7 +122,7 @@ def read(function: Callable[..., Any], path: Path, *arguments: Any, limits: Limi
             raise ResourceError(str(answer["words"]))
         words = {"memory": _too_large(limits)}
         raise UnreadableError(words.get(answer["failure"], str(answer.get("words"))))
-    opened.told(answer["read"], path.parent)
+    file_dependencies.told(answer["read"], path.parent)
     return answer["value"]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from flexclear.pipeline.core import machine
-from flexclear.pipeline.core.foreign import apart
+from flexclear.pipeline.core.external_files import apart
 
 
 def read(path: Path, where: str, copies: float, remedy: str) -> dict[str, np.ndarray]:

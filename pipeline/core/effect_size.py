@@ -22,9 +22,9 @@ from scipy.special import stdtrit
 
 from flexclear.pipeline.core.algebra import rotation_between
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.kept import Kept, parse_kept
+from flexclear.pipeline.core.scene.output_quantities import Kept, parse_kept
+from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
-from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
 
 #: a difference of means that chance alone makes less often than this counts: of hundred independent looks one in ten
 RARE = 1e-3

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.foreign import apart
-from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.external_files import apart
+from flexclear.pipeline.core.workflow import file_dependencies
 
 #: what meshio keeps among the sets of cells of a Gmsh 4 file, but numbers of curves and points
 NO_CELLS = "gmsh:bounding_entities"
@@ -106,4 +106,4 @@ def _note_companions(path: Path) -> None:
     if path.suffix in (".xdmf", ".xmf"):
         words = re.split(r"[\s<>]+", path.read_text(encoding="utf-8", errors="replace"))
         for name in {word.partition(".h5:")[0] for word in words if ".h5:" in word}:
-            opened.note(path.parent / f"{name}.h5")
+            file_dependencies.note(path.parent / f"{name}.h5")

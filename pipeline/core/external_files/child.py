@@ -11,8 +11,8 @@ from typing import IO, Any
 
 from flexclear.pipeline.core import system
 from flexclear.pipeline.core.errors import ResourceError, shown
-from flexclear.pipeline.core.foreign import wire
-from flexclear.pipeline.core.workflow import family, opened
+from flexclear.pipeline.core.external_files import wire
+from flexclear.pipeline.core.workflow import family, file_dependencies
 
 #: bytes of a request: names, numbers, and paths
 LARGEST_REQUEST = 1_000_000
@@ -40,8 +40,8 @@ def _answer(asked: dict[str, Any], answers: IO[bytes]) -> None:
     try:
         module, _, name = asked["function"].partition(":")
         function = getattr(importlib.import_module(module), name)
-        with opened.watched(path.parent) as read, opened.ordinary_only():
-            opened.note(path)  # some readers are not written in Python
+        with file_dependencies.watched(path.parent) as read, file_dependencies.ordinary_only():
+            file_dependencies.note(path)  # some readers are not written in Python
             value = function(path, *asked["arguments"])
         wire.send(answers, {"value": value, "read": read})
     except (MemoryError, BrokenPipeError) as error:

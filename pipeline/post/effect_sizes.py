@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.influence import Influence, influence
+from flexclear.pipeline.core.effect_size import Influence, influence
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 from flexclear.pipeline.core.scene.variants import Effect
-from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.post.overview.curves import measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table
 

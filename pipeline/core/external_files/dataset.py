@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.foreign import apart
-from flexclear.pipeline.core.foreign.checks import require_file
+from flexclear.pipeline.core.external_files import apart
+from flexclear.pipeline.core.external_files.checks import require_file
 from flexclear.pipeline.core.version import DISTRIBUTION
 
 if TYPE_CHECKING:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from flexclear.pipeline.core import influence
+from flexclear.pipeline.core import effect_size
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.wanted import KINDS, Quantity
 
 #: peaks of forces between flexible bodies are at least this share of those between rigid ones
 SOFTER = 0.5
@@ -32,7 +32,7 @@ def wanted_in(
         point = rigid() if of_contact else ideal
         if point.refused:
             raise SolverError(f"{scene.name}: the mechanism with rigid bodies cannot be run: {point.refused}")
-        sizes[q.name] = influence.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
+        sizes[q.name] = effect_size.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
         want = scene.accuracy.quantities[q.name]
         found[q.name] = want.absolute if want.absolute is not None else (want.relative or 0.0) * sizes[q.name]
         if not found[q.name] > 0.0:
@@ -44,7 +44,7 @@ def wanted_in(
     if all(found[name] >= most for name, most in sizes.items()):
         # forces and rates may come from impacts alone
         more = rigid() if scene.contacts() or scene.stop else ideal
-        sizes = {q.name: max(sizes[q.name], 0.0 if more.refused else influence.size(more, q)) for q in quantities}
+        sizes = {q.name: max(sizes[q.name], 0.0 if more.refused else effect_size.size(more, q)) for q in quantities}
     if all(found[name] >= most for name, most in sizes.items()):
         q = quantities[0]
         raise InputError(

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.errors import ResourceError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow import opened
+from flexclear.pipeline.core.workflow import file_dependencies
 from flexclear.pipeline.core.workflow.execute import execute, find, states
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
 from flexclear.pipeline.core.workflow.task import Task, facts
@@ -157,7 +157,7 @@ def test_what_a_task_opens_is_noted_by_whoever_opens_it(tmp_path: Path) -> None:
         (tmp_path / name).write_text(name)
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "d.dat").touch()
-    with opened.watched(tmp_path, outside=[tmp_path / "out"]) as read:
+    with file_dependencies.watched(tmp_path, outside=[tmp_path / "out"]) as read:
         (tmp_path / "a.dat").read_bytes()
         os.close(os.open(tmp_path / "b.dat", os.O_RDONLY))
         (tmp_path / "c.py").read_text()
@@ -167,29 +167,29 @@ def test_what_a_task_opens_is_noted_by_whoever_opens_it(tmp_path: Path) -> None:
         np.random.default_rng(1)
     (tmp_path / "b.dat").read_text()
     assert read.keys() == {"a.dat", "b.dat"}
-    assert read == opened.digests(read, tmp_path)
+    assert read == file_dependencies.digests(read, tmp_path)
 
 
 def test_where_modules_are_looked_for_is_no_fact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What an import that fails looks into is no file of a task: whole places, and bare names of editable installs."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(opened.tempfile, "gettempdir", lambda: os.devnull)
+    monkeypatch.setattr(file_dependencies.tempfile, "gettempdir", lambda: os.devnull)
     monkeypatch.setattr(sys, "path", ["__editable__.finder.__path_hook__", str(tmp_path / "modules.zip")])
-    with opened.watched(tmp_path) as found:
+    with file_dependencies.watched(tmp_path) as found:
         for name in (*sys.path, "data.zip"):
             with contextlib.suppress(OSError):
                 Path(name).open().close()
-    assert found == {"data.zip": opened.ABSENT}
+    assert found == {"data.zip": file_dependencies.ABSENT}
 
 
 def test_a_project_inside_of_an_environment_is_no_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As `python -m venv .` makes it: only the folders of libraries there are left out."""
     monkeypatch.setattr(sys, "prefix", str(tmp_path))
-    opened._system.cache_clear()
+    file_dependencies._system.cache_clear()
     (tmp_path / "a.dat").write_text("a")
-    with opened.watched(tmp_path) as read:
+    with file_dependencies.watched(tmp_path) as read:
         (tmp_path / "a.dat").read_text()
-    opened._system.cache_clear()
+    file_dependencies._system.cache_clear()
     assert read.keys() == {"a.dat"}
 
 
@@ -199,7 +199,7 @@ def test_a_file_that_changes_while_it_is_read_is_told(tmp_path: Path) -> None:
     (tmp_path / "new").write_text("new")
 
     def read() -> None:
-        with opened.watched(tmp_path):
+        with file_dependencies.watched(tmp_path):
             path.read_text()
             (tmp_path / "new").rename(path)
 
@@ -234,7 +234,7 @@ def test_what_a_page_opens_counts_each_time(root: Path) -> None:
     """Whatever the process did before: a second page of one process depends on the same files as its first."""
     found = []
     for _ in range(2):
-        with opened.watched(root) as read:
+        with file_dependencies.watched(root) as read:
             for name in ("page.css", "page.js", "viewer.js"):
                 assert pages.asset(name)
         found.append(read)
@@ -249,7 +249,7 @@ def test_what_a_library_writes_for_itself_is_no_input(tmp_path: Path, monkeypatc
     others.parent.mkdir()
     for path in (own, others, table):
         path.write_text("before")
-    with opened.watched(tmp_path) as read:
+    with file_dependencies.watched(tmp_path) as read:
         assert own.read_text() == table.read_text() == "before"
         own.write_text("after")
         monkeypatch.setenv("MPLCONFIGDIR", str(others.parent))

@@ -10,13 +10,13 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.effect_size import Influence, influence, kept, members_apart
 from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.influence import Influence, influence, kept, members_apart
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect, with_modes, without
-from flexclear.pipeline.core.scene.wanted import Quantity
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.point import Runner

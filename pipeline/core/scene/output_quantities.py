@@ -1,7 +1,7 @@
 """What a sweep keeps of each point, by name: a quantity, and what of it.
 
-``platform.velocity.largest`` is ``<quantity>.<reduction>``; quantities are those of `pipeline.core.scene.wanted`. How a
-series becomes such a number is known to `pipeline.core.quantities`.
+``platform.velocity.largest`` is ``<quantity>.<reduction>``; `pipeline.core.scene.requested_accuracy` lists the
+quantities. `pipeline.core.quantities` reduces a series to such a number.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from flexclear.pipeline.core.registry import suggestion
-from flexclear.pipeline.core.scene.wanted import KINDS, Quantity, parse
+from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity, parse
 
 #: reduction -> what it says of a series
 SERIES = {

@@ -1,0 +1,130 @@
+"""Named fields of the arrays h, f, w and n: what `memory` declares, as kernels read and write it.
+
+After ``d = data(h, f, w, n)``, ``d.nv`` is a size, ``d.bias[k]`` an entry of a stretch of w, ``d.links[i].parent`` a
+field of a row of a table, and ``d.evaluation`` an integer of n.  The names are those of `memory` in small letters.  A
+field of three numbers is a vector and one of 3 x 3 numbers a matrix, both tuples that are read and assigned as a whole.
+A field of any other shape is indexed like a stretch.
+
+Interpreted kernels and the tracer (`specialise`) use the classes here; compiled kernels get the same names from
+`field_types`, as loads and stores.  The compiler assumes that no two pointers of a kernel refer to the same memory, so
+a kernel that writes never gets `d` together with a row or stretch of it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.kernels import INTERPRETED, Kernel
+
+
+class Stretch:
+    """Entries of an array from an offset on."""
+
+    __slots__ = ("array", "begin")
+
+    def __init__(self, array: Any, begin: Any) -> None:
+        self.array, self.begin = array, begin
+
+    def __getitem__(self, k: Any) -> Any:
+        return self.array[self.begin + k]
+
+    def __setitem__(self, k: Any, value: Any) -> None:
+        self.array[self.begin + k] = value
+
+
+class Rows(Stretch):
+    """Rows of a table; a subclass for each."""
+
+    __slots__ = ()
+    size: int
+    row: type[Stretch]
+
+    def __getitem__(self, i: Any) -> Any:
+        return self.row(self.array, self.begin + self.size * i)
+
+
+class Data:
+    """The four arrays, with what they hold by name."""
+
+    __slots__ = ("f", "h", "n", "w")
+
+    def __init__(self, h: Any, f: Any, w: Any, n: Any) -> None:
+        self.h, self.f, self.w, self.n = h, f, w, n
+
+
+def _number(offset: int) -> property:
+    def read(row: Stretch) -> Any:
+        return row.array[row.begin + offset]
+
+    def write(row: Stretch, value: Any) -> None:
+        row.array[row.begin + offset] = value
+
+    return property(read, write)
+
+
+def _tuple(offset: int, count: int) -> property:
+    def read(row: Stretch) -> Any:
+        return tuple(row.array[row.begin + offset + k] for k in range(count))
+
+    def write(row: Stretch, values: Any) -> None:
+        for k, value in zip(range(count), values, strict=True):
+            row.array[row.begin + offset + k] = value
+
+    return property(read, write)
+
+
+def _field(offset: int, shape: tuple[int, ...]) -> property:
+    if shape in m.TUPLES:
+        return _tuple(offset, m.TUPLES[shape])
+    return property(lambda row: Stretch(row.array, row.begin + offset)) if shape else _number(offset)
+
+
+def _rows(name: str) -> property:
+    fields = {field: _field(*where) for field, where in m.row_fields(name).items()}
+    row = type(name, (Stretch,), {"__slots__": (), **fields})
+    kind = type(name, (Rows,), {"__slots__": (), "size": m.NAMED[name].size, "row": row})
+    array, place = m.ARRAYS[name], m.NAMED[name].place
+    return property(lambda d: kind(getattr(d, array), d.h[place]))
+
+
+def _size(place: int) -> property:
+    return property(lambda d: d.h[place])
+
+
+def _stretch(place: int) -> property:
+    return property(lambda d: Stretch(d.w, d.h[place]))
+
+
+def _integer(place: int) -> property:
+    def write(d: Data, value: Any) -> None:
+        d.n[place] = value
+
+    return property(lambda d: d.n[place], write)
+
+
+for _made, _places in ((_size, m.SIZES), (_stretch, m.STRETCHES), (_integer, m.REPORTS)):
+    for _name, _place in _places.items():
+        setattr(Data, _name, _made(_place))
+for _name in m.NAMED:
+    setattr(Data, _name, _rows(_name))
+
+
+def _data(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> Data:
+    return Data(h, f, w, n)
+
+
+class _Constructor(Kernel):
+    """`data` where it is called by compiled code."""
+
+    @property
+    def _numba_type_(self) -> Any:
+        from flexclear.pipeline.dynamics.field_types import CONSTRUCTOR
+
+        return CONSTRUCTOR
+
+
+#: data(h, f, w, n): the four arrays with named fields
+data: Any = _data if INTERPRETED else _Constructor(_data, lambda function: None)

@@ -1,0 +1,95 @@
+"""Named fields: compiled, interpreted and traced kernels read and write what `memory` declares."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numba import njit, types
+from numba.core.errors import NumbaError, TypingError
+
+import flexclear.pipeline.dynamics.compile.calls  # noqa: F401  (registers the types of named fields)
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.fields import Data, data
+from flexclear.pipeline.dynamics.memory import ARRAYS, row_fields
+from flexclear.pipeline.dynamics.memory import NAMED as TABLES
+
+ROWS = 3
+
+
+def arrays() -> tuple[np.ndarray, ...]:
+    """h, f, w, n with every stretch and ROWS rows of every table at an offset of its own; entries are all different."""
+    h, sizes = np.zeros(m.HEADER, np.int64), {"h": m.HEADER, "f": 0, "w": 0}
+    for name, table in TABLES.items():
+        h[table.place] = sizes[ARRAYS[name]]
+        sizes[ARRAYS[name]] += ROWS * table.size
+    for place in m.STRETCHES.values():
+        h[place] = sizes["w"]
+        sizes["w"] += ROWS
+    for k, place in enumerate(m.SIZES.values()):
+        h[place] = -1 - k
+    wiring = np.arange(m.HEADER, sizes["h"]) * 10
+    f, w = (np.arange(float(sizes[array])) + start for array, start in (("f", 0.25), ("w", 0.5)))
+    return np.concatenate([h, wiring]), f, w, np.arange(m.INTEGERS)
+
+
+def test_names_are_those_of_memory_and_none_means_two_things() -> None:
+    names = [*m.SIZES, *m.STRETCHES, *m.REPORTS, *TABLES]
+    assert len(names) == len(set(names))
+    assert {name: getattr(m, name.upper()) for name in names} == {**m.SIZES, **m.STRETCHES, **m.REPORTS, **TABLES}
+    assert len(m.SIZES) + len(m.STRETCHES) + len(TABLES) + len(m.ADDRESSES) == m.HEADER
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_python_has_each_field_of_each_row(name: str) -> None:
+    """Against rows as NumPy has them."""
+    given = arrays()
+    h = given[0]
+    table, array = TABLES[name], dict(zip("hfwn", given, strict=True))[ARRAYS[name]]
+    begin = h[table.place]
+    rows = m.named(table, array[begin : begin + ROWS * table.size])
+    for field, (_, shape) in row_fields(name).items():
+        held = getattr(getattr(Data(*given), name)[1], field)
+        size = int(np.prod(shape))
+        entries = [held[k] for k in range(size)] if shape else [held]
+        np.testing.assert_array_equal(entries, np.ravel(rows[field][1]))
+
+
+def changed(h, f, w, n):
+    """Something of every kind: returns a number, and writes into w and n."""
+    d = data(h, f, w, n)
+    frame, tree = d.link_frames[1], d.inertia[2]
+    frame.origin = (frame.omega[2], d.link_numbers[0].com[1], 7)
+    frame.axes = d.site_numbers[2].axes
+    tree.mass += tree.inertia[4]
+    tree.inertia[5] = d.gravity[0].acceleration[2]
+    d.bias[1] += d.u[2]
+    d.evaluation, d.abridged = d.links[2].joint, d.state + 3
+    return d.nv + d.links[d.n_links + 2].parent + d.touch[1].gap
+
+
+def test_compiled_kernels_do_as_interpreted_ones() -> None:
+    plain, coded = arrays(), arrays()
+    pointers = types.CPointer(types.int64), types.CPointer(types.float64)
+    assert pointers[0] != pointers[1]
+    scope = {**changed.__globals__, "data": lambda *given: Data(*given)}
+    by_python = type(changed)(changed.__code__, scope)(*plain)
+    assert njit(changed)(*coded) == by_python
+    for a, b, before in zip(plain, coded, arrays(), strict=True):
+        np.testing.assert_array_equal(a, b)
+        assert (a is plain[2] or a is plain[3]) != np.array_equal(a, before)
+    assert plain[3][m.EVALUATION] == m.LINKS.joint.py_func(plain[0], 2)
+
+
+def test_a_name_that_nothing_declares_is_an_error_of_the_compiler() -> None:
+    def unknown(h, f, w, n):
+        return data(h, f, w, n).links[0].parents
+
+    def whole(h, f, w, n):
+        data(h, f, w, n).n_links = 3
+
+    with pytest.raises(TypingError, match="parents"):
+        njit(unknown)(*arrays())
+    with pytest.raises((NumbaError, TypeError), match="cannot assign n_links"):
+        njit(whole)(*arrays())
+    with pytest.raises(AttributeError, match="parents"):
+        _ = Data(*arrays()).links[0].parents
