@@ -64,10 +64,6 @@ def test_equal_results_stop_the_chain(project: Project):
     project.calls()
     first = "from __future__ import annotations\n"
     project.edit("stages/s4_simulate.py", first, first + "\nEDITED = 1\n")
-        "stages/s4_simulate.py",
-        "from __future__ import annotations\n",
-        "from __future__ import annotations\n\nEDITED = 1\n",
-    )
     project.run("run", "tiny/ideal", "--to", "simulate")
     assert project.calls() == ["simulate tiny/ideal"]
     assert "post             fresh" in project.run("why", "tiny/ideal").stdout
