@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.units import quantity
 from flexclear.stages import as_json, run
+from flexclear.stages.workplace import common_arguments, workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,16 +24,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         help="vibrations about steady motion: drives keep their speed instead of being held",
     )
     as_json.json_argument(parser)
+    common_arguments(parser)
 
 
 def command(options: argparse.Namespace) -> None:
     """Print the table."""
-    (graph,) = run.graphs([options.scene])
+    (graph,) = run.graphs([options.scene], options.set)
     try:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
-    found = run.linear(graph.scene, time, moving=options.moving)
+    found = run.linear(graph.scene, time, moving=options.moving, place=workplace(options))
     print(as_json.as_json(found) if options.json else text(found).rstrip("\n"))
 
 

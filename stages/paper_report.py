@@ -82,7 +82,8 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
 def bring(place: Workplace) -> Outcome:
     """Bring everything that the report shows, and the page, up to date; what fails is left out of the page."""
     scenes = Scenes()
-    shown = place.bring(report_tasks(place, scenes))
+    tasks = report_tasks(place, scenes)  # records go by the identity of tasks, which must not end before
+    shown = place.bring(tasks)
     graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in shown.records]
     made = place.bring([page_task(place, shown.records, graphs)])
     check(made)

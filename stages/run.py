@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
-from flexclear.pipeline.core.artifacts.store import PARTIAL, Store, write_dataset
+from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.errors import InputError, InputErrors, SolverError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
@@ -21,7 +21,7 @@ from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.resource_estimate import check_run
 from flexclear.pipeline.core.workflow.progress import WARNING
 from flexclear.pipeline.core.workflow.schedule import Outcome
-from flexclear.stages import owner
+from flexclear.stages import export, owner
 from flexclear.stages.graph import STAGES, Graph
 from flexclear.stages.s5_post import origins
 from flexclear.stages.workplace import Workplace, check, common_arguments, near, workplace
@@ -40,7 +40,12 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
     )
-    parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset of the run here (one scene)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="write the run here: .nc or .mat; .csv, .parquet, .xlsx",
+    )
     parser.add_argument("--planned", action="store_true", help="plan first, and run what the wanted accuracy calls for")
     parser.add_argument("--verify", action="store_true", help="with --planned: run the full scene, tell the true error")
 
@@ -50,6 +55,7 @@ def command(options: argparse.Namespace) -> None:
     if options.out is not None and len(options.scenes) > 1:
         raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "run the scenes one by one")
     if options.out is not None:
+        export.check_format(options.out)
         check_target(options.out)
     if options.verify and not options.planned:
         raise InputError("--verify", "tells the true error of a plan, and no plan is asked for", "add --planned")
@@ -216,7 +222,7 @@ def linear(
     place = place or workplace()
     graph = Graph(scene, shown=as_in_its_file(scene))
     task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
-    outcome = place.bring([task], jobs=1)
+    outcome = place.bring([task])
     check(outcome)
     return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
 
@@ -334,7 +340,7 @@ def copy_run(graph: Graph, place: Workplace, target: Path) -> None:
     """Write the dataset of the run to a file of the user's, titled, and atomically like any other."""
     dataset = run(graph.scene, place)
     with disk_limits(target.parent):
-        write_dataset(target, dataset)
+        export.write(dataset, target)
 
 
 def check_target(target: Path, option: str = "--out") -> None:

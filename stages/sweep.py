@@ -16,7 +16,7 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
 from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
-from flexclear.stages import limit, run, sweep_large, sweep_plan
+from flexclear.stages import export, limit, run, sweep_large, sweep_plan
 from flexclear.stages.sweep_engine import Engine, Job, engine, now
 from flexclear.stages.workplace import Workplace, near, said_arguments, workplace
 
@@ -37,7 +37,14 @@ OFTEN, SHARE = 2.0, 0.01
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("sweeps", nargs="+", metavar="SWEEP", help="a sweep file, or a name below scenes/")
-    parser.add_argument("--workers", type=int, metavar="N", help="processes of this machine (default: its cores)")
+    parser.add_argument(
+        "--jobs",
+        "--workers",
+        dest="workers",
+        type=int,
+        metavar="N",
+        help="processes at most (default: one for each core)",
+    )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster with this scheduler instead")
     parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset here (one sweep); .zarr: as Zarr")
     limit.argument(parser)
@@ -52,6 +59,7 @@ def command(options: argparse.Namespace) -> None:
         if options.out.suffix == sweep_large.SUFFIX:
             sweep_large.require_zarr(f"--out {options.out}")
         else:
+            export.check_format(options.out, (".nc", sweep_large.SUFFIX))
             run.check_target(options.out)
     place = workplace(options)
     paths = [run.find_scene(name) for name in options.sweeps]
@@ -67,7 +75,7 @@ def command(options: argparse.Namespace) -> None:
 def width(asked: int | None) -> int:
     """Number of workers; InputError for one that cannot be."""
     if asked is not None and asked < 1:
-        raise InputError("--workers", f"must be at least 1, not {asked}")
+        raise InputError("--jobs", f"must be at least 1, not {asked}", "leave it out to use every core")
     return asked or cores.cores()
 
 

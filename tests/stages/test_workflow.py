@@ -41,7 +41,7 @@ def test_why_says_what_changed_and_run_does_just_that(project: Project):
     project.run("run", "tiny/contact")
     project.edit("scenes/tiny/contact.toml", "0.5 mm", "0.2 mm")
     with (project.folder / "pipeline/dynamics/contact/normal/lankarani_nikravesh.py").open("a") as file:
-        file.write("\n# edited\n")
+        file.write("\nEDITED = 1\n")
     lines = [line.strip() for line in project.run("why", "tiny/contact").stdout.splitlines()]
     assert lines == [
         "tiny/contact",
@@ -53,7 +53,7 @@ def test_why_says_what_changed_and_run_does_just_that(project: Project):
     project.run("run", "tiny/contact")
     assert project.calls() == ["simulate tiny/contact", "post tiny/contact"]
     project.edit("scenes/tiny/contact.toml", "0.2 mm", "0.5 mm")
-    project.edit("pipeline/dynamics/contact/normal/lankarani_nikravesh.py", "\n# edited\n", "")
+    project.edit("pipeline/dynamics/contact/normal/lankarani_nikravesh.py", "\nEDITED = 1\n", "")
     project.run("run", "tiny/contact")
     assert project.calls() == []  # what was made before the edits is still in the cache
 
@@ -62,7 +62,8 @@ def test_equal_results_stop_the_chain(project: Project):
     """A new title of nothing else: simulate runs again after an edit, post has the same input."""
     project.run("run", "tiny/ideal")
     project.calls()
-    project.edit("stages/s4_simulate.py", '"""One run (schema RUN)', '"""A run (schema RUN)')
+    first = "from __future__ import annotations\n"
+    project.edit("stages/s4_simulate.py", first, first + "\nEDITED = 1\n")
     project.run("run", "tiny/ideal", "--to", "simulate")
     assert project.calls() == ["simulate tiny/ideal"]
     assert "post             fresh" in project.run("why", "tiny/ideal").stdout
@@ -202,6 +203,13 @@ def test_out_copies_the_run(project: Project):
     copied = xr.load_dataset(target, decode_times=False)
     assert copied.attrs["title"] == "Ball in a socket"
     assert copied.sizes["time"] == 5
+    assert project.run("run", "tiny/ideal", "--out", "mine.csv").returncode == 0
+    columns = (project.folder / "mine.csv").read_text().splitlines()
+    assert columns[0].startswith("time [s],")
+    assert len(columns) > 2
+    unknown = project.run("run", "tiny/ideal", "--out", "mine.hdf")
+    assert unknown.returncode == 2
+    assert "'.hdf' is no known format" in unknown.stderr
     refused = project.run("run", "tiny/ideal", "--out", "nowhere/mine.nc")
     assert refused.returncode == 2
     assert "its folder does not exist" in refused.stderr
