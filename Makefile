@@ -35,7 +35,7 @@ test-slow: $(TOOLS) ## The tests marked slow
 # other Pythons that this machine may have; each gets an environment of its own and runs what `doctor` computes
 OTHERS := python3.12 python3.13 python3.14 $(wildcard $(HOME)/.pyenv/versions/3.1[2-9]*/bin/python)
 
-interpreters: $(READY) ## A short run under every other Python there is
+interpreters: $(READY) ## A short run under every other Python there is, and with the lowest versions of libraries
 	@ran=" "; for p in $(OTHERS); do \
 		v=$$($$p -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) || continue; \
 		case "$$ran" in *" $$v "*) continue;; esac; \
@@ -47,6 +47,12 @@ interpreters: $(READY) ## A short run under every other Python there is
 			{ echo "skipped: what it needs is not to be had for Python $$v here"; continue; }; \
 		FLEXCLEAR_RESULTS=$$there/results $$there/bin/python -m flexclear doctor || exit 1; \
 	done; test "$$ran" != " " || echo "skipped: there is no other Python here"
+	@echo "-- lowest versions of libraries"; there=$(VENV)/others/lowest; \
+	test $$there/.ready -nt .ci/lowest.txt && test $$there/.ready -nt pyproject.toml || { \
+		$(RUN) -m venv $$there && $$there/bin/pip install -q --retries 1 --timeout 20 -c .ci/lowest.txt -e . && \
+		touch $$there/.ready; } || \
+		{ echo "skipped: the lowest versions are not to be had here"; exit 0; }; \
+	FLEXCLEAR_RESULTS=$$there/results $$there/bin/python -m flexclear doctor
 
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
 	$(RUN) -m benchmarks evaluation peers runs commands cold growth ensembles exudyn

@@ -170,3 +170,14 @@ def test_what_must_pass_is_what_a_user_types(root: Path):
     run = re.search(r"^for target in (.*); do$", text, re.MULTILINE)
     assert run is not None
     assert run[1].split() == ["setup", "check", "docs", "test", "interpreters"]
+
+
+def test_the_lowest_versions_are_those_that_are_declared(root: Path):
+    """`make interpreters` runs with them."""
+    project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
+    lowest = dict(
+        line.lower().split("==") for line in (root / ".ci" / "lowest.txt").read_text().splitlines() if "==" in line
+    )
+    for requirement in project["dependencies"]:
+        name, _, bound = requirement.lower().partition(">=")
+        assert lowest[name] == bound or lowest[name].startswith(f"{bound}."), requirement
