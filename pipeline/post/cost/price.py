@@ -119,8 +119,7 @@ def _notes(study: xr.Dataset) -> list[str]:
         )
     if study.attrs["horizon"] != "none":
         notes.append(
-            f"Pointwise errors count up to the horizon of the reference and its confirmation, "
-            f"t = {study.attrs['horizon']:.4g} s."
+            f"Pointwise errors count up to the predictability horizon, t = {study.attrs['horizon']:.4g} s."
         )
     if study.attrs["refused"]:
         notes.append(f"Refused: {study.attrs['refused']}.")
@@ -130,8 +129,8 @@ def _notes(study: xr.Dataset) -> list[str]:
 def _confirmed(study: xr.Dataset) -> str:
     unsure, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
     said = f"Reference: {study.attrs['reference']}. "
-    if np.isnan(unsure).any():
-        return f"{said}Not confirmed: {by} was refused."
+    if not by:
+        return f"{said}Not confirmed: no run by another method was made."
     if np.isinf(unsure).any():
         return f"{said}Not confirmed: {by} finds another number of impacts."
     worst = str(study["quantity"].values[int(np.argmax(unsure))])
@@ -147,10 +146,10 @@ def _why_not(study: xr.Dataset) -> str:
     if best is NOTHING:
         return "every run is refused, or has another number of impacts than the reference"
     if best.error <= ROUNDED * float(unsure.sel(quantity=best.worst)):
-        return (
-            f"two independent methods at their tightest tolerances differ as much ({best.worst}); "
-            "rounding errors, which the motion itself magnifies, decide there, and no method helps"
-        )
+        agree = f"two independent methods at the tightest tolerances that were run differ as much ({best.worst})"
+        if study.attrs.get("undone"):
+            return f"{agree}; a larger budget allows tighter ones"
+        return f"{agree}; rounding errors, which the motion itself magnifies, decide there, and no method helps"
     return f"the best setting that was tried reaches {best.error:.1e} ({best.worst})"
 
 

@@ -1,6 +1,6 @@
 """From the runs of a study to one dataset: error and cost over the factors, and how good the reference is.
 
-Errors are pointwise up to the horizon of the reference and its confirmation; beyond it only statistics mean anything
+Errors are pointwise up to the horizon of the scene's run; beyond it only statistics mean anything
 (`pipeline.post.cost.statistics`). They are relative to the size of each quantity (`quantities.scale`).
 """
 
@@ -15,6 +15,7 @@ import xarray as xr
 
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 
 #: groups of points and the factors that span each
@@ -54,6 +55,32 @@ class Point:
     key: str
     group: str
     factors: Mapping[str, Any]
+
+
+def with_reference(
+    points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]
+) -> list[Point]:
+    """The points, and among them again the reference and its confirmation, as points of groups of these names.
+
+    The reference is the run at the tightest tolerance. Of the runs by other methods the one that agrees best with it
+    confirms it: its own error, which is not smaller than the reference's, is part of their distance. Where no other
+    method was run, it is the same one's next run.
+    Raises SolverError where every run was refused.
+    """
+    there = [p for p in points if p.group == "tolerance" and "refused" not in runs[p.key].attrs]
+    if not there:
+        reasons = "; ".join(dict.fromkeys(_reason(runs[p.key]) for p in points if "refused" in runs[p.key].attrs))
+        raise SolverError(f"no run with chosen steps could be made, so that there is nothing to compare with: {reasons}")
+    best = min(there, key=lambda p: (p.factors["rtol"], -INTEGRATORS[p.factors["adaptive_integrator"]].order))
+    others = [p for p in there if p.factors["adaptive_integrator"] != best.factors["adaptive_integrator"]]
+    others = others or [p for p in there if p is not best]
+    until, reference = believed(points, runs), runs[best.key]
+
+    def apart(point: Point) -> float:
+        return max(relative_errors(runs[point.key], reference, chosen, until).values(), default=0.0)
+
+    found = [*points, Point(best.key, "reference", {})]
+    return found + [Point(p.key, "confirmation", {}) for p in sorted(others, key=apart)[:1]]
 
 
 def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
@@ -168,12 +195,11 @@ def relative_errors(
 
 
 def believed(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
-    """Time up to which pointwise errors mean something [s]: the lesser horizon of the reference and its confirmation.
+    """Time up to which pointwise errors mean something [s]: the least horizon of the runs that have one.
 
-    Infinite for runs that say nothing of it.
+    Infinite where none has.
     """
-    both = [runs[p.key] for p in points if p.group in ("reference", "confirmation")]
-    return min((float(run["horizon"]) for run in both if "horizon" in run), default=np.inf)
+    return min((float(runs[p.key]["horizon"]) for p in points if "horizon" in runs[p.key]), default=np.inf)
 
 
 def relative(error: float, scale: float) -> float:
