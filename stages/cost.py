@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 #: tolerances at which ensembles are compared, where a scene has one
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
 #: processor time that a study's runs may take [s]; what one takes besides its integration, and a new set of kernels
-BUDGET, POINT, COMPILING = 100.0, 0.3, 8.0
+BUDGET, POINT, COMPILING = 100.0, 0.6, 8.0
 #: a point may take so many times the evaluations of the scene's own run, or this share of the budget if that is more
 MOST = 10.0
 #: of runs that were left undone, so many are named
@@ -142,6 +142,7 @@ class Study:
         there = {design.key for design in (*self.points, *self.undone)}
         more = [design for design in more if design.key not in there]
         self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
+        self._complete = True
 
     @cached_property
     def _near(self) -> list[cost_design.Design]:
@@ -175,7 +176,8 @@ class Study:
                 "points": listed,
                 "quantities": [[q.owner, q.kind] for q in chosen],
                 "title": self.scene.title,
-                "setting": self.setting.words,
+                "own": self.setting.attributes,
+                "complete": self._complete and not self.undone,
                 "undone": _listed([design.key for design in self.undone]),
                 "peers": list(self.peers),
             },
@@ -205,6 +207,7 @@ class Study:
             self._ensembles[f"ensemble:rtol {rtol:g}"] = task
 
     def __post_init__(self) -> None:
+        self._complete = False
         self._ensembles: dict[str, Task] = {}
         self._compiled: dict[tuple[str, ...], Task] = {}
 
@@ -286,6 +289,17 @@ def bring(
     return study.drawn()
 
 
+def dataset(scene: Scene, place: Workplace, budget: str | float | None = None, models: bool = False) -> xr.Dataset:
+    """The study as a dataset that shows its answer in a notebook; budget: [s], or text such as "2min"."""
+    from flexclear.pipeline.post.answered import answered
+    from flexclear.pipeline.post.cost.answer import sentences
+
+    given = limit.seconds(budget, "budget") if isinstance(budget, str) else budget
+    # in this process: workers would run a caller's script again from its top
+    found, folder = bring(scene, replace(place, jobs=1), seconds=BUDGET if given is None else given, models=models)
+    return answered(found, sentences(found), (folder / "work_precision.png").read_bytes())
+
+
 def told(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:
     """What a page says of a scene, and the files of its pictures, by path relative to the page.
 
@@ -333,9 +347,7 @@ def _bundles(design: cost_design.Design) -> dict[str, Task]:
     return Graph(design.scene, shown=False, recipe=design.recipe).bodies()
 
 
-def _measured(
-    design: cost_design.Design, function: str, more: Mapping[str, object], compiled: Task
-) -> Task:
+def _measured(design: cost_design.Design, function: str, more: Mapping[str, object], compiled: Task) -> Task:
     """A task of `stages.cost_point` on a design's scene."""
     ensemble = design.scene.ensemble is not None
     return Task(

@@ -47,9 +47,10 @@ class Setting:
     step: float | None = None
 
     @property
-    def words(self) -> str:
-        """In words."""
-        return f"{self.integrator}, " + (f"rtol {self.rtol:g}" if self.step is None else f"step {self.step:g} s")
+    def attributes(self) -> dict[str, Any]:
+        """As attributes of a study."""
+        setting = {"own_rtol": self.rtol} if self.step is None else {"own_step": self.step}
+        return {"own_integrator": self.integrator, **setting}
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def near(scene: Scene, own: Setting) -> list[Design]:
     asis, denser = _sampling(scene, own)
     if own.step is not None:
         mine = [_stepped(scene, own.integrator, own.step * factor) for factor in STEPS]
-        confirming = CONFIRMING_STEPS
+        confirming: tuple[float, ...] = CONFIRMING_STEPS
     else:
         tolerances = dict.fromkeys(min(max(own.rtol * factor, TIGHTEST), LOOSEST) for factor in TOLERANCES)
         mine = [_tolerant(scene, own.integrator, rtol) for rtol in tolerances]
@@ -110,7 +111,7 @@ def wide(scene: Scene, integrators: Collection[str] = ()) -> list[Design]:
         if name not in known:
             raise InputError(f"--integrators {name}", "is not among those that are compared", suggestion(name, known))
     found = list[Design]()
-    for name in known if not integrators else integrators:
+    for name in integrators or known:
         found += [_tolerant(scene, name, rtol) for rtol in INTEGRATORS[name].tolerances]
         found += [_stepped(scene, name, step) for step in INTEGRATORS[name].steps]
     paper = paper_solver(scene)
@@ -135,9 +136,7 @@ def _stepped(scene: Scene, integrator: str, step: float) -> Design:
     return _design(scene, "step", solver, fixed_integrator=integrator, step=step)
 
 
-def _design(
-    scene: Scene, group: str, solver: Mapping[str, Any], key: str = "", **factors: Any
-) -> Design:
+def _design(scene: Scene, group: str, solver: Mapping[str, Any], key: str = "", **factors: Any) -> Design:
     change = {"solver": _solver(scene, **solver), **PLAIN}
     return Design(key or _words(solver), group, factors, edited(scene, change))
 

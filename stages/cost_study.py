@@ -17,20 +17,24 @@ LOCATED = 1e-12
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``cost.nc`` and its tables and figures.
 
-    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, `setting` of the
-    scene's own run in words, what was left `undone` in words, and `peers`, as of `stages.cost_peers`.  The reference is
-    the tightest run among the points, and a run by another method confirms it.
+    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, the `own`
+    setting of the scene (own_integrator, own_rtol or own_step), what was left `undone` in words, whether the study is
+    `complete`, and `peers`, as of `stages.cost_peers`.  The reference is the tightest run among the points, and a run
+    by another method confirms it.
     """
     from flexclear.pipeline.core.scene.requested_accuracy import Quantity
     from flexclear.pipeline.post.cost import causes, price, statistics, work_precision
-    from flexclear.pipeline.post.cost.study import Point, assemble, with_reference
+    from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
     from flexclear.pipeline.post.plotting.table import files
 
     points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
     chosen = [Quantity(*pair) for pair in params["quantities"]]
     points = with_reference(points, runs, chosen)
-    study = assemble(points, runs, chosen).assign_attrs(setting=params["setting"], undone=params["undone"])
+    study = assemble(points, runs, chosen)
+    study.attrs |= params["own"] | {"undone": params["undone"], "complete": int(params["complete"])}
+    asis = next(runs[p.key] for p in points if p.key == "as it stands")
+    study.attrs |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
     ensembles = _ensembles(inputs)
     # the last one is that at the tightest tolerance
     split = split_of(points, runs, chosen, next(reversed(ensembles.values()), None))
