@@ -119,8 +119,8 @@ def stability(scene: Scene | str | Path, budget: str | float | None = None) -> x
     """Whether the run of a scene is stable: value, limit, verdict and remedy over `check`.
 
     Energy balance, closed loops, agreement with tighter runs and with another method, rejected and stiff steps,
-    singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost, of which half goes here.
-    In a notebook the dataset shows the answer first.  Raises FlexclearError.
+    singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost.  In a notebook
+    the dataset shows the answer first.  Raises FlexclearError.
     """
     found: xr.Dataset = _stages("answers").dataset("stability", _loaded(scene), _stages("run").workplace(), budget)
     return found

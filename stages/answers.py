@@ -103,7 +103,7 @@ def dataset(name: str, scene: Scene, place: Workplace, budget: str | float | Non
     from flexclear.pipeline.post.answered import answered
 
     # in this process: workers would run a caller's script again from its top
-    answer = getattr(Answers(scene, replace(place, jobs=1), seconds(budget)), name)
+    answer = getattr(Answers(scene, replace(place, jobs=1), seconds(budget), questions=1), name)
     if answer is None:
         raise InputError(str(scene.path or scene.name), "has no effect that could be taken away, or watches nothing")
     words = said(name, answer, scene)
@@ -127,19 +127,28 @@ class Answers:
     """The three answers about a scene, each made when it is asked for.
 
     seconds: of processor that the runs may take; without it TIMES the scene's own run, and at least LEAST.
+    questions: among which it is divided, the costs of accuracy and the effects.
     """
 
     scene: Scene
     place: Workplace
     seconds: float | None = None
+    questions: int = 2
+
+    @cached_property
+    def _begun(self) -> cost.Study:
+        """The scene's own run, measured, and the budget that follows from it."""
+        study = cost.Study(self.scene, self.place, (self.seconds or LEAST) / self.questions)
+        study.begin()
+        if self.seconds is None:
+            study.seconds = max(LEAST, TIMES * study.own * study.pace) / self.questions
+        return study
 
     @cached_property
     def _study(self) -> cost.Study:
         """The points about the scene's own setting."""
-        study = cost.Study(self.scene, self.place, LEAST / 2.0 if self.seconds is None else self.seconds / 2.0)
+        study = self._begun
         study.first()
-        if self.seconds is None:
-            study.seconds = max(study.seconds, 0.5 * TIMES * study.own * study.pace)
         study.neighbourhood()
         return study
 
@@ -172,8 +181,7 @@ class Answers:
         effects, chosen = variants.effects(self.scene), self.scene.watched()
         if not effects or not chosen:
             return None
-        study = self._study
-        return _brought(_Comparison(self.scene, self.place, effects, chosen, study).task(), self.place)
+        return _brought(_Comparison(self.scene, self.place, effects, chosen, self._begun).task(), self.place)
 
 
 @dataclass

@@ -117,18 +117,23 @@ class Study:
     own: float = 0.0
     pace: float = 0.0
 
-    def first(self) -> None:
-        """Make the scene's own run and a few about it.
+    def begin(self) -> None:
+        """Make the scene's own run, which tells what others will take.
 
-        Raises FailedTasksError or SolverError where the scene's own run cannot be made.
+        Raises FailedTasksError or SolverError where it cannot be made.
         """
-        asis, *others = self._near[: cost_design.FIRST]
-        record = self._made(asis)
+        if self.points:
+            return
+        record = self._made(self._near[0])
         if "refused" in record.attrs:
             raise SolverError(f"{self.scene.name}: {record.attrs['refused']}")
         self.own = float(record.attrs["evaluations"])
         self.pace = max(float(record["cpu_repeat"].median()) / self.own, 1e-9)
-        self._queue(others)
+
+    def first(self) -> None:
+        """Make a few points about the scene's own setting."""
+        self.begin()
+        self._queue(self._near[1 : cost_design.FIRST])
 
     def neighbourhood(self) -> None:
         """Make the other points about the scene's own setting, as far as the budget goes."""

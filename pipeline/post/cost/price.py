@@ -134,7 +134,9 @@ def _confirmed(study: xr.Dataset) -> str:
     unsure, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
     said = f"Reference: {study.attrs['reference']}. "
     if not by:
-        return f"{said}Not confirmed: no run by another method was made."
+        return f"{said}Not confirmed: no other run was made."
+    if np.isnan(unsure).any():
+        return f"{said}Not confirmed: {by} was refused."
     if np.isinf(unsure).any():
         return f"{said}Not confirmed: {by} finds another number of impacts."
     worst = str(study["quantity"].values[int(np.argmax(unsure))])
