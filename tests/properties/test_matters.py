@@ -30,7 +30,8 @@ def point(offset: float, scatter: float = 0.0) -> Point:
     series[:, 0] = np.sin(2.0 * np.pi * TIME) + offset
     values = {"slider.velocity.series": series, "slider.velocity.largest": np.array(1.0 + offset)}
     deviation = {
-        name: np.full_like(value, scatter / np.sqrt(max(value.shape[-1:] or (1,)))) for name, value in values.items()
+        name: np.full_like(value, scatter / np.sqrt(value.shape[-1] if value.ndim else 1))
+        for name, value in values.items()
     }
     return Point(values, {}, deviation if scatter else {}, 100)
 
@@ -48,7 +49,7 @@ def test_without_scatter_a_change_is_the_distance_of_the_two_runs():
 
 
 def test_scatter_leaves_a_change_undecided_and_more_members_decide_it():
-    few, many = (Pair(point(0.0, 0.05), point(0.03, 0.05), members) for members in (4, 64))
+    few, many = (Pair(point(0.0, 0.05), point(0.03, 0.05), members) for members in (4, 1024))
     assert undecided(few, [VELOCITY]) == [VELOCITY]
     assert undecided(many, [VELOCITY]) == []
     change = compared(few, VELOCITY)
