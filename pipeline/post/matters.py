@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.effect_size import Influence, influence, size
+from flexclear.pipeline.core.effect_size import Influence, chance, influence, size
 from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 from flexclear.pipeline.post.effect_sizes import written
 from flexclear.pipeline.post.overview.curves import measured, rounded
@@ -27,6 +27,8 @@ IDEAL = "clearance and flexibility"
 SLIGHT = 0.01
 #: accuracies of which the answer says which effects they call for, where the scene asks for none
 LEVELS = (0.1, 0.01, 0.001)
+#: members of which Student's t is that of any larger number
+MANY = 1000
 #: a change that both runs' rounding could make, as a fraction of the quantity's size
 NOTHING = 1e-6
 
@@ -134,9 +136,9 @@ def _percent(value: float, scale: float) -> str:
 
 
 def needed(change: Influence, scale: float, members: int) -> int:
-    """Members that would decide a change: chance falls with the square root of their number."""
-    enough = max(SLIGHT * scale, change.difference)
-    return int(np.ceil(members * (change.uncertainty / enough) ** 2)) if enough > 0.0 else 2 * members
+    """Members that would decide a change: chance falls with the root of their number, and Student's t to that of many."""
+    enough, fewer = max(SLIGHT * scale, change.difference), chance(MANY) / chance(members)
+    return int(np.ceil(members * (fewer * change.uncertainty / enough) ** 2)) if enough > 0.0 else 2 * members
 
 
 def sentence(found: xr.Dataset, wanted: Mapping[str, float]) -> str:
