@@ -136,7 +136,7 @@ def _percent(value: float, scale: float) -> str:
 
 
 def needed(change: Influence, scale: float, members: int) -> int:
-    """Members that would decide a change: chance falls with the root of their number, and Student's t to that of many."""
+    """Members that would decide a change: chance falls with the root of their number, and Student's t with it."""
     enough, fewer = max(SLIGHT * scale, change.difference), chance(MANY) / chance(members)
     return int(np.ceil(members * (fewer * change.uncertainty / enough) ** 2)) if enough > 0.0 else 2 * members
 
