@@ -320,7 +320,7 @@ def _joined(
 def sizes(
     scene: Scene, links: list[Link], link_of: Mapping[str, int], frames: Mapping[str, Frame]
 ) -> tuple[float, Components]:
-    """Size of all that there is [m], and the independent mechanisms with theirs: what length tolerances are relative to.
+    """Size of all that there is [m], and independent mechanisms with theirs: what length tolerances are relative to.
 
     What an independent mechanism does not use of the ground is none of its size.
     """
