@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.decisions import EVIDENCE, Plan
+from flexclear.pipeline.core.decisions import EVIDENCE, NOT_WORTH, Plan
 from flexclear.pipeline.post.effect_sizes import written
 from flexclear.pipeline.post.plotting.table import Table
 
@@ -154,14 +154,14 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
 
 def words(found: xr.Dataset) -> str:
     """The plan in a sentence or two, for a designer."""
-    kept = [str(w) for w, k in zip(found["words"].values, found["kept"].values, strict=True) if k]
-    gone = [str(w) for w, k in zip(found["words"].values, found["kept"].values, strict=True) if not k]
+    needed, unseen, gone = _sorted(found)
     asked = " and ".join(str(name) for name in found["quantity"].values)
-    if not kept:
+    if not needed and not unseen:
         return f"For {asked} as wanted nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
-    if not gone:
-        return f"For {asked} as wanted all effects are needed: {listed(kept)}."
-    return f"For {asked} as wanted {listed(kept)} must be kept; {listed(gone)} may be left out."
+    left = f"{listed(gone)} may be left out" if gone else "nothing may be left out" if not unseen else ""
+    parts = [f"{listed(needed)} must be kept" if needed else "", left]
+    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} kept without a look" if unseen else ""]
+    return f"For {asked} as wanted {'; '.join(filter(None, parts))}."
 
 
 def listed(names: list[str]) -> str:
@@ -176,9 +176,9 @@ def verified(found: xr.Dataset) -> Table:
         unit = str(found["unit"].values[k])
         error, chance = float(found["error"][k]), float(found["chance"][k])
         wanted = float(found["wanted"][k])
-        share = error / wanted
-        verdict = "met" if share <= 1.0 else f"missed, {share:.2g} times"
-        rows.append((str(name), written(wanted, 0.0, unit), written(error, chance, unit), verdict))
+        rows.append(
+            (str(name), written(wanted, 0.0, unit), written(error, chance, unit), _verdict(found.isel(quantity=k)))
+        )
     notes = [
         f"Evaluations of the equations of motion: {int(found.attrs['full_evaluations']):,} in full, "
         f"{int(found.attrs['planned_evaluations']):,} as planned, of all members together.",
@@ -187,6 +187,61 @@ def verified(found: xr.Dataset) -> Table:
     ]
     return Table(
         "The plan beside the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)
+    )
+
+
+MET, MISSED, UNDECIDED = "met", "missed", "not decided"
+
+
+def verdict(error: float, chance: float, wanted: float) -> str:
+    """Met where error and chance together are below what is wanted, missed where both are above, else not decided."""
+    if error + chance <= wanted:
+        return MET
+    return MISSED if error - chance > wanted else UNDECIDED
+
+
+def _verdict(one: xr.Dataset) -> str:
+    """The verdict on one quantity, with what it would take where it is not decided."""
+    error, chance, wanted = (float(one[name]) for name in ("error", "chance", "wanted"))
+    said = verdict(error, chance, wanted)
+    if said == MISSED:
+        return f"missed, {error / wanted:.2g} times"
+    if said == UNDECIDED and error < wanted:
+        members = int(one.attrs["members"])
+        return f"not decided: {int(np.ceil(members * (chance / (wanted - error)) ** 2))} members would"
+    return said
+
+
+def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
+    """What each accuracy calls for, by the accuracy in words; why there is no plan, where there is none."""
+    rows = list[tuple[str, ...]]()
+    for level, found in plans.items():
+        if isinstance(found, str):
+            rows.append((level, "–", "–", "–", "–", found.splitlines()[0]))
+            continue
+        told = json.loads(found.attrs["planned"])
+        needed, unseen, gone = _sorted(found)
+        modes = ", ".join(f"{count} of {body}" for body, count in told["modes"].items()) or "all"
+        method = f"{told['integrator']}, rtol {told['rtol']:.0e}"
+        rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
+    return Table(
+        "What accuracy calls for",
+        ("of each size", "needed", "kept without a look", "may be left out", "modes", "integrated by"),
+        tuple(rows),
+        (
+            "Each accuracy is that of all watched quantities; name one in [accuracy] to get its planned scene. "
+            "Kept without a look: leaving the effect out would save no time worth the runs that tell its size.",
+        ),
+    )
+
+
+def _sorted(found: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
+    """Effects in words: those that are needed, those that are kept without evidence, and those that may be left out."""
+    rows = list(zip(found["words"].values, found["kept"].values, found["reason"].values, strict=True))
+    return (
+        [str(w) for w, kept, reason in rows if kept and reason != NOT_WORTH],
+        [str(w) for w, kept, reason in rows if kept and reason == NOT_WORTH],
+        [str(w) for w, kept, _ in rows if not kept],
     )
 
 
