@@ -132,8 +132,8 @@ def sweep(
     >>> import flexclear as fc
     >>> where = {"load.gravity.acceleration.1": [-9.81, -1.62]}  # on the earth, and on the moon
     >>> kept, short = ["bob.velocity.largest"], {"time.end": "0.2 s"}
-    >>> found = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
-    >>> found["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
+    >>> results = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
+    >>> results["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
     [1.954, 0.324]
     """
     given = {name: _plain(values) for name, values in vary.items()}
@@ -152,8 +152,8 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
     The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
     why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
     """
-    found: tuple[xr.Dataset, xr.Dataset] = _stages("sections").judge(_loaded(scene))
-    return found
+    datasets: tuple[xr.Dataset, xr.Dataset] = _stages("sections").judge(_loaded(scene))
+    return datasets
 
 
 def equilibrium(
@@ -191,8 +191,8 @@ def frequencies(
     Arguments and errors as there.
 
     >>> import flexclear as fc
-    >>> found = fc.frequencies("scenes/checks/oscillator.toml")
-    >>> round(found["frequency"].item(), 4), round(found["damping_ratio"].item(), 6)  # [Hz], [-]
+    >>> modes = fc.frequencies("scenes/checks/oscillator.toml")
+    >>> round(modes["frequency"].item(), 4), round(modes["damping_ratio"].item(), 6)  # [Hz], [-]
     (1.5836, 0.1)
     """
     return _linear(scene, time, drives, moving=moving, vibrations=True)
@@ -208,8 +208,8 @@ def compare(
     Raises FlexclearError.
     """
     without = "both" if ideal is True else ideal or None
-    found = _stages("compare").bring([_loaded(scene) for scene in scenes], _stages("run").workplace(), without)
-    return found.dataset()
+    comparison = _stages("compare").bring([_loaded(scene) for scene in scenes], _stages("run").workplace(), without)
+    return comparison.dataset()
 
 
 def effects(scene: Scene | str | Path) -> xr.Dataset:
@@ -218,8 +218,8 @@ def effects(scene: Scene | str | Path) -> xr.Dataset:
     Variables and meanings: `pipeline.post.effect_sizes`.  The quantities are those of `[view] watch`, else of
     `[accuracy]`, else the usual ones.  Raises FlexclearError.
     """
-    found: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").workplace())
-    return found
+    dataset: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").workplace())
+    return dataset
 
 
 def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
@@ -228,8 +228,8 @@ def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
     The dataset (`pipeline.post.plan.dataset`) holds the estimated influence of each effect on each quantity of
     `[accuracy]`, what was decided, and why.  Raises FlexclearError.
     """
-    found = _stages("plan").bring(_loaded(scene), _stages("run").workplace())
-    return found.planned, found.dataset()
+    planned = _stages("plan").bring(_loaded(scene), _stages("run").workplace())
+    return planned.planned, planned.dataset()
 
 
 def render(scene: Scene | str | Path) -> Path:

@@ -43,23 +43,23 @@ def command(options: argparse.Namespace) -> int:
 
     What is only odd is told, and is no mistake.
     """
-    found: dict[str, FlexclearError] = {}
+    errors: dict[str, FlexclearError] = {}
     for name in options.scenes:
         mistakes, seen = examined(name)
-        found |= {str(mistake): mistake for mistake in mistakes}
+        errors |= {str(mistake): mistake for mistake in mistakes}
         if not mistakes and not options.json:
             print(f"{run.find_scene(name)}: {seen.summary}; no mistake found")
             for odd in seen.odd:
                 print(f"flexclear: warning: {lines.located(odd)}", file=sys.stderr)
     if options.json:
-        print(json.dumps([_record(mistake) for mistake in found.values()], indent=2))
+        print(json.dumps([_record(mistake) for mistake in errors.values()], indent=2))
     else:
-        for mistake in found.values():
+        for mistake in errors.values():
             told = lines.located(mistake) if isinstance(mistake, InputError) else mistake
             print(f"flexclear: {told}", file=sys.stderr)
-        if len(found) > 1:
-            print(f"flexclear: {len(found)} mistakes", file=sys.stderr)
-    return min((mistake.exit_code for mistake in found.values()), default=0)
+        if len(errors) > 1:
+            print(f"flexclear: {len(errors)} mistakes", file=sys.stderr)
+    return min((mistake.exit_code for mistake in errors.values()), default=0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,20 +80,20 @@ def examined(name: str) -> tuple[list[FlexclearError], Seen]:
 
 
 def _of_scene(path: Path) -> tuple[list[FlexclearError], Seen]:
-    found = list[FlexclearError](dangling(compose(path), run.recipe_frames, str(path)))
+    errors = list[FlexclearError](dangling(compose(path), run.recipe_frames, str(path)))
     scene = None
     try:
         scene = load_scene(path)
     except MISTAKES as error:
-        found += _each(error)
-    found += _collect(_recipes(path))
+        errors += _each(error)
+    errors += _collect(_recipes(path))
     if scene is not None:
-        found += _collect([lambda: Graph(scene).up_to("post")], path)
-        found += _collect(_laws(scene), path)
-        if not found and all(s1_mesh.kind_of(Path(mesh)) == "beam" for mesh in scene.recipes().values()):
-            found += _collect([lambda: _assembled(scene)], path)
+        errors += _collect([lambda: Graph(scene).up_to("post")], path)
+        errors += _collect(_laws(scene), path)
+        if not errors and all(s1_mesh.kind_of(Path(mesh)) == "beam" for mesh in scene.recipes().values()):
+            errors += _collect([lambda: _assembled(scene)], path)
     seen = Seen(scene.summary(), tuple(oddities(scene))) if scene is not None else Seen()
-    return list({str(error): error for error in found}.values()), seen
+    return list({str(error): error for error in errors}.values()), seen
 
 
 def _of_sweep(path: Path) -> tuple[list[FlexclearError], Seen]:
@@ -101,19 +101,19 @@ def _of_sweep(path: Path) -> tuple[list[FlexclearError], Seen]:
     from flexclear.stages import sweep, sweep_plan
 
     wanted, scene = sweep.read(path)
-    found, seen = examined(str(scene.path))
-    if not found:
-        found = _collect([lambda: sweep_plan.plan(wanted, scene, str(path))])
-    return found, replace(seen, summary=f"a sweep over {', '.join(wanted.vary)} of {scene.name}: {seen.summary}")
+    errors, seen = examined(str(scene.path))
+    if not errors:
+        errors = _collect([lambda: sweep_plan.plan(wanted, scene, str(path))])
+    return errors, replace(seen, summary=f"a sweep over {', '.join(wanted.vary)} of {scene.name}: {seen.summary}")
 
 
 def _of_recipe(path: Path) -> tuple[list[FlexclearError], Seen]:
     """A recipe is looked at as where a scene names it, with the limits of a scene that says none."""
-    found = _collect([lambda: s1_mesh.check_size(path, Limits())])
-    if not any(isinstance(error, ResourceError) for error in found):  # what is too large is not meshed
-        found += _collect([lambda: _recipe(path)])
-    if found:
-        return found, Seen()
+    errors = _collect([lambda: s1_mesh.check_size(path, Limits())])
+    if not any(isinstance(error, ResourceError) for error in errors):  # what is too large is not meshed
+        errors += _collect([lambda: _recipe(path)])
+    if errors:
+        return errors, Seen()
     table = s1_mesh.params(path)["recipe"]
     frames = ", ".join(table.get("frames", {})) or "none"
     told = f"a mesh recipe, {table['shape']['type']}, frames: {frames}"
@@ -194,14 +194,14 @@ def _undeformed(recipe: Path) -> xr.Dataset:
 
 def _collect(checks: Iterable[Callable[[], Any]], path: Path | None = None) -> list[FlexclearError]:
     """What the checks raise; errors without a file are placed in that of `path`."""
-    found: list[FlexclearError] = []
+    errors: list[FlexclearError] = []
     for check in checks:
         try:
             with run.in_file(path):
                 check()
         except MISTAKES as error:
-            found += _each(error)
-    return found
+            errors += _each(error)
+    return errors
 
 
 def _each(error: FlexclearError) -> list[FlexclearError]:
@@ -211,8 +211,8 @@ def _each(error: FlexclearError) -> list[FlexclearError]:
 def _record(mistake: FlexclearError) -> dict[str, Any]:
     if not isinstance(mistake, InputError):
         return {"file": None, "line": None, "place": "", "problem": str(mistake), "remedy": None}
-    found = lines.where(mistake)
-    file, line = (str(found[0]), found[1]) if found else (None, None)
+    location = lines.where(mistake)
+    file, line = (str(location[0]), location[1]) if location else (None, None)
     return {
         "file": file,
         "line": line,

@@ -37,11 +37,11 @@ def command(options: argparse.Namespace) -> None:
 def text(graph: Graph, sources: Sources) -> str:
     """Three lists: methods, those that may be needed (module: source), and data (part of the scene: source)."""
     scene = graph.scene
-    found, always = list(methods(graph, sources)), _at_once(graph, sources)
+    used, always = list(methods(graph, sources)), _at_once(graph, sources)
     lines = [f"Methods of {scene.name}"]
-    lines += [f"  {module}: {source}" for module, source in found if module in always] or ["  (none is named)"]
+    lines += [f"  {module}: {source}" for module, source in used if module in always] or ["  (none is named)"]
     lines.append("Methods that are used where a run or a command needs them")
-    lines += [f"  {module}: {source}" for module, source in found if module not in always] or ["  (none is named)"]
+    lines += [f"  {module}: {source}" for module, source in used if module not in always] or ["  (none is named)"]
     lines.append(f"Data of {scene.name}")
     lines += [f"  {place}: {source}" for place, source in scene.sources().items()] or ["  (none is named)"]
     return "\n".join(lines) + "\n"
@@ -58,8 +58,8 @@ def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
             continue
         path = source_file(sources.root, name)
         assert path is not None  # else it would not be in the closure
-        for found in dict.fromkeys(named(path.read_text(encoding="utf-8"))):
-            yield name, found
+        for key in dict.fromkeys(named(path.read_text(encoding="utf-8"))):
+            yield name, key
 
 
 def _at_once(graph: Graph, sources: Sources) -> set[str]:

@@ -50,9 +50,9 @@ def command(options: argparse.Namespace) -> None:
     """Bring the comparison up to date, print its tables and say where it is."""
     place = workplace(options)
     scenes = [graph.scene for graph in run.graphs(options.scenes, options.set)]
-    found = bring(scenes, place, options.ideal)
-    print(*(found.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")
-    run.told(found.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"})
+    comparison = bring(scenes, place, options.ideal)
+    print(*(comparison.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")
+    run.told(comparison.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"})
 
 
 @dataclass(frozen=True)
@@ -99,46 +99,48 @@ def bring(scenes: list[Scene], place: Workplace, without: str | None = None) -> 
     task = _task(graphs, {label: task for label, task in tight.items() if id(task) in outcome.records})
     done = place.bring([task])
     check(done)
-    found = Comparison(task, done.records[id(task)], place)
-    publish(found.folder / "index.html", page(found, ", ".join(graphs)))
-    return found
+    comparison = Comparison(task, done.records[id(task)], place)
+    publish(comparison.folder / "index.html", page(comparison, ", ".join(graphs)))
+    return comparison
 
 
 def twins(scene: Scene, without: str) -> list[Scene]:
     """The scene without what `without` says, the most ideal one first; InputError when there is nothing to take."""
     sets = {"both": (tuple(EFFECTS),), "each": (tuple(EFFECTS), *((effect,) for effect in EFFECTS))}
-    found: list[Scene] = []
+    ideals: list[Scene] = []
     for effects in sets.get(without, ((without,),)):
         there = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
-        if there or not found:
+        if there or not ideals:
             twin = ideal(scene, effects)
-            same = any(twin.model_dump() == other.model_dump() for other in found)
+            same = any(twin.model_dump() == other.model_dump() for other in ideals)
             twin._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
-            found += [] if same else [twin]
-    return found
+            ideals += [] if same else [twin]
+    return ideals
 
 
-def page(found: Comparison, title: str) -> bytes:
+def page(comparison: Comparison, title: str) -> bytes:
     """The page of a comparison, all pictures inside."""
     from flexclear.pipeline.post.overview.page import page as written
 
-    return written(f"Compared: {title}", "The first run is the reference.", parts(found))
+    return written(f"Compared: {title}", "The first run is the reference.", parts(comparison))
 
 
-def parts(found: Comparison) -> list[Part]:
+def parts(comparison: Comparison) -> list[Part]:
     """What a page shows of a comparison."""
     from flexclear.pipeline.post.overview.page import Part, media
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
-    tables = "".join(as_html(from_markdown(found.file(name).read_text(encoding="utf-8"))) for name in TABLES)
+    tables = "".join(as_html(from_markdown(comparison.file(name).read_text(encoding="utf-8"))) for name in TABLES)
     pictures = [
-        media(name, found.file(name).read_bytes(), text) for name, text in PICTURES.items() if _there(found, name)
+        media(name, comparison.file(name).read_bytes(), text)
+        for name, text in PICTURES.items()
+        if _there(comparison, name)
     ]
     return [Part("differences", "Differences and errors", tables), Part("runs", "Side by side", "".join(pictures))]
 
 
-def _there(found: Comparison, name: str) -> bool:
-    return name in found.record.files
+def _there(comparison: Comparison, name: str) -> bool:
+    return name in comparison.record.files
 
 
 def _labels(sides: list[Scene]) -> list[str]:

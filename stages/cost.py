@@ -69,7 +69,7 @@ def command(options: argparse.Namespace) -> None:
             )
             print(f"figures and data: {folder}\n")
     if options.json:
-        print(as_json.as_json({name: found for name, (found, _) in studies.items()}))
+        print(as_json.as_json({name: one for name, (one, _) in studies.items()}))
     if options.page is not None:
         said = f" --peer {options.peer.as_posix()}" if options.peer else ""
         said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
@@ -138,30 +138,30 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, optio
     """
     from flexclear.pipeline.post.cost.page import markdown
 
-    found = []
+    sections = []
     with disk_limits(page.parent):
         (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
         for name, (study, folder) in studies.items():
             said, pictures = told(name, study, folder, page.stem)
-            found.append(said)
+            sections.append(said)
             for path, file in pictures.items():
                 publish(page.parent / path, file.read_bytes())
-        publish(page, markdown(tuple(found), f"{page.as_posix()}{options}").encode())
+        publish(page, markdown(tuple(sections), f"{page.as_posix()}{options}").encode())
 
 
 def _highest(scene: Scene, place: Workplace) -> float | None:
     """The highest frequency in the scene's bundles [Hz]; they are made first."""
-    found = bundles(scene, place, jobs=None)
-    return max((float(bundle["frequency"].max()) for bundle in found.values()), default=None)
+    reduced = bundles(scene, place, jobs=None)
+    return max((float(bundle["frequency"].max()) for bundle in reduced.values()), default=None)
 
 
 def _kernels(designs: list[cost_design.Design]) -> dict[tuple[str, ...], Task]:
     """One task for each set of kernels that the points need; compiled side by side."""
-    found: dict[tuple[str, ...], Task] = {}
+    tasks: dict[tuple[str, ...], Task] = {}
     for design in designs:
-        if kernels.shared(design.scene) not in found:
-            found[kernels.shared(design.scene)] = kernels.task(design.scene, _bundles(design))
-    return found
+        if kernels.shared(design.scene) not in tasks:
+            tasks[kernels.shared(design.scene)] = kernels.task(design.scene, _bundles(design))
+    return tasks
 
 
 def _bundles(design: cost_design.Design) -> dict[str, Task]:
@@ -188,9 +188,9 @@ def _measured(
 
 def _ensembles(scene: Scene, names: list[str], compiled: Mapping[tuple[str, ...], Task]) -> dict[str, Task]:
     """Ensembles at several tolerances, of a scene that has one."""
-    found = {}
+    ensembles = {}
     for rtol in ENSEMBLES if scene.ensemble is not None else ():
         change = edited(scene, {"solver.rtol": rtol, "accuracy": None})
         design = cost_design.Design(f"ensemble, rtol {rtol:g}", "ensemble", {}, change)
-        found[f"ensemble:rtol {rtol:g}"] = _measured(design, "run_ensemble", {"quantities": names}, compiled)
-    return found
+        ensembles[f"ensemble:rtol {rtol:g}"] = _measured(design, "run_ensemble", {"quantities": names}, compiled)
+    return ensembles

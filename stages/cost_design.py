@@ -48,8 +48,8 @@ def runs(scene: Scene, highest: float | None, integrators: Collection[str] = ())
     for name in integrators:
         if name not in known:
             raise InputError(f"--integrators {name}", "is not among those that are compared", suggestion(name, known))
-    found = [d for d in _integration(scene) if _chosen(d, integrators)] + list(_sampling(scene))
-    return found + (list(_models(scene, highest)) if highest is not None else [])
+    designs = [d for d in _integration(scene) if _chosen(d, integrators)] + list(_sampling(scene))
+    return designs + (list(_models(scene, highest)) if highest is not None else [])
 
 
 def _chosen(design: Design, integrators: Collection[str]) -> bool:

@@ -52,8 +52,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def _ensembles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     """Ensembles that could be made, by what was varied."""
-    found = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
-    return {name: data for name, data in found.items() if "refused" not in data.attrs}
+    ensembles = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
+    return {name: data for name, data in ensembles.items() if "refused" not in data.attrs}
 
 
 def _paper(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> Any:

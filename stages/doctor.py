@@ -58,10 +58,10 @@ RUN = """import sys
 from flexclear import pipeline
 from flexclear.pipeline.core.errors import FlexclearError
 try:
-    found = pipeline.run(sys.argv[1])
+    result = pipeline.run(sys.argv[1])
 except FlexclearError as error:
     sys.exit(str(error))
-print(float(found.position.sel(body="ball", axis="z")[-1]))
+print(float(result.position.sel(body="ball", axis="z")[-1]))
 """
 #: integration is exact to its tolerance, 1e-10 of metres
 CLOSE = 1e-9
@@ -93,7 +93,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> None:
-    """Print what was found, line by line; UnwellError at the end when something is wrong."""
+    """Print the findings line by line; raise UnwellError at the end when something is wrong."""
     if options.bundle is not None:
         path = bundle.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
         print(f"{path}: the scene's files, versions and what was said; flexclear doctor --repeat {path.name}")
@@ -117,7 +117,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def findings() -> Iterator[tuple[str, str, bool]]:
-    """Name, what was found, and whether that is well."""
+    """Name, finding, and whether that is right."""
     yield (
         "python",
         f"{platform.python_version()} on {platform.system()} {platform.machine()}",

@@ -34,8 +34,8 @@ def command(options: argparse.Namespace) -> None:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
-    found = run.linear(graph.scene, time, moving=options.moving, place=workplace(options))
-    print(as_json.as_json(found) if options.json else text(found).rstrip("\n"))
+    modes = run.linear(graph.scene, time, moving=options.moving, place=workplace(options))
+    print(as_json.as_json(modes) if options.json else text(modes).rstrip("\n"))
 
 
 def text(linear: xr.Dataset) -> str:

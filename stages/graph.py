@@ -202,8 +202,8 @@ class Graph:
 
     def of(self, stage: str) -> dict[str, Task]:
         """Tasks of one stage by body; by the empty name where there is one for the whole scene."""
-        found = getattr(self, stage)
-        return found if isinstance(found, dict) else {"": found} if found is not None else {}
+        tasks = getattr(self, stage)
+        return tasks if isinstance(tasks, dict) else {"": tasks} if tasks is not None else {}
 
     def artifact(self, reference: str) -> Task:
         """The task behind ``run``, ``post``, ``modes/rod1`` ...; InputError when there is none."""

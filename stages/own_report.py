@@ -129,57 +129,57 @@ def _page(
 
 def _told(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:
     """Attributes by what they are called; whole numbers in groups of three, shares in per cent."""
-    found = {}
+    rows = {}
     for name, label in names.items():
         value = attributes.get(name)
         if value not in (None, ""):
             whole = isinstance(value, int) or (getattr(value, "dtype", None) is not None and value.dtype.kind in "iu")
             if name.endswith("_share"):
-                found[label] = f"{100.0 * float(value):.3g} %"
+                rows[label] = f"{100.0 * float(value):.3g} %"
             elif whole:
-                found[label] = f"{int(value):,}"
+                rows[label] = f"{int(value):,}"
             else:
-                found[label] = f"{value:.4g}" if isinstance(value, float) else str(value)
-    return found
+                rows[label] = f"{value:.4g}" if isinstance(value, float) else str(value)
+    return rows
 
 
 def _stability(run: xr.Dataset | None) -> dict[str, str]:
     if run is None:
         return {}
-    found = _told(run.attrs, STABILITY)
+    rows = _told(run.attrs, STABILITY)
     if "horizon" in run:
-        found["predictability"] = sentence(float(run["horizon"]), float(run["time"].values[-1]))
+        rows["predictability"] = sentence(float(run["horizon"]), float(run["time"].values[-1]))
     for name, label, unit in (
         ("energy_error", "largest error of the energy balance", "J"),
         ("constraint_error", "largest error of a closed loop", "m"),
     ):
         if name in run:
-            found[label] = f"{float(abs(run[name]).max()):.2e} {unit}"
-    return found
+            rows[label] = f"{float(abs(run[name]).max()):.2e} {unit}"
+    return rows
 
 
 def _provenance(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> dict[str, str]:
-    found = {"command": f"`flexclear report {graph.scene.path.name if graph.scene.path else graph.scene.name}`"}
+    rows = {"command": f"`flexclear report {graph.scene.path.name if graph.scene.path else graph.scene.name}`"}
     record = records.get(id(graph.simulate))
     if record is not None:
-        found |= _told(place.store.load(record).attrs, PROVENANCE)
-        found["digest of the run"] = record.digest
-    found["sources of methods and data"] = f"`flexclear cite {graph.scene.name}`"
-    return found
+        rows |= _told(place.store.load(record).attrs, PROVENANCE)
+        rows["digest of the run"] = record.digest
+    rows["sources of methods and data"] = f"`flexclear cite {graph.scene.name}`"
+    return rows
 
 
 def _files(graph: Graph, compared: compare.Comparison | None) -> dict[str, bytes]:
     """The scene as it was written, with what it extends, its recipes, and the tables; small enough for any page."""
-    found = {}
+    files = {}
     if graph.scene.path is not None:
-        found[graph.scene.path.name] = graph.scene.path.read_bytes()
+        files[graph.scene.path.name] = graph.scene.path.read_bytes()
     for recipe in graph.scene.recipes().values():
-        found[Path(recipe).name] = Path(recipe).read_bytes()
+        files[Path(recipe).name] = Path(recipe).read_bytes()
     if compared is not None:
         for name in ("differences.csv", "costs.csv"):
             if name in compared.record.files:
-                found[name] = compared.file(name).read_bytes()
-    return found
+                files[name] = compared.file(name).read_bytes()
+    return files
 
 
 def _moving(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> str:

@@ -72,11 +72,11 @@ class Scenes:
 
 def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
     """What only the timing runs on, compiled beside other tasks; kernels of the scenes' own runs are there by then."""
-    found: dict[tuple[str, ...], Task] = {}
+    tasks: dict[tuple[str, ...], Task] = {}
     for graph in graphs:
         for scene in (timing.paper_scene(graph.scene), timing.damped_scene(graph.scene, graph.scene.solver.rtol)):
-            found.setdefault(kernels.shared(scene), kernels.task(scene, graph.bodies()))
-    return {f"kernels/{k}": task for k, task in enumerate(found.values())}
+            tasks.setdefault(kernels.shared(scene), kernels.task(scene, graph.bodies()))
+    return {f"kernels/{k}": task for k, task in enumerate(tasks.values())}
 
 
 def bring(place: Workplace) -> Outcome:
@@ -118,8 +118,8 @@ def figure_index(place: Workplace) -> Mapping[str, Mapping[str, Any]]:
     outcome = place.bring([task])
     check(outcome)
     record = outcome.records[id(task)]
-    found: dict[str, dict[str, Any]] = json.loads(place.store.path(task.stage, record.key, "index.json").read_bytes())
-    return found
+    index: dict[str, dict[str, Any]] = json.loads(place.store.path(task.stage, record.key, "index.json").read_bytes())
+    return index
 
 
 def page_task(place: Workplace, records: Mapping[int, Record], graphs: list[Graph]) -> Task:

@@ -44,13 +44,13 @@ def command(options: argparse.Namespace) -> None:
     place = workplace(options)
     missed = list[str]()
     for graph in run.graphs(options.scenes, options.set):
-        found = bring(graph.scene, place)
-        print(found.text())
+        planned = bring(graph.scene, place)
+        print(planned.text())
         if options.out is not None:
-            publish(options.out, found.file(options.out))
+            publish(options.out, planned.file(options.out))
         if options.verify:
-            missed += verify(found, place)
-        found.tell()
+            missed += verify(planned, place)
+        planned.tell()
     if missed:
         raise run.MissedAccuracyError("\n".join(missed))
 
@@ -139,11 +139,11 @@ def bring(scene: Scene, place: Workplace) -> Planned:
     outcome = place.bring([task])
     check(outcome)
     record = outcome.records[id(task)]
-    found = Planned(scene, of(scene, place.store.load(record)), task, record, place)
+    planned = Planned(scene, of(scene, place.store.load(record)), task, record, place)
     if scene.path is not None:
-        publish(found.target, found.file(found.target))
-        publish(found.folder / "index.html", page(found))
-    return found
+        publish(planned.target, planned.file(planned.target))
+        publish(planned.folder / "index.html", page(planned))
+    return planned
 
 
 def of(scene: Scene, plan: xr.Dataset) -> Scene:
@@ -179,7 +179,7 @@ def _kinds(owners: dict[str, tuple[str, ...]], name: str) -> set[str]:
     return {kind for kind, of_kind in KINDS.items() if name in owners[of_kind.owner]}
 
 
-def page(found: Planned) -> bytes:
+def page(planned: Planned) -> bytes:
     """The page of a plan: in words, the chart, the table, the planned scene."""
     import html
 
@@ -188,26 +188,26 @@ def page(found: Planned) -> bytes:
     from flexclear.pipeline.post.plan import words
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
-    picture = media("plan.png", found.kept("plan.png").read_bytes(), "Estimated influence of each effect, at most")
-    text = html.escape(found.file(found.target).decode())
+    picture = media("plan.png", planned.kept("plan.png").read_bytes(), "Estimated influence of each effect, at most")
+    text = html.escape(planned.file(planned.target).decode())
     parts = [
         Part("chart", "Influences", picture),
-        Part("decisions", "Decisions", as_html(from_markdown(found.text()))),
+        Part("decisions", "Decisions", as_html(from_markdown(planned.text()))),
         Part("scene", "The planned scene", f"<figure><pre class='scroll'>{text}</pre></figure>"),
     ]
-    return made(f"Plan: {found.scene.title}", words(found.dataset()), parts)
+    return made(f"Plan: {planned.scene.title}", words(planned.dataset()), parts)
 
 
-def verify(found: Planned, place: Workplace) -> list[str]:
+def verify(planned: Planned, place: Workplace) -> list[str]:
     """Run the full and the planned scene, print how far they are apart, and return what was missed, in words."""
     from flexclear.pipeline.post.plan import verified
     from flexclear.pipeline.post.plotting.table import as_markdown
 
-    compared = beside(found, place)
+    compared = beside(planned, place)
     print(as_markdown(verified(compared)))
-    wanted = found.scene.accuracy
+    wanted = planned.scene.accuracy
     over = [
-        f"{found.scene.name}: the plan misses {name}: {error:.3g} instead of {most:.3g} {unit}"
+        f"{planned.scene.name}: the plan misses {name}: {error:.3g} instead of {most:.3g} {unit}"
         for name, unit, error, most in zip(
             *(compared[key].values for key in ("quantity", "unit", "error", "wanted")), strict=True
         )
@@ -216,31 +216,31 @@ def verify(found: Planned, place: Workplace) -> list[str]:
     return over if wanted is None or not wanted.allow_missed else []
 
 
-def beside(found: Planned, place: Workplace) -> xr.Dataset:
+def beside(planned: Planned, place: Workplace) -> xr.Dataset:
     """Distance of the planned run from the full one by quantity, each over members where it has contacts."""
     from flexclear.pipeline.core import effect_size
     from flexclear.pipeline.core.errors import SolverError
     from flexclear.pipeline.core.scene.requested_accuracy import parse
 
-    assert found.scene.accuracy is not None
-    names = list(found.scene.accuracy.quantities)
-    chosen = [parse(name, found.scene.owners()) for name in names]
-    full = edited(found.scene, {"accuracy": None})
-    tasks = [s4_watched.task(scene, chosen, MEMBERS) for scene in (full, found.planned)]
+    assert planned.scene.accuracy is not None
+    names = list(planned.scene.accuracy.quantities)
+    chosen = [parse(name, planned.scene.owners()) for name in names]
+    full = edited(planned.scene, {"accuracy": None})
+    tasks = [s4_watched.task(scene, chosen, MEMBERS) for scene in (full, planned.planned)]
     outcome = place.bring(tasks)
     check(outcome)
     one, two = (
         s4_watched.point(place.store.load(outcome.records[id(task)]), scene, chosen)
-        for task, scene in zip(tasks, (full, found.planned), strict=True)
+        for task, scene in zip(tasks, (full, planned.planned), strict=True)
     )
     for point, what in ((one, "full"), (two, "planned")):
         if point.refused:
-            raise SolverError(f"{found.scene.name}: the {what} run is refused: {point.refused}")
-    plan = found.dataset()
+            raise SolverError(f"{planned.scene.name}: the {what} run is refused: {point.refused}")
+    plan = planned.dataset()
     apart = [effect_size.influence(two, one, q, MEMBERS) for q in chosen]
     result = plan[["wanted"]].copy()
     for k, q in enumerate(chosen):
-        want = found.scene.accuracy.quantities[q.name]
+        want = planned.scene.accuracy.quantities[q.name]
         if want.relative is not None:  # what it is relative to is known now
             result["wanted"][k] = want.relative * effect_size.size(one, q)
     result["error"] = (("quantity",), [i.difference for i in apart])

@@ -51,7 +51,7 @@ def command(options: argparse.Namespace) -> None:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
     graphs, place = run.graphs(options.scenes, options.set), workplace(options)
     tasks = {graph.scene.name: _tasks(graph, wanted, options.what is not None, time) for graph in graphs}
-    made = [task for found in tasks.values() for task in found]
+    made = [task for group in tasks.values() for task in group]
     if len(graphs) > 1 and wanted == [("modes", "html")]:
         made.append(_beside(graphs))
     outcome = place.bring(made)

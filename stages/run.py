@@ -201,8 +201,8 @@ def deficits(graph: Graph, place: Workplace, outcome: Outcome) -> str:
     """What the scene's bundles lack, one table for each flexible body."""
     from flexclear.pipeline.core.artifacts.deficits import table
 
-    found = _loaded(graph, place, outcome)
-    return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in found.items())
+    reduced = _loaded(graph, place, outcome)
+    return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
 
 
 def linear(
@@ -257,18 +257,18 @@ def as_in_its_file(scene: Scene) -> bool:
 
 def overrides(settings: Sequence[str]) -> dict[str, object]:
     """``KEY=VALUE`` texts as edits of a scene; a value is what TOML reads, else text. InputError for other texts."""
-    found: dict[str, object] = {}
+    changes: dict[str, object] = {}
     for text in settings:
         key, sign, value = text.partition("=")
         if not sign or not key.strip():
             raise InputError(f"--set {text}", "is no KEY=VALUE", "write --set joint.A1.clearance='0.2 mm'")
         try:
-            found[key.strip()] = tomllib.loads(f"value = {value}")["value"]
+            changes[key.strip()] = tomllib.loads(f"value = {value}")["value"]
         except ValueError:  # no TOML, or a number of more digits than Python reads
-            found[key.strip()] = value.strip()
+            changes[key.strip()] = value.strip()
         except RecursionError:
             raise InputError(f"--set {text}", "nests tables or lists too deeply to be read") from None
-    return found
+    return changes
 
 
 def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
@@ -287,7 +287,7 @@ def _edits(settings: Sequence[str]) -> str:
 
 def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
     """Graphs of the scenes, each once, with `settings` (KEY=VALUE) changed; the mistakes of all are told together."""
-    found: dict[Path | str, Graph] = {}
+    by_scene: dict[Path | str, Graph] = {}
     wrong: list[InputError] = []
     for name in names:
         try:
@@ -296,7 +296,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
             with in_file(graph.scene.path):
                 graph.up_to("post")
             path = graph.scene.path
-            found[graph.scene.name if path is None or settings else path.resolve()] = graph
+            by_scene[graph.scene.name if path is None or settings else path.resolve()] = graph
         except InputErrors as errors:
             wrong.extend(errors.errors)
         except InputError as error:
@@ -304,8 +304,8 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
     if wrong:
         told = [lines.located(error) for error in wrong]
         raise told[0] if len(told) == 1 else InputErrors(told)
-    owner.refuse_namesakes([graph.scene for graph in found.values()])
-    return list(found.values())
+    owner.refuse_namesakes([graph.scene for graph in by_scene.values()])
+    return list(by_scene.values())
 
 
 @contextmanager

@@ -60,9 +60,9 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     for text in lacks:
         progress(None, text)
     with stopping.until(scene.limits.time, scene.limits.time_words):
-        found = dynamics.simulated(scene, reduced, progress)
-    told = "\n".join(filter(None, [str(found.attrs.get("warnings", "")), *lacks]))
-    return {"nc": found.assign_attrs(warnings=told) if told else found}
+        simulated = dynamics.simulated(scene, reduced, progress)
+    told = "\n".join(filter(None, [str(simulated.attrs.get("warnings", "")), *lacks]))
+    return {"nc": simulated.assign_attrs(warnings=told) if told else simulated}
 
 
 def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[str]:
@@ -71,13 +71,13 @@ def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[
         return []
     from flexclear.pipeline.core.artifacts import deficits
 
-    found = []
+    messages = []
     for body, bundle in reduced.items():
         ends = (end.partition(".") for joint in scene.joint.values() for end in joint.between)
         used = [frame for owner, _, frame in ends if owner == body]
         if used and "compliance_share" in bundle:
-            found += deficits.warnings(bundle, used, body)
-    return found
+            messages += deficits.warnings(bundle, used, body)
+    return messages
 
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -33,13 +33,13 @@ def params(scene: Scene) -> dict[str, Any]:
 def origins(scene: Scene) -> dict[str, str]:
     """Where values come from, as attributes of datasets."""
     texts = sources(scene)
-    found = {"sources": texts, "assumptions": assumed(texts)}
-    return {name: json.dumps(by_place, sort_keys=True) for name, by_place in found.items()}
+    origin = {"sources": texts, "assumptions": assumed(texts)}
+    return {name: json.dumps(by_place, sort_keys=True) for name, by_place in origin.items()}
 
 
 def sources(scene: Scene) -> dict[str, str]:
     """Where values come from, those of mesh recipes included: place -> text."""
-    found = scene.sources()
+    by_path = scene.sources()
     for body, recipe in scene.recipes().items():
-        found |= s1_mesh.sources(Path(recipe), f"body.{body}.recipe")
-    return found
+        by_path |= s1_mesh.sources(Path(recipe), f"body.{body}.recipe")
+    return by_path

@@ -40,24 +40,24 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
 
     Raises InputError for files of shapes that are not there.
     """
-    found: dict[str, Any] = {"what": what, "format": kind}
+    values: dict[str, Any] = {"what": what, "format": kind}
     if what in ("motion", "vibrations") and kind in ("png", "gif", "mp4"):
-        found["gl"] = gl_state()
+        values["gl"] = gl_state()
     if kind == "html":
-        found["title"] = scene.title
+        values["title"] = scene.title
     if what != "modes":
-        found["bodies"] = _looks(scene)
+        values["bodies"] = _looks(scene)
     if scene.view is not None and what != "modes":
         asked = scene.view.model_dump(mode="json", include=set(SEEN), exclude_none=True)
-        found |= {"view": asked} if asked else {}
+        values |= {"view": asked} if asked else {}
     if (what == "joint" and kind in ("png", "html")) or (what == "motion" and kind in ("gif", "mp4")):
-        found["watched"] = list(dict.fromkeys(quantity.owner for quantity in scene.watched()))
-    return found
+        values["watched"] = list(dict.fromkeys(quantity.owner for quantity in scene.watched()))
+    return values
 
 
 def _looks(scene: Scene) -> dict[str, Any]:
     """Shapes and colours of bodies, where the scene gives some; files by their names, since their content counts."""
-    found = {}
+    looks = {}
     for name, body in scene.body.items():
         told = body.model_dump(mode="json", include=set(UNSEEN), exclude_none=True)
         for k, shape in enumerate(told.get("geometry", ())):
@@ -68,8 +68,8 @@ def _looks(scene: Scene) -> dict[str, Any]:
                     "paths are relative to the scene",
                 )
         if told:
-            found[name] = told
-    return found
+            looks[name] = told
+    return looks
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -71,10 +71,10 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         kept = effect_size.kept(params["owners"][k], chosen)
         points[frozenset(gone)] = unpacked(inputs[f"variant{k}"], kept)["point"]
     progress(None, "comparing")
-    found = effect_sizes.assemble(effects, chosen, points, params["members"], params["units"])
+    dataset = effect_sizes.assemble(effects, chosen, points, params["members"], params["units"])
     title = f"What each effect does: {params['title']}"
-    result: dict[str, Any] = {"nc": found} | files("effects", effect_sizes.table(found))
-    return result | effect_sizes.chart("effects", found, title)
+    result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
+    return result | effect_sizes.chart("effects", dataset, title)
 
 
 def page(scene: Scene, words: str, picture: bytes) -> bytes:

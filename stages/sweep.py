@@ -84,10 +84,10 @@ def read(path: Path) -> tuple[Sweep, Scene]:
     sweep = load_sweep(path)
     beside = path.parent / sweep.scene
     try:
-        found = beside if is_file(beside) else run.find_scene(sweep.scene)
+        scene_path = beside if is_file(beside) else run.find_scene(sweep.scene)
     except InputError as error:
         raise InputError(f"{path} [scene]", f"'{sweep.scene}' {error.problem}", error.remedy) from None
-    return sweep, load_scene(found)
+    return sweep, load_scene(scene_path)
 
 
 def of_scene(
@@ -97,8 +97,8 @@ def of_scene(
     from flexclear.pipeline.core.scene.sweep import read_sweep
 
     plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, UNNAMED), scene, UNNAMED)
-    with engine(width(workers), scheduler) as found:
-        return bring(plan, found, workplace())
+    with engine(width(workers), scheduler) as runner:
+        return bring(plan, runner, workplace())
 
 
 @dataclass
@@ -162,9 +162,9 @@ def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path
             shown = str(folder.relative_to(place.store.root))
             place.store.show_families(shown, {family.folder[0]: family.facts for family in ready.families})
         kept = () if large else plan.kept
-        found = {key: point for family in ready.families for key, point in family.find(place.store, kept).items()}
+        points = {key: point for family in ready.families for key, point in family.find(place.store, kept).items()}
         wanted = {job.key: job for job in ready.jobs}
-        desk = _Desk(ready, place, len(wanted), {key: found[key] for key in wanted if key in found}, large=large)
+        desk = _Desk(ready, place, len(wanted), {key: points[key] for key in wanted if key in points}, large=large)
         missing = [job for key, job in wanted.items() if key not in desk.done]
         try:
             if missing:

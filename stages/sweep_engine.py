@@ -121,10 +121,10 @@ class Engine:
 
 def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
     """Jobs in stretches of one family, the next one last."""
-    found: dict[str, list[Job]] = {}
+    families: dict[str, list[Job]] = {}
     for job in jobs:
-        found.setdefault(job.family, []).append(job)
-    return [list(reversed(mine)) for mine in reversed(found.values())]
+        families.setdefault(job.family, []).append(job)
+    return [list(reversed(mine)) for mine in reversed(families.values())]
 
 
 def _portion(left: int, pace: float, width: int, abreast: bool) -> int:
@@ -154,8 +154,8 @@ def _take(waiting: list[list[Job]], count: int) -> list[Job]:
 def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
     """The engine of a sweep: a Dask cluster at an address, that many processes here, or this one."""
     if scheduler is not None:
-        with _cluster(scheduler) as found:
-            yield found
+        with _cluster(scheduler) as runner:
+            yield runner
         return
     if width == 1:
         yield Engine(_here, lambda: 1)
@@ -239,11 +239,11 @@ def _threads(client: Any, place: str) -> int:
     threads = sum(client.nthreads().values())
     if not threads:
         raise InputError(place, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
-    found = client.run(source_digest, on_error="return")
-    for worker, digest in found.items():
+    digests = client.run(source_digest, on_error="return")
+    for worker, digest in digests.items():
         if isinstance(digest, Exception):
             raise InputError(place, f"worker {worker} cannot import flexclear: {digest}", "install it where it runs")
-    others = [worker for worker, digest in found.items() if digest != source_digest()]
+    others = [worker for worker, digest in digests.items() if digest != source_digest()]
     if others:
         raise InputError(place, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")
     return int(threads)

@@ -113,12 +113,12 @@ def _places(plan: Plan, store: Store) -> Iterator[tuple[str, Record]]:
             yield from ((str(key), record) for key in batch["key"].values)
 
 
-def write_copy(path: Path, found: xr.Dataset) -> None:
+def write_copy(path: Path, dataset: xr.Dataset) -> None:
     """A dataset, in memory or lazily opened, in Zarr's form."""
-    along = str(found["status"].dims[0])
-    count = found.sizes[along]
-    rows = ceil(count / max(1, ceil(found.nbytes / SLAB)))
-    write(path, (found.isel({along: slice(k, k + rows)}).load() for k in range(0, count, rows)), along)
+    along = str(dataset["status"].dims[0])
+    count = dataset.sizes[along]
+    rows = ceil(count / max(1, ceil(dataset.nbytes / SLAB)))
+    write(path, (dataset.isel({along: slice(k, k + rows)}).load() for k in range(0, count, rows)), along)
 
 
 def stripped(point: Point) -> Point:

@@ -73,10 +73,10 @@ class Family:
         """All points of the family that are stored and sound, with their values of what is `kept`."""
         from flexclear.pipeline.core.artifacts.points import unpacked
 
-        found: dict[str, Point] = {}
+        points: dict[str, Point] = {}
         for _, batch in self.batches(store):
-            found |= unpacked(batch, kept)
-        return found
+            points |= unpacked(batch, kept)
+        return points
 
     def batches(self, store: Store) -> Iterator[tuple[Record, xr.Dataset]]:
         """What `keep` has stored, as far as it is sound."""
@@ -250,16 +250,16 @@ def _turning(base: Scene, made: Design, kept: Sequence[Kept], where: str) -> fro
     """Names of the quantities that are about an axis; InputError for one that is so at some of the points only."""
     from flexclear.pipeline.dynamics.model.driving import turns
 
-    found = frozenset(one.quantity.name for one in kept if turns(base, one.quantity))
+    turning = frozenset(one.quantity.name for one in kept if turns(base, one.quantity))
     for axis, scene in _worded(base, made):
         for one in kept:
-            if turns(scene, one.quantity) != (one.quantity.name in found):
+            if turns(scene, one.quantity) != (one.quantity.name in turning):
                 raise InputError(
                     f"{where} [vary.{axis.name}]",
                     f"'{one.name}' is a force at some points and a torque at others",
                     "make two sweeps of it",
                 )
-    return found
+    return turning
 
 
 def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
@@ -299,12 +299,12 @@ def prepare(wanted: Plan, place: Workplace) -> Plan:
             folder="",
             modules=modules,
         )
-        found = facts(task, {name: record.digest for name, record in records.items()}, place.sources)
+        given = facts(task, {name: record.digest for name, record in records.items()}, place.sources)
         inputs = {name: place.store.load(record) for name, record in records.items()}
         keep = tuple(one.name for one in wanted.kept)
         limited = {**simulate, "limits": graph.scene.limits.written()}  # no facts, and a point may ask for more
-        work = Work(key(found), limited, inputs, keep, wanted.sweep.members or 0, wanted.sweep.error)
-        families[text] = Family(work, found)
+        work = Work(key(given), limited, inputs, keep, wanted.sweep.members or 0, wanted.sweep.error)
+        families[text] = Family(work, given)
     jobs = []
     for point in points:
         text, own = _group(wanted.scene, point)
@@ -329,10 +329,10 @@ def _groups(scene: Scene, points: Sequence[Mapping[str, Any]]) -> dict[str, dict
 
 def _modules(wanted: Plan) -> tuple[str, ...]:
     """Modules that any point reaches by the names of its parts: values that are no numbers may name others."""
-    found = set(s4_simulate.modules(wanted.scene))
+    modules = set(s4_simulate.modules(wanted.scene))
     for _, scene in _worded(wanted.scene, wanted.design):
-        found |= set(s4_simulate.modules(scene))
-    return tuple(sorted(found))
+        modules |= set(s4_simulate.modules(scene))
+    return tuple(sorted(modules))
 
 
 def _without_varied(simulate: Mapping[str, Any], point: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:

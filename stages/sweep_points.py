@@ -84,12 +84,12 @@ def work(
     scene, runner = _opened(key, packed)
     begun, own = time.process_time(), list(journals or [None] * len(points))
     if not abreast:
-        found = [_point(runner, scene, point, where) for point, where in zip(points, own, strict=True)]
+        results = [_point(runner, scene, point, where) for point, where in zip(points, own, strict=True)]
     else:
-        found = _abreast(runner, scene, points, own)
+        results = _abreast(runner, scene, points, own)
     for where in filter(None, own):
         journal.remove(where)
-    return found, time.process_time() - begun
+    return results, time.process_time() - begun
 
 
 def _abreast(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]], own: list[Path | None]) -> list[Point]:
@@ -126,9 +126,9 @@ def _point(
     if own is None:
         return runner.run(edited, place, alive)
     with journal.kept(own.parent, own.name) as kept:
-        found = runner.run(edited, place, alive)
+        result = runner.run(edited, place, alive)
         kept.write()  # others of its batch may take long
-        return found
+        return result
 
 
 @cache

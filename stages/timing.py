@@ -60,8 +60,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
             costs[way][name], why = _measured(wanted, reduced, checked=way == "step")
             refused += [f"{name}: {why}"] if why else []
     data: dict[str, Any] = {}
-    for way, found in costs.items():
-        data |= _variables(way, list(found.values()))
+    for way, costs_of_way in costs.items():
+        data |= _variables(way, list(costs_of_way.values()))
     for way, values in tolerance.items():
         data[f"{way}_rtol"] = (("scene",), list(values.values()), {"units": "1"})
     attributes = {"Conventions": "CF-1.11", "equal_error": EQUAL_ERROR, "share": SHARE, "step": PAPER["step"]}
@@ -77,7 +77,7 @@ def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
         return [float(cost.run.attrs[name]) if cost else float("nan") for cost in costs]
 
     error = [float(np.abs(cost.run["energy_error"]).max()) if cost else float("nan") for cost in costs]
-    found: dict[str, Any] = {
+    variables: dict[str, Any] = {
         f"{way}_evaluations": (("scene",), told("evaluations"), {"units": "1"}),
         f"{way}_steps": (("scene",), told("steps"), {"units": "1"}),
         f"{way}_energy_error": (("scene",), error, {"units": "J"}),
@@ -87,8 +87,8 @@ def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
         seconds = np.full((len(costs), max(1, *map(len, repeats))), np.nan)
         for row, values in zip(seconds, repeats, strict=True):
             row[: len(values)] = values
-        found[f"{way}_{part}_seconds"] = (("scene", f"{way}_{dim}"), seconds, {"units": "s"})
-    return found
+        variables[f"{way}_{part}_seconds"] = (("scene", f"{way}_{dim}"), seconds, {"units": "s"})
+    return variables
 
 
 def _measured(scene: Scene, bundles: Mapping[str, xr.Dataset], *, checked: bool) -> tuple[Cost | None, str]:

@@ -21,17 +21,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print the state of every stage."""
-    place, found = workplace(options), dict[str, dict[str, list[str]]]()
+    place, reasons = workplace(options), dict[str, dict[str, list[str]]]()
     for graph in run.graphs(options.scenes, options.set):
         stages = states(graph.up_to(options.to), place.store, place.sources)
-        found[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
-    print(as_json.as_json(found) if options.json else text(found))
+        reasons[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
+    print(as_json.as_json(reasons) if options.json else text(reasons))
 
 
-def text(found: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
+def text(reasons: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
     """For each scene its stages, and why each would run again."""
     told = []
-    for scene, stages in found.items():
+    for scene, stages in reasons.items():
         told.append(scene)
         for label, why in stages.items():
             first, *others = map(shown, why or ["fresh"])

@@ -154,19 +154,19 @@ def scale(run: xr.Dataset, quantity: Quantity) -> float:
 
 def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
     """The part of a run that `error` and `scale` need for these quantities."""
-    found: dict[str, xr.DataArray] = {}
+    recorded: dict[str, xr.DataArray] = {}
     for owner in ("body", "joint", "drive"):
         mine = [q for q in chosen if KINDS[q.kind].owner == owner]
         names = sorted({q.owner for q in mine})
-        found |= {KINDS[q.kind].variable: run[KINDS[q.kind].variable].sel({owner: names}) for q in mine}
+        recorded |= {KINDS[q.kind].variable: run[KINDS[q.kind].variable].sel({owner: names}) for q in mine}
     if any(KINDS[q.kind].owner == "contact" for q in chosen):
-        found |= {str(name): run[name] for name in run.data_vars if str(name).startswith("event_")}
-        found |= {name: run[name] for name in ("contact_impulse",) if name in run}
+        recorded |= {str(name): run[name] for name in run.data_vars if str(name).startswith("event_")}
+        recorded |= {name: run[name] for name in ("contact_impulse",) if name in run}
     if "horizon" in run:
-        found["horizon"] = run["horizon"]
+        recorded["horizon"] = run["horizon"]
     import xarray as xr  # here, since a run needs none of it
 
-    return xr.Dataset(found)
+    return xr.Dataset(recorded)
 
 
 def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:

@@ -54,17 +54,17 @@ def cores() -> int:
 
 def memory() -> int:
     """Bytes that this process can still get: of the machine, of its container, of its own limit."""
-    found = [_physical()]
+    bounds = [_physical()]
     lines = _text("/proc/meminfo").splitlines()
-    found += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
+    bounds += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
     limit, used = _text("/sys/fs/cgroup/memory.max"), _text("/sys/fs/cgroup/memory.current")
     if limit.isdigit() and used.isdigit():
-        found.append(int(limit) - int(used))
+        bounds.append(int(limit) - int(used))
     resource = _module("resource")
     if resource is not None:
         soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-        found += [soft] if soft != resource.RLIM_INFINITY else []
-    return max(0, min(found))
+        bounds += [soft] if soft != resource.RLIM_INFINITY else []
+    return max(0, min(bounds))
 
 
 def _physical() -> int:

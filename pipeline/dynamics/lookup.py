@@ -28,8 +28,8 @@ class Lookup:
                 def load(index: Any) -> Any:
                     return builder.load(builder.gep(entries, [index]))
 
-                found = builder.add(load(constant(place)), builder.mul(constant(size), row))
-                return found if field is None else load(builder.add(found, constant(field)))
+                loaded = builder.add(load(constant(place)), builder.mul(constant(size), row))
+                return loaded if field is None else load(builder.add(loaded, constant(field)))
 
             return types.int64(h, types.int64), generate
 

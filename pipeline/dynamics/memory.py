@@ -63,9 +63,9 @@ def _places(number: int) -> list[int]:
 def _named(kind: dict[str, int], declared: str) -> list[int]:
     """The next places of the header of h, which join those of their kind by name."""
     names = declared.split()
-    found = _places(len(names))
-    kind.update(zip(names, found, strict=True))
-    return found
+    places = _places(len(names))
+    kind.update(zip(names, places, strict=True))
+    return places
 
 
 def _fields(declared: str) -> dict[str, tuple[int, ...]]:

@@ -66,12 +66,12 @@ def zero_one(series: np.ndarray, seed: int = 20190310) -> float:
         return float("nan")
     j, cut = np.arange(1, n + 1), n // 10
     lags = np.arange(1, cut + 1)
-    found = list[float]()
+    correlations = list[float]()
     for c in np.random.default_rng(seed).uniform(AWAY, np.pi - AWAY, FREQUENCIES):
         path = np.cumsum(x * np.exp(1j * c * j))
         displacement = [float(np.mean(np.abs(path[k : k + n - cut] - path[: n - cut]) ** 2)) for k in lags]
-        found.append(float(np.corrcoef(lags, displacement)[0, 1]))
-    return float(np.median(found))
+        correlations.append(float(np.corrcoef(lags, displacement)[0, 1]))
+    return float(np.median(correlations))
 
 
 def period_of(states: np.ndarray, size: float) -> tuple[int, float]:

@@ -35,7 +35,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
         "apart": list(plan.apart),
     }
-    found = xr.Dataset(
+    plan_dataset = xr.Dataset(
         {
             "influence": (("effect", "quantity"), estimate),
             "uncertainty": (("effect", "quantity"), doubt),
@@ -84,44 +84,44 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         "mesh_error": "estimated error of the quantity due to the body's mesh, at most, in the quantity's unit",
     }
     for name, text in meanings.items():
-        found[name].attrs = {"long_name": text}
-    return found
+        plan_dataset[name].attrs = {"long_name": text}
+    return plan_dataset
 
 
-def drawn(found: xr.Dataset) -> xr.Dataset:
+def drawn(planned: xr.Dataset) -> xr.Dataset:
     """What the chart of influences takes of a plan."""
     return xr.Dataset(
-        {"dropped": found["influence"] + found["uncertainty"].fillna(0.0)},
-        coords={"effect": found["effect"], "quantity": found["quantity"], "unit": found["unit"]},
+        {"dropped": planned["influence"] + planned["uncertainty"].fillna(0.0)},
+        coords={"effect": planned["effect"], "quantity": planned["quantity"], "unit": planned["unit"]},
     )
 
 
-def table(found: xr.Dataset) -> Table:
+def table(planned: xr.Dataset) -> Table:
     """Decision, evidence and reason of each effect, and its estimated influence on each quantity."""
-    names = [str(name) for name in found["quantity"].values]
-    units = [str(unit) for unit in found["unit"].values]
+    names = [str(name) for name in planned["quantity"].values]
+    units = [str(unit) for unit in planned["unit"].values]
     rows = []
-    for i, effect in enumerate(found["words"].values):
-        part = found.isel(effect=i)
+    for i, effect in enumerate(planned["words"].values):
+        part = planned.isel(effect=i)
         cells = [
             written(float(part["influence"][k]), float(np.nan_to_num(part["uncertainty"][k])), unit)
             for k, unit in enumerate(units)
         ]
         decision = "keep" if int(part["kept"]) else "drop"
         rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
-    wanted = [written(float(value), 0.0, unit) for value, unit in zip(found["wanted"].values, units, strict=True)]
+    wanted = [written(float(value), 0.0, unit) for value, unit in zip(planned["wanted"].values, units, strict=True)]
     rows.append(("wanted", "", *wanted, "", ""))
-    told = json.loads(found.attrs["planned"])
-    notes = [words(found)]
+    told = json.loads(planned.attrs["planned"])
+    notes = [words(planned)]
     notes += [f"{name} keeps {count} of its modes, which do the same as all." for name, count in told["modes"].items()]
-    notes += [_of_mesh(found.sel(body=body), units) for body in found["body"].values]
+    notes += [_of_mesh(planned.sel(body=body), units) for body in planned["body"].values]
     if told["apart"]:
         notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(told['apart'])}.")
-    if found.attrs["dearer"]:
-        notes.append(f"{found.attrs['dearer']}.")
+    if planned.attrs["dearer"]:
+        notes.append(f"{planned.attrs['dearer']}.")
     notes.append(
         f"The planned run is integrated by {told['integrator']} at a relative tolerance of {told['rtol']:.0e}. "
-        f"The plan rests on {found.attrs['runs']} short runs, {found.attrs['evaluations']:,} evaluations."
+        f"The plan rests on {planned.attrs['runs']} short runs, {planned.attrs['evaluations']:,} evaluations."
     )
     return Table(
         "What the wanted accuracy calls for",
@@ -152,11 +152,11 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
     return f"{told}: enough; {called} would do. Elements cost no time in a run, so the recipe stays as it is."
 
 
-def words(found: xr.Dataset) -> str:
+def words(planned: xr.Dataset) -> str:
     """The plan in a sentence or two, for a designer."""
-    kept = [str(w) for w, k in zip(found["words"].values, found["kept"].values, strict=True) if k]
-    gone = [str(w) for w, k in zip(found["words"].values, found["kept"].values, strict=True) if not k]
-    asked = " and ".join(str(name) for name in found["quantity"].values)
+    kept = [str(w) for w, k in zip(planned["words"].values, planned["kept"].values, strict=True) if k]
+    gone = [str(w) for w, k in zip(planned["words"].values, planned["kept"].values, strict=True) if not k]
+    asked = " and ".join(str(name) for name in planned["quantity"].values)
     if not kept:
         return f"For {asked} as wanted nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
     if not gone:
@@ -169,20 +169,20 @@ def listed(names: list[str]) -> str:
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" and {names[-1]}"
 
 
-def verified(found: xr.Dataset) -> Table:
+def verified(planned: xr.Dataset) -> Table:
     """The true distance of the planned run from the full one, beside what is wanted."""
     rows = []
-    for k, name in enumerate(found["quantity"].values):
-        unit = str(found["unit"].values[k])
-        error, chance = float(found["error"][k]), float(found["chance"][k])
-        wanted = float(found["wanted"][k])
+    for k, name in enumerate(planned["quantity"].values):
+        unit = str(planned["unit"].values[k])
+        error, chance = float(planned["error"][k]), float(planned["chance"][k])
+        wanted = float(planned["wanted"][k])
         share = error / wanted
         verdict = "met" if share <= 1.0 else f"missed, {share:.2g} times"
         rows.append((str(name), written(wanted, 0.0, unit), written(error, chance, unit), verdict))
     notes = [
-        f"Evaluations of the equations of motion: {int(found.attrs['full_evaluations']):,} in full, "
-        f"{int(found.attrs['planned_evaluations']):,} as planned, of all members together.",
-        *_no_gain(int(found.attrs["full_evaluations"]), int(found.attrs["planned_evaluations"])),
+        f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
+        f"{int(planned.attrs['planned_evaluations']):,} as planned, of all members together.",
+        *_no_gain(int(planned.attrs["full_evaluations"]), int(planned.attrs["planned_evaluations"])),
         "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
     return Table(

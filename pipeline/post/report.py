@@ -70,20 +70,20 @@ def _documents(docs: Path) -> dict[str, str]:
 
 def _variants(folder: Path) -> list[tuple[str, str]]:
     """Name and title of each scene in a folder."""
-    found = []
+    variants = []
     for path in sorted(folder.glob("*.toml")):
         title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
-        found.append((f"`{path.parent.parent.name}/{path.parent.name}/{path.stem}`", str(title)))
-    return found
+        variants.append((f"`{path.parent.parent.name}/{path.parent.name}/{path.stem}`", str(title)))
+    return variants
 
 
 def run_attributes(paths: Mapping[str, Path]) -> dict[str, dict[str, object]]:
     """Attributes of the run datasets at these paths, by scene."""
-    found = {}
+    by_scene = {}
     for scene, path in paths.items():
         with xr.open_dataset(path) as run:
-            found[scene] = dict(run.attrs)
-    return found
+            by_scene[scene] = dict(run.attrs)
+    return by_scene
 
 
 def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[str, tuple[str, tuple[str, ...]]]:

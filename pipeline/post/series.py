@@ -96,13 +96,13 @@ def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Variable
     if "contact_penetration" in run:
         series["penetration"] = (("contact",), run["contact_penetration"].values)
         series["force"] = (("contact",), run["contact_normal_force"].values)
-    found: Variables = {}
+    variables: Variables = {}
     for name, (dims, values) in series.items():
-        found[f"peak_{name}"] = (dims, values.max(axis=0, initial=0.0))
-        found[f"peak_{name}_time"] = (dims, run["time"].values[first_largest(values, axis=0)])
+        variables[f"peak_{name}"] = (dims, values.max(axis=0, initial=0.0))
+        variables[f"peak_{name}_time"] = (dims, run["time"].values[first_largest(values, axis=0)])
     if "event_peak_force" in run:
-        found["peak_force"] = (("contact",), _peak_force(run))
-    return found
+        variables["peak_force"] = (("contact",), _peak_force(run))
+    return variables
 
 
 def contacts(run: xr.Dataset | LabelledArrays) -> Variables:

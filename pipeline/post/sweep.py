@@ -66,18 +66,18 @@ def _panels(sweep: xr.Dataset, *, sections: bool) -> dict[str, xr.Dataset]:
 
     One number for each point or section; vectors component by component.  Series are left to the user's own figures.
     """
-    dims, found = sweep["status"].dims, dict[str, xr.Dataset]()
+    dims, panels = sweep["status"].dims, dict[str, xr.Dataset]()
     for name in map(str, sweep.data_vars):
         inner = tuple(dim for dim in sweep[name].dims if dim not in dims)
         told = "units" in sweep[name].attrs and not name.endswith((".error", ".deviation"))
         if not told or ("section" in inner and not sections):
             continue
         if inner in ((), ("section",)):
-            found[name] = sweep
+            panels[name] = sweep
         elif inner in (("axis",), ("section", "axis")):
             for axis in _moving(sweep[name]):
-                found[f"{name} {axis}"] = sweep.assign({f"{name} {axis}": sweep[name].sel(axis=axis, drop=True)})
-    return found
+                panels[f"{name} {axis}"] = sweep.assign({f"{name} {axis}": sweep[name].sel(axis=axis, drop=True)})
+    return panels
 
 
 def _moving(vector: xr.DataArray) -> list[str]:
@@ -89,17 +89,17 @@ def _moving(vector: xr.DataArray) -> list[str]:
 
 def _still(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:
     """What is said of components without a panel."""
-    found = []
+    constant = []
     for name in map(str, sweep.data_vars):
         there = {panel.removeprefix(f"{name} ") for panel in panels if panel.startswith(f"{name} ")}
         if there:
             away = [str(axis) for axis in sweep["axis"].values if axis not in there]
-            found += (
+            constant += (
                 [f"{' and '.join(away)} of {name} are 0" if len(away) > 1 else f"{away[0]} of {name} is 0"]
                 if away
                 else []
             )
-    return found
+    return constant
 
 
 def _drawn(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:

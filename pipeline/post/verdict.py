@@ -131,10 +131,10 @@ def derive(sections: xr.Dataset) -> xr.Dataset:
     data["power"] = (("frequency", "component"), np.stack([power for _, power in lines], axis=1))
     coordinates = {"section": sections.section.values, "frequency": lines[0][0]}
     if "impact_phase" in sections:
-        found = [first_impacts(sections, str(name)) for name in sections.contact.values]
+        impacts = [first_impacts(sections, str(name)) for name in sections.contact.values]
         data["impact_correlation"] = (
             ("lag", "contact"),
-            np.nan_to_num(np.stack([chaos.autocorrelation(phase) for phase in found], axis=1)),
+            np.nan_to_num(np.stack([chaos.autocorrelation(phase) for phase in impacts], axis=1)),
         )
         coordinates |= {"contact": sections.contact.values}
     told = {"verdict": verdict.kind, "reasons": "; ".join(verdict.reasons)}

@@ -74,7 +74,7 @@ def spread(direction: np.ndarray, totals: np.ndarray, sectors: int, bands: int) 
 
     Sector s holds angles about z from x on, s to s + 1 times 2 pi/sectors; band b z-components from -1 on.
     """
-    found = np.zeros((bands, sectors, totals.shape[1]))
+    distributed = np.zeros((bands, sectors, totals.shape[1]))
     growth, share = np.diff(totals, axis=0), (np.arange(PIECES) + 0.5) / PIECES
     grown = np.flatnonzero(np.any(growth != 0.0, axis=1))
     start, end = direction[grown], direction[grown + 1]
@@ -88,5 +88,5 @@ def spread(direction: np.ndarray, totals: np.ndarray, sectors: int, bands: int) 
     band = np.minimum(((height + 1.0) / 2.0 * bands).astype(int), bands - 1)
     for what in range(totals.shape[1]):
         values = np.repeat(growth[grown, what] / PIECES, PIECES)
-        np.add.at(found[..., what], (band.ravel(), sector.ravel()), values)
-    return found
+        np.add.at(distributed[..., what], (band.ravel(), sector.ravel()), values)
+    return distributed

@@ -124,15 +124,15 @@ def motion(turning: bool) -> str:
 
 def with_names(data: LabelledArrays) -> LabelledArrays:
     """The same with the coordinates that follow from its dimensions alone."""
-    found: dict[str, LabelledArray] = {}
+    variables: dict[str, LabelledArray] = {}
     for name, length in data.sizes.items():
         if name in NAMED:
-            found[name] = LabelledArray((name,), np.array(NAMED[name]))
+            variables[name] = LabelledArray((name,), np.array(NAMED[name]))
         elif name in NUMBERED and name not in data.coords:
-            found[name] = LabelledArray((name,), np.arange(length, dtype=np.int32) + NUMBERED[name])
+            variables[name] = LabelledArray((name,), np.arange(length, dtype=np.int32) + NUMBERED[name])
         if name in MOTIONS:
-            found[f"{name}_motion"] = LabelledArray((name,), np.array(MOTIONS[name]))
-    return data.assign_coords(found)
+            variables[f"{name}_motion"] = LabelledArray((name,), np.array(MOTIONS[name]))
+    return data.assign_coords(variables)
 
 
 def turning(data: LabelledArrays, dims: tuple[str, ...]) -> tuple[str, np.ndarray]:

@@ -60,7 +60,7 @@ def warnings(bundle: xr.Dataset, frames_used: Sequence[str], body: str = "the bo
     """
     used = list(dict.fromkeys(frames_used))
     pairs = [(i, j) for k, i in enumerate(used) for j in used[k + 1 :]] or [(i, i) for i in used]
-    found = []
+    messages = []
     for name, held in pairs:
         both = bundle["compliance_share"].sel(frame=[name, held], frame_held=[held, name]).values
         share = bundle["direction"].copy(data=np.minimum(both[0, 0], both[1, 1]))
@@ -69,11 +69,11 @@ def warnings(bundle: xr.Dataset, frames_used: Sequence[str], body: str = "the bo
             continue
         where = f"of '{name}'" if name == held else f"between '{held}' and '{name}'"
         amounts = ", ".join(f"{d} {_percent(v)} %" for d, v in zip(low["direction"].values, low.values, strict=True))
-        found.append(
+        messages.append(
             f"{body}: its {bundle.attrs['reference']} modes have too little of the static compliance {where} "
             f"({amounts} of the full model's); joints there find the body too stiff. {_remedy(bundle, used)}"
         )
-    return found
+    return messages
 
 
 def _remedy(bundle: xr.Dataset, used: Sequence[str]) -> str:

@@ -251,12 +251,12 @@ def sweep(root: Path) -> int:
 
 
 def _abandoned(path: Path) -> bool:
-    found = _TEMPORARY.fullmatch(path.name)
-    if found is None:
+    match = _TEMPORARY.fullmatch(path.name)
+    if match is None:
         return False  # none of ours
-    if found["host"] != _host():
+    if match["host"] != _host():
         return _old(path)
-    return not system.alive(int(found["pid"]))
+    return not system.alive(int(match["pid"]))
 
 
 def _old(path: Path) -> bool:

@@ -70,10 +70,10 @@ class LabelledArrays:
         """The same with more attributes."""
         return replace(self, attrs={**self.attrs, **told})
 
-    def assign_coords(self, found: Mapping[str, LabelledArray]) -> LabelledArrays:
+    def assign_coords(self, coordinates: Mapping[str, LabelledArray]) -> LabelledArrays:
         """The same with these coordinates last, in place of others of their names."""
-        kept = {name: array for name, array in self.variables.items() if name not in found}
-        return replace(self, variables=kept | dict(found), coords=self.coords | found.keys())
+        kept = {name: array for name, array in self.variables.items() if name not in coordinates}
+        return replace(self, variables=kept | dict(coordinates), coords=self.coords | coordinates.keys())
 
     def to_xarray(self) -> xr.Dataset:
         """The same for users; values are shared."""

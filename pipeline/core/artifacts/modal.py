@@ -39,8 +39,8 @@ class Modal:
         if "count" in result.attrs:
             result.attrs["count"] = count
         if "compliance_full" in result and "modal_stiffness" in result:
-            found = shares(of_bundle(result), result["compliance_full"].values)
-            result["compliance_share"] = result["compliance_share"].copy(data=found)
+            fractions = shares(of_bundle(result), result["compliance_full"].values)
+            result["compliance_share"] = result["compliance_share"].copy(data=fractions)
         return result
 
     def _check(self, count: int) -> None:

@@ -89,15 +89,15 @@ def _set_attribute(file: Any, name: str, value: Any) -> None:
 def _listed(data: LabelledArrays) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
     """The attribute `coordinates` of each array, and that of the file for those that no array has all dimensions of."""
     beside = sorted(data.coords - data.sizes.keys())
-    found, left = dict[str, dict[str, str]](), set(beside)
+    attributes, left = dict[str, dict[str, str]](), set(beside)
     for name, array in data.variables.items():
         if name in beside or name in array.dims:
             continue
         own = [other for other in beside if set(data[other].dims) <= set(array.dims)]
         if own:
-            found[name] = {_COORDINATES: " ".join(own)}
+            attributes[name] = {_COORDINATES: " ".join(own)}
             left -= set(own)
-    return found, {_COORDINATES: " ".join(sorted(left))} if left else {}
+    return attributes, {_COORDINATES: " ".join(sorted(left))} if left else {}
 
 
 def read(content: bytes) -> LabelledArrays:

@@ -53,15 +53,15 @@ def batch(points: Mapping[str, Point], kept: Sequence[Kept]) -> xr.Dataset:
 def unpacked(stored: xr.Dataset, kept: Sequence[Kept]) -> dict[str, Point]:
     """The points of a batch by their keys."""
     arrays = {str(name): stored[name].values for name in stored.variables}
-    found = {}
+    points = {}
     for k, key in enumerate(arrays["key"]):
         refused = str(arrays["refused"][k])
         values, error, deviation = (
             {} if refused else {q.name: arrays[name][k] for q in kept if (name := variable(q, share)) in arrays}
             for share in SHARES
         )
-        found[str(key)] = Point(values, error, deviation, int(arrays["evaluations"][k]), refused)
-    return found
+        points[str(key)] = Point(values, error, deviation, int(arrays["evaluations"][k]), refused)
+    return points
 
 
 def variable(one: Kept, share: str) -> str:

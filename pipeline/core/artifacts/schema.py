@@ -343,7 +343,7 @@ def conformed(data: LabelledArrays, schema: Schema, *, title: str, **attributes:
     if missing or unknown:
         raise ValueError(f"artifact lacks {missing} and has undeclared {unknown}")
     data = with_names(data)
-    found, units_of = dict(data.variables), dict[str, LabelledArray]()
+    variables, units_of = dict(data.variables), dict[str, LabelledArray]()
     for name, array in data.variables.items():
         if _is_unit(name):
             continue
@@ -354,12 +354,12 @@ def conformed(data: LabelledArrays, schema: Schema, *, title: str, **attributes:
             raise ValueError(f"{name} holds values that are not finite")
         units, mixed = _units(data, name, variable)
         told = ({"units": units} if units else {}) | {"long_name": variable.long_name}
-        found[name] = replace(array, attrs=told)
+        variables[name] = replace(array, attrs=told)
         if mixed is not None:
             units_of[f"{name}_units"] = mixed
     made = {"Conventions": CONVENTIONS, "title": title, "source": f"{DISTRIBUTION} {version()}"}
-    coords = data.coords | units_of.keys() | (set(_NAMING) & found.keys())
-    return LabelledArrays(found | units_of, frozenset(coords), made | attributes)
+    coords = data.coords | units_of.keys() | (set(_NAMING) & variables.keys())
+    return LabelledArrays(variables | units_of, frozenset(coords), made | attributes)
 
 
 def _is_unit(name: str) -> bool:

@@ -109,10 +109,10 @@ class Store:
         for name, digest in record.files.items():
             path = self.path(record.stage, record.key, name)
             try:
-                found = digest_of(path)
+                actual = digest_of(path)
             except OSError:
                 return f"{self._shown(path)} is missing, or no file"
-            if found != digest:
+            if actual != digest:
                 _STORED.pop(digest, None)
                 return f"{self._shown(path)} is corrupt (its content differs from its sha256)"
         return None
@@ -232,7 +232,7 @@ class Store:
 
     def _tell_outdated(self, folder: str) -> None:
         path = self.root / folder / OUTDATED
-        notes = [read_checked(found) for found in sorted((path.parent / ".facts").glob("*.failed"))]
+        notes = [read_checked(path_of_note) for path_of_note in sorted((path.parent / ".facts").glob("*.failed"))]
         lines = [f"{note.get('label')}: {note.get('why')}\n" for note in notes if note is not None]
         if lines:
             publish(path, (OUTDATED_TEXT + "".join(lines)).encode())
@@ -288,12 +288,12 @@ def read_record(path: Path) -> Record | None:
     try:
         table = read_checked(path) or {}
         files, facts, said = (_texts(table.get(name, {})) for name in ("files", "facts", "said"))
-        found = Record(str(table["stage"]), str(table["key"]), files, facts, said)
+        record = Record(str(table["stage"]), str(table["key"]), files, facts, said)
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
     # a record of somebody else's must not lead out of its folder: what is pruned is removed
-    inside = all(_PART.fullmatch(name) for name in (*found.stage.split("/"), found.key, *found.files))
-    return found if inside and (found.files or found.key == FAMILY) else None
+    inside = all(_PART.fullmatch(name) for name in (*record.stage.split("/"), record.key, *record.files))
+    return record if inside and (record.files or record.key == FAMILY) else None
 
 
 def _texts(table: Mapping[object, object]) -> dict[str, str]:

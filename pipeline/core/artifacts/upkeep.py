@@ -57,13 +57,13 @@ def inventory(store: Store, *, whole: bool) -> Inventory:
     return Inventory(tuple(artifacts), tuple(damaged), tuple(unreadable), tuple(_orphans(store, known)))
 
 
-def prunable(store: Store, found: Inventory, older: float) -> list[Artifact]:
+def prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
     """Artifacts that no folder of results shows, and that were made more than `older` seconds ago.
 
     What the shown ones were made from stays as well: without it they would be made again. A sweep shows its families,
     all of whose points stay, since it goes on with them.
     """
-    made = {artifact.record.digest: artifact.record for artifact in found.artifacts}
+    made = {artifact.record.digest: artifact.record for artifact in listed.artifacts}
     kept, waiting = set(), list(_shown(store))
     while waiting:
         record = waiting.pop()
@@ -72,7 +72,7 @@ def prunable(store: Store, found: Inventory, older: float) -> list[Artifact]:
             above = (digest for fact, digest in record.facts.items() if fact.startswith("input "))
             waiting += [made[digest] for digest in above if digest in made]
     of_sweeps = {stage for stage, key in kept if key == FAMILY}
-    mine = [a for a in found.artifacts if a.age > older and a.record.stage not in of_sweeps]
+    mine = [a for a in listed.artifacts if a.age > older and a.record.stage not in of_sweeps]
     return [a for a in mine if (a.record.stage, a.record.key) not in kept]
 
 
@@ -92,8 +92,8 @@ def find(store: Store, what: str) -> Record | None:
             record = read_record(facts)
             if record is not None and any(_same(path, store.path(record.stage, record.key, f)) for f in record.files):
                 return record
-    found = [path for path in _records(store) if path.stem.startswith(what)]
-    return read_record(found[0]) if len(found) == 1 else None
+    records = [path for path in _records(store) if path.stem.startswith(what)]
+    return read_record(records[0]) if len(records) == 1 else None
 
 
 def _same(path: Path, other: Path) -> bool:

@@ -63,10 +63,10 @@ class Limits:
 def _size(path: Path) -> int:
     """Bytes of a file and of those of its name with other endings, as far as its folder may be looked at."""
     try:
-        found = [other for other in path.parent.iterdir() if other.stem == path.stem and other.is_file()]
+        companions = [other for other in path.parent.iterdir() if other.stem == path.stem and other.is_file()]
     except OSError:
-        found = [path]
-    return sum(file.stat().st_size for file in found)
+        companions = [path]
+    return sum(file.stat().st_size for file in companions)
 
 
 def allowed() -> float:
@@ -146,8 +146,8 @@ def _answer(asked: dict[str, Any], limits: Limits) -> dict[str, Any]:
     reason = "what its reader answers is no message"
     try:
         wire.send(stdin, asked)
-        found = wire.receive(stdout, limits.memory)
-        answer = found if "failure" in found or {"value", "read"} <= found.keys() else None
+        received = wire.receive(stdout, limits.memory)
+        answer = received if "failure" in received or {"value", "read"} <= received.keys() else None
     except (OSError, EOFError):
         reason = _end_of(child, late.is_set(), limits)
     except (ValueError, TypeError, KeyError, AttributeError, MemoryError):

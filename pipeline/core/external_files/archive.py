@@ -17,8 +17,8 @@ def read(path: Path, where: str, copies: float, remedy: str) -> dict[str, np.nda
     copies: how often what is unpacked will be in memory.  remedy: what helps where that is too much.
     Raises ResourceError for that, `apart.UnreadableError`, and as `apart.read` does.
     """
-    found: dict[str, np.ndarray] = apart.read(unpacked, path, where, copies, remedy, apart.allowed())
-    return found
+    arrays: dict[str, np.ndarray] = apart.read(unpacked, path, where, copies, remedy, apart.allowed())
+    return arrays
 
 
 def unpacked(path: Path, where: str, copies: float, remedy: str, allowed: float) -> dict[str, np.ndarray]:

@@ -31,8 +31,8 @@ def require_mesh(path: Path, where: str, largest: int | None = None) -> None:
     machine.require_memory(COPIES * size, f"{where}: '{path.name}'", "use a coarser mesh")
     if path.suffix == ".vtk":
         with path.open("rb") as file:
-            found = _GRID.search(file.read(HEADER))
-        count = prod(int(number) for number in found[1].split()) if found is not None else 0
+            match = _GRID.search(file.read(HEADER))
+        count = prod(int(number) for number in match[1].split()) if match is not None else 0
         if count > MOST_POINTS:
             raise InputError(where, f"'{path.name}' promises a grid of {count:.3g} points, more than {MOST_POINTS}")
 

@@ -23,14 +23,14 @@ def read(path: Path) -> xr.Dataset:
 
     require_file(path, str(path))
     try:
-        found = apart.read(parsed, path)
+        dataset = apart.read(parsed, path)
     except apart.UnreadableError as error:
         raise InputError(str(path), f"cannot be read as a NetCDF dataset: {error}", _REMEDY) from None
-    if not str(found["attributes"].get("source")).startswith(f"{DISTRIBUTION} "):
+    if not str(dataset["attributes"].get("source")).startswith(f"{DISTRIBUTION} "):
         why = "is a dataset, but no scene's: it has no attribute `source` that names flexclear"
         raise InputError(str(path), why, _REMEDY)
-    made = xr.Dataset({name: tuple(variable) for name, variable in found["variables"].items()})
-    return made.set_coords(found["coordinates"]).assign_attrs(found["attributes"])
+    made = xr.Dataset({name: tuple(variable) for name, variable in dataset["variables"].items()})
+    return made.set_coords(dataset["coordinates"]).assign_attrs(dataset["attributes"])
 
 
 _REMEDY = "name a scene, or a file below results/runs such as run.nc; xarray.open_dataset opens any other"

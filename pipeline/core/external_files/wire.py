@@ -61,14 +61,14 @@ def _length(file: IO[bytes], most: float) -> int:
 
 def _exactly(file: IO[bytes], count: int) -> np.ndarray:
     """So many bytes; EOFError where there are fewer."""
-    found = np.empty(count, dtype=np.uint8)
-    view, done = found.data, 0
+    buffer = np.empty(count, dtype=np.uint8)
+    view, done = buffer.data, 0
     while done < count:
         more = file.readinto(view[done:])  # type: ignore[attr-defined]
         if not more:
             raise EOFError("the other process is gone")
         done += more
-    return found
+    return buffer
 
 
 def _told(value: Any, arrays: list[np.ndarray]) -> Any:
@@ -101,7 +101,7 @@ def _arrays(told: Any) -> list[tuple[np.dtype, tuple[int, ...]]]:
             raise ValueError(f"an array of {name!r}, {shape!r}")
         return [(np.dtype(name), tuple(shape))]
     parts = content if kind == "list" else content.values() if kind == "table" else ()
-    return [found for part in parts for found in _arrays(part)]
+    return [array for part in parts for array in _arrays(part)]
 
 
 def _value(told: Any, arrays: Any) -> Any:

@@ -131,8 +131,8 @@ def _principal(rows: list[list[float]]) -> list[float]:
         return sorted(rows[k][k] for k in range(3))
     import numpy as np  # here, as in `Pose`: most scenes are checked without it, and commands start in half the time
 
-    found: list[float] = np.linalg.eigvalsh(np.array(rows)).tolist()
-    return found
+    moments: list[float] = np.linalg.eigvalsh(np.array(rows)).tolist()
+    return moments
 
 
 Inertia = Annotated[
@@ -188,12 +188,12 @@ class Part(BaseModel):
         """The schema, with the meanings of keys that the docstring tells."""
         from flexclear.pipeline.core.scene.key_descriptions import meanings  # reads docstrings, which only schemas need
 
-        found = handler(core)
-        properties = handler.resolve_ref_schema(found).get("properties", {})
+        schema = handler(core)
+        properties = handler.resolve_ref_schema(schema).get("properties", {})
         for key, meaning in meanings(cls, properties.keys()).items():
             old = properties[key].get("description")
             properties[key]["description"] = f"{meaning}; {old}" if old else meaning
-        return found
+        return schema
 
 
 def given_once(part: Part, ways: tuple[str, ...]) -> None:

@@ -25,8 +25,8 @@ USE = {
 
 def kind_of_file(table: Mapping[str, Any]) -> str:
     """SCENE, SWEEP or RECIPE: what most of a file's keys say; SCENE where none tells."""
-    found = {kind: len(keys & set(table)) for kind, keys in TELLING.items()}
-    return max(found, key=lambda kind: found[kind])
+    matches = {kind: len(keys & set(table)) for kind, keys in TELLING.items()}
+    return max(matches, key=lambda kind: matches[kind])
 
 
 def require_kind(table: Mapping[str, Any], path: Path, wanted: str) -> None:

@@ -51,26 +51,26 @@ def loose(scene: Scene) -> dict[str, Clearance]:
 
 def owned(scene: Scene, left: Collection[str]) -> dict[str, Any]:
     """Edits of what is asked for, where the joints with clearance, or the stops, of these names are taken away."""
-    found: dict[str, Any] = {}
+    keys: dict[str, Any] = {}
     owners = scene.owners()
     if left:
         contacts = tuple(name for name in owners["contact"] if name.partition(".")[0] not in left)
         owners = {**owners, "contact": contacts}
         if not contacts:
-            found["ensemble"] = None
+            keys["ensemble"] = None
         if scene.accuracy is not None:
             wanted = {
                 n: w.model_dump(exclude_none=True) for n, w in scene.accuracy.quantities.items() if _has(n, owners)
             }
             rest = scene.accuracy.model_dump(exclude={"quantities"}, exclude_none=True)
-            found["accuracy"] = {**rest, "quantities": wanted} if wanted else None
+            keys["accuracy"] = {**rest, "quantities": wanted} if wanted else None
         if scene.view is not None and scene.view.watch is not None:
             watched = [name for name in scene.view.watch if _has(name, owners)]
-            found["view.watch"] = watched or None
+            keys["view.watch"] = watched or None
             if not watched:
-                found["view"] = None
-                del found["view.watch"]
-    return found
+                keys["view"] = None
+                del keys["view.watch"]
+    return keys
 
 
 def _has(name: str, owners: dict[str, tuple[str, ...]]) -> bool:

@@ -19,9 +19,9 @@ PARTIAL = "Partial"
 
 def scene_schema() -> dict[str, Any]:
     """The schema of a scene file, with everything by which it may edit another."""
-    found = Scene.model_json_schema(mode="validation")
-    definitions, properties = found["$defs"], found["properties"]
-    required = found.pop("required")
+    schema = Scene.model_json_schema(mode="validation")
+    definitions, properties = schema["$defs"], schema["properties"]
+    required = schema.pop("required")
     definitions["Accuracy"] = _accuracy(definitions["Accuracy"])
     for name in list(definitions):
         definitions[PARTIAL + name] = _partial(definitions[name])
@@ -34,11 +34,11 @@ def scene_schema() -> dict[str, Any]:
         "items": {"type": "string"},
         "description": 'places that are taken away, such as "joint.A1"',
     }
-    found |= {
+    schema |= {
         "if": {"not": {"required": ["extends"]}},
         "then": {"required": required, **{"properties": dict.fromkeys(("replace", "set", "remove"), False)}},
     }
-    return identified(found, "scene")
+    return identified(schema, "scene")
 
 
 def identified(schema: dict[str, Any], kind: str) -> dict[str, Any]:

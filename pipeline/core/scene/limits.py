@@ -17,10 +17,10 @@ _SIZE = re.compile(r"(\d{1,15}(?:\.\d{1,15})?) ?([kMGT]?B)")
 def _bytes(value: Any) -> Any:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return value
-    found = _SIZE.fullmatch(value.strip()) if isinstance(value, str) else None
-    if found is None:
+    match = _SIZE.fullmatch(value.strip()) if isinstance(value, str) else None
+    if match is None:
         raise ValueError(f"expected a size such as '4 GB', in {', '.join(_UNITS)}")
-    return float(found[1]) * _UNITS[found[2]]
+    return float(match[1]) * _UNITS[match[2]]
 
 
 _TEXT = {"type": "string", "description": "size such as '4 GB'"}

@@ -25,10 +25,10 @@ def located(error: InputError) -> InputError:
     """The error with the line of its place behind the place, where a file has it; of several, each."""
     if isinstance(error, InputErrors):
         return InputErrors([located(one) for one in error.errors])
-    found = where(error)
-    if found is None:
+    position = where(error)
+    if position is None:
         return error
-    file, line = found
+    file, line = position
     said = _PLACE.match(error.place)
     other = "" if said is None or Path(said["file"]).resolve() == file.resolve() else f" of {file}"
     return InputError(f"{error.place}, line {line}{other}", error.problem, error.remedy)
@@ -67,7 +67,7 @@ def _read(text: str) -> tuple[object, dict[tuple[str, ...], int]]:
 
 def written(text: str) -> dict[tuple[str, ...], int]:
     """The line on which each key of a TOML text is first written, tables included."""
-    found: dict[tuple[str, ...], int] = {}
+    lines_of: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
     quote = ""
     for number, line in enumerate(text.splitlines(), start=1):
@@ -82,8 +82,8 @@ def written(text: str) -> dict[tuple[str, ...], int]:
             keys = (*table, *_keys(value[1]))
             quote = next((q for q in ('"""', "'''") if line.count(q) == 1), "")
         for length in range(1, len(keys) + 1):
-            found.setdefault(keys[:length], number)
-    return found
+            lines_of.setdefault(keys[:length], number)
+    return lines_of
 
 
 def _keys(dotted: str) -> tuple[str, ...]:

@@ -62,15 +62,15 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
     override and errors as of `load_scene`.  Its name is its title's.
     """
     place = Path("scene")
-    found = copy.deepcopy(dict(table))
-    _require_tables(found, place)
-    if any(key in found for key in EDITS):
+    copied = copy.deepcopy(dict(table))
+    _require_tables(copied, place)
+    if any(key in copied for key in EDITS):
         raise InputError("scene", "edits another scene, which only files do", "use edited(scene, changes)")
-    _absolute_files(found, Path.cwd() / place)
+    _absolute_files(copied, Path.cwd() / place)
     for key, value in (override or {}).items():
-        _put(found, key, value, "override of scene")
-    check_parts(found, place, FAMILIES)
-    scene = _read(found, place)
+        _put(copied, key, value, "override of scene")
+    check_parts(copied, place, FAMILIES)
+    scene = _read(copied, place)
     name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
     scene._name = f"{name}-scene" if portable.is_device(name) else name
     return scene
@@ -238,8 +238,8 @@ def read_toml(path: Path) -> dict[str, Any]:
         text = path.read_text(encoding="utf-8-sig")
         if DEEP.search(text):
             raise InputError(str(path), "nests tables too deeply to be read: a key has more than 50 parts")
-        found: dict[str, Any] = _copied(_parsed(text))
-        return found
+        content: dict[str, Any] = _copied(_parsed(text))
+        return content
     except FileNotFoundError:
         raise InputError(str(path), "there is no such file", _neighbours(path)) from None
     except UnicodeDecodeError as error:
@@ -374,20 +374,20 @@ def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
 def _absolute_files(table: dict[str, Any], path: Path) -> None:
     """Recipes, tables and shapes are looked for beside the scene, then in each folder above it."""
 
-    def found(name: str) -> str:
+    def absolute(name: str) -> str:
         return str(next((p for p in (folder / name for folder in path.parents) if is_file(p)), path.parent / name))
 
     for body in table.get("body", {}).values():
         mesh = body.get("mesh") if isinstance(body, dict) else None
         if isinstance(mesh, str) and not Path(mesh).is_absolute():
-            body["mesh"] = found(mesh)
+            body["mesh"] = absolute(mesh)
         for shape in body.get("geometry") or () if isinstance(body, dict) else ():
             file = shape.get("file") if isinstance(shape, dict) else None
             if isinstance(file, str) and not Path(file).is_absolute():
-                shape["file"] = found(file)
+                shape["file"] = absolute(file)
     for law in _tables([table.get("drive"), table.get("load")]):
         if not Path(law["file"]).is_absolute():
-            law["file"] = found(law["file"])
+            law["file"] = absolute(law["file"])
 
 
 def _tables(node: object) -> Iterator[dict[str, Any]]:

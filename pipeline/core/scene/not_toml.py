@@ -23,8 +23,8 @@ _PARTS = re.compile(
 
 def not_toml(path: Path, text: str, message: str) -> InputError:
     """The error of a file with this text, which the reader of TOML refuses with this message."""
-    found, lines = _LINE.search(message), text.splitlines()
-    number = int(found[1]) if found else 0
+    match, lines = _LINE.search(message), text.splitlines()
+    number = int(match[1]) if match else 0
     line = lines[number - 1] if 0 < number <= len(lines) else ""
     place = f"{path}, line {number}" if number else str(path)
     problem, hint = _guessed(line) or _said(message, line)

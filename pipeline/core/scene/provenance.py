@@ -8,10 +8,10 @@ from typing import Any
 
 def told(table: Mapping[str, Any], place: str = "") -> dict[str, str]:
     """Place -> text of every `source` at and below a table; of the table itself by its place, or by that of its key."""
-    found: dict[str, str] = {}
+    sources: dict[str, str] = {}
     for where, source in _sources(table, place):
-        found |= {where: source} if isinstance(source, str) else {_below(where, key): t for key, t in source.items()}
-    return found
+        sources |= {where: source} if isinstance(source, str) else {_below(where, key): t for key, t in source.items()}
+    return sources
 
 
 def mistaken(table: Mapping[str, Any]) -> str | None:

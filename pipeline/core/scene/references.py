@@ -19,18 +19,18 @@ def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputE
     """Every name in a composed scene table that leads nowhere; `path` opens each place."""
     frames = {name: _frames(body, recipe) for name, body in _tables(table.get("body"))}
     joints = [name for name, _ in _tables(table.get("joint"))]
-    found: list[InputError] = []
+    errors: list[InputError] = []
     for place, name in _named_frames(table):
-        found += _frame(f"{path} [{place}]", name, frames)
+        errors += _frame(f"{path} [{place}]", name, frames)
     for place, name in _named_joints(table):
         if name not in joints:
-            found.append(InputError(f"{path} [{place}]", f"there is no joint '{name}'", suggestion(name, joints)))
+            errors.append(InputError(f"{path} [{place}]", f"there is no joint '{name}'", suggestion(name, joints)))
     for place, name in _named_bodies(table):
         if name not in frames:
-            found.append(InputError(f"{path} [{place}]", f"there is no body '{name}'", suggestion(name, frames)))
+            errors.append(InputError(f"{path} [{place}]", f"there is no body '{name}'", suggestion(name, frames)))
     for name, body in _tables(table.get("body")):
-        found += _interfaces(f"{path} [body.{name}.modes", body, frames[name])
-    return found
+        errors += _interfaces(f"{path} [body.{name}.modes", body, frames[name])
+    return errors
 
 
 def _tables(family: object) -> Iterator[tuple[str, dict[str, Any]]]:

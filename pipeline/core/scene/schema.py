@@ -121,8 +121,8 @@ class Accuracy(Part):
         if not isinstance(table, dict) or set(table) <= {"quantities"} | plain:
             return table
         wanted = {name: value for name, value in table.items() if name not in plain}
-        found = {name: _wanted(name, value) for name, value in _leaves(wanted, "")}
-        return {"quantities": found} | {name: table[name] for name in plain & set(table)}
+        accuracies = {name: _wanted(name, value) for name, value in _leaves(wanted, "")}
+        return {"quantities": accuracies} | {name: table[name] for name in plain & set(table)}
 
 
 class View(Part):
@@ -163,14 +163,14 @@ class View(Part):
 
 def _leaves(table: dict[str, Any], place: str) -> list[tuple[str, Any]]:
     """Dotted name -> value, of nested tables or quoted names alike."""
-    found = []
+    leaves = []
     for key, value in table.items():
         name = f"{place}.{key}".lstrip(".")
         if isinstance(value, dict) and not set(value) <= {"absolute", "relative"}:
-            found += _leaves(value, name)
+            leaves += _leaves(value, name)
         elif name != "source":
-            found.append((name, value))
-    return found
+            leaves.append((name, value))
+    return leaves
 
 
 def _wanted(name: str, value: Any) -> Any:
@@ -253,13 +253,13 @@ class Scene(Part):
 
     def _bodies_have_files_of_their_own(self) -> None:
         """Results are sent from one system to another: meshes and modes of bodies are files called by their names."""
-        found: dict[str, str] = {}
+        names: dict[str, str] = {}
         for name in self.recipes():
             if portable.is_device(name):
                 raise ValueError(
                     f"body.{name}: '{name}' is a device on Windows, and files are called by this name: give it another"
                 )
-            other = found.setdefault(portable.folded(name), name)
+            other = names.setdefault(portable.folded(name), name)
             if other != name:
                 raise ValueError(
                     f"body.{name}: is called as '{other}' but for capitals or accents, which names of files on Windows "
@@ -324,13 +324,13 @@ class Scene(Part):
         driven = {getattr(drive, "joint", None) for drive in self.drive.values()}
         told = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
         known = {name for name, body in self.body.items() if isinstance(body, Ground)}
-        found = set(known)
+        known_bodies = set(known)
         for _ in told:
             for joint in told:
                 pair = {frame.partition(".")[0] for frame in joint.between}
-                if pair & found:
-                    found |= {name for name in pair if not isinstance(self.body.get(name), FlexibleBody)}
-        return found - known
+                if pair & known_bodies:
+                    known_bodies |= {name for name in pair if not isinstance(self.body.get(name), FlexibleBody)}
+        return known_bodies - known
 
     def watched(self) -> list[Quantity]:
         """The quantities that are looked at: those that `[view]` names, else as `wanted`."""
@@ -424,8 +424,8 @@ class Scene(Part):
 
     def sources(self) -> dict[str, str]:
         """Where each value comes from: ``part.key`` (or ``part``) -> text."""
-        found = provenance.told(self.model_dump())
-        return {place or "scene": text for place, text in found.items()}
+        given = provenance.told(self.model_dump())
+        return {place or "scene": text for place, text in given.items()}
 
     def assumptions(self) -> dict[str, str]:
         """The sources that say ``assumed: why``."""

@@ -96,11 +96,11 @@ class Parameter(Part):
 
 def number_and_unit(value: Any) -> tuple[float, str]:
     """SI value and SI unit of a number, or of text with a unit; ValueError in words."""
-    found = any_quantity(value)
-    if isinstance(found, str):
-        number, _, unit = found.partition(" ")
+    quantity = any_quantity(value)
+    if isinstance(quantity, str):
+        number, _, unit = quantity.partition(" ")
         return float(number), unit
-    return found, ""
+    return quantity, ""
 
 
 class Sample(Part):

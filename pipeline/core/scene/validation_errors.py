@@ -56,19 +56,19 @@ TAGS = {
 
 
 def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel]) -> InputErrors:
-    """Everything that pydantic found in a file that should be a `model`."""
+    """All validation errors of a file that should be a `model`."""
     places: dict[str, list[tuple[str, InputError]]] = {}
     for e in error.errors(include_url=False)[:MOST]:
-        found = _input_error(path, e, model)
-        places.setdefault(found.place, []).append((e["type"], found))
-    unique = {str(found): found for there in places.values() for found in _nearest(there)}
+        invalid = _input_error(path, e, model)
+        places.setdefault(invalid.place, []).append((e["type"], invalid))
+    unique = {str(e): e for there in places.values() for e in _nearest(there)}
     return InputErrors(list(unique.values()))
 
 
 def _nearest(there: list[tuple[str, InputError]]) -> list[InputError]:
     """What to tell of one place: where there are alternatives, only what is wrong with those of the value's kind."""
-    fitting = [found for kind, found in there if kind not in OTHER_KIND]
-    others = {found.problem: found for kind, found in there if kind in OTHER_KIND}
+    fitting = [candidate for kind, candidate in there if kind not in OTHER_KIND]
+    others = {candidate.problem: candidate for kind, candidate in there if kind in OTHER_KIND}
     if fitting or len(others) < 2:
         return fitting or list(others.values())
     problems = [problem.partition(" (got ") for problem in others]
@@ -120,7 +120,7 @@ def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], lis
     """
     keys, here, beside = list[Any](), [model], list[str]()
     for key in loc:
-        inner = [found for a in here for found in _inside(a, key)]
+        inner = [candidate for a in here for candidate in _inside(a, key)]
         if inner:
             keys.append(key)
             beside, here = _keys(here), inner
@@ -168,8 +168,8 @@ def _keys(alternatives: list[Any]) -> list[str]:
 def _types(alternative: Any) -> tuple[str, ...]:
     """Names by which a part says that it is this one."""
     fields = alternative.model_fields if _is_model(alternative) else {}
-    found = (fields[key].annotation for key in CHOOSING if key in fields)
-    return tuple(name for annotation in found if get_origin(annotation) is Literal for name in get_args(annotation))
+    kinds = (fields[key].annotation for key in CHOOSING if key in fields)
+    return tuple(name for annotation in kinds if get_origin(annotation) is Literal for name in get_args(annotation))
 
 
 def _chosen_by(alternative: Any, tag: Any) -> bool:

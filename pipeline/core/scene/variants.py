@@ -50,25 +50,25 @@ class Effect:
 
 def effects(scene: Scene) -> tuple[Effect, ...]:
     """The effects of a scene that can be taken away, flexible bodies first, what lies within one right after it."""
-    found = list[Effect]()
+    listed = list[Effect]()
     for name, body in scene.flexible().items():
         whole = Effect(f"body.{name}.modes", FLEXIBILITY)
-        found.append(whole)
+        listed.append(whole)
         for key in ("damping", "stiffening"):
             if getattr(body, key) is not None:
-                found.append(Effect(f"body.{name}.{key}", key, whole.name))
+                listed.append(Effect(f"body.{name}.{key}", key, whole.name))
     for name, joint in scene.contacts().items():
         there = name in loose(scene)
         if there:
-            found.append(Effect(f"joint.{name}.clearance", CLEARANCE))
+            listed.append(Effect(f"joint.{name}.clearance", CLEARANCE))
         if joint.friction is not None:
-            found.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if there else ""))
-    found += [Effect(f"joint.{name}.friction", "friction") for name in scene.rubbing()]
+            listed.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if there else ""))
+    listed += [Effect(f"joint.{name}.friction", "friction") for name in scene.rubbing()]
     for name, load in scene.load.items():
         if load.type in OF_THE_WORLD:
-            found.append(Effect(f"load.{name}", "gravity" if load.type == "gravity" else "friction"))
-    found += [Effect(f"stop.{name}", "stop") for name in scene.stop]
-    return tuple(found)
+            listed.append(Effect(f"load.{name}", "gravity" if load.type == "gravity" else "friction"))
+    listed += [Effect(f"stop.{name}", "stop") for name in scene.stop]
+    return tuple(listed)
 
 
 def named(scene: Scene, names: Iterable[str], place: str) -> tuple[Effect, ...]:
@@ -101,15 +101,15 @@ def without(scene: Scene, gone: Collection[Effect]) -> Scene:
 def _settings(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
     """Edits of settings that speak of flexible bodies which are gone: stresses asked for, deformations at the start."""
     rigid = {effect.owner for effect in gone if effect.kind == FLEXIBILITY}
-    found: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     if scene.output.stress is not None and rigid & set(scene.output.stress):
         output = scene.output.model_dump(mode="json", exclude={"stress"}, exclude_none=True)
         left = [name for name in scene.output.stress if name not in rigid]
-        found["output"] = output | ({"stress": left} if left else {})
+        settings["output"] = output | ({"stress": left} if left else {})
     if scene.start is not None and rigid & set(scene.start.modal):
         start = scene.start.model_dump(mode="json", exclude_none=True)
-        found["start"] = start | {"modal": {k: v for k, v in start["modal"].items() if k not in rigid}}
-    return found
+        settings["start"] = start | {"modal": {k: v for k, v in start["modal"].items() if k not in rigid}}
+    return settings
 
 
 def _left(gone: Collection[Effect]) -> frozenset[str]:
@@ -119,7 +119,7 @@ def _left(gone: Collection[Effect]) -> frozenset[str]:
 
 def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
     """Place -> what stands there instead, or None for what is removed."""
-    found: dict[str, Any] = {}
+    changes: dict[str, Any] = {}
     places = {effect.name for effect in gone}
     for effect in gone:
         if effect.within in places:
@@ -127,17 +127,17 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
         family, name = effect.name.split(".")[:2]
         part = getattr(scene, family)[name]
         if effect.kind == CLEARANCE:
-            found[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[part.type], "between": list(part.between)}
+            changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[part.type], "between": list(part.between)}
         elif effect.kind == FLEXIBILITY:
             kept = part.model_dump(mode="json", include=set(KEPT), exclude_none=True)
-            found[f"body.{name}"] = {"type": "rigid", **kept}
+            changes[f"body.{name}"] = {"type": "rigid", **kept}
         elif effect.name.count(".") == 1:
-            found[effect.name] = None
+            changes[effect.name] = None
         else:
             key = effect.name.split(".")[2]
-            table = found.get(f"{family}.{name}") or part.model_dump(mode="json", exclude_none=True)
-            found[f"{family}.{name}"] = {k: v for k, v in table.items() if k != key}
-    return found
+            table = changes.get(f"{family}.{name}") or part.model_dump(mode="json", exclude_none=True)
+            changes[f"{family}.{name}"] = {k: v for k, v in table.items() if k != key}
+    return changes
 
 
 def with_modes(scene: Scene, counts: Mapping[str, int]) -> Scene:

@@ -67,13 +67,13 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
 
 def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
     """State of each task and all its inputs, inputs first; nothing is run."""
-    found: dict[int, State] = {}
+    states_of: dict[int, State] = {}
     for task in in_order(tasks):
-        above = {name: found[id(t)].record for name, t in task.inputs.items()}
+        above = {name: states_of[id(t)].record for name, t in task.inputs.items()}
         fresh = {name: record for name, record in above.items() if record is not None}
         stale = frozenset(above.keys() - fresh.keys())
-        found[id(task)] = _state(task, fresh, stale, store, sources)
-    return list(found.values())
+        states_of[id(task)] = _state(task, fresh, stale, store, sources)
+    return list(states_of.values())
 
 
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:

@@ -115,11 +115,11 @@ def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]
     global _current
     _listen()
     places = (*_system(), *(str(folder) for folder in (kernel_root(), *outside)))
-    found: dict[str, str] = {}
+    watched_files: dict[str, str] = {}
     before, _current = _current, Opened(tuple(f"{place.rstrip(os.sep)}{os.sep}" for place in places))
     seen = _current
     try:
-        yield found
+        yield watched_files
     finally:
         _current = before
     temporary = tempfile.gettempdir()
@@ -129,7 +129,7 @@ def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]
             continue  # the process's own: made by a task, or by a library for itself
         if now != then:
             raise changed(name)
-        found[_place(name, base)] = then
+        watched_files[_place(name, base)] = then
 
 
 def changed(name: str) -> ResourceError:
@@ -161,9 +161,9 @@ def digest(path: str) -> str:
         return ABSENT
 
 
-def facts(found: Mapping[str, str]) -> dict[str, str]:
+def facts(file_digests: Mapping[str, str]) -> dict[str, str]:
     """As facts of a key."""
-    return {f"file {name}": value for name, value in sorted(found.items())}
+    return {f"file {name}": value for name, value in sorted(file_digests.items())}
 
 
 @cache

@@ -131,7 +131,7 @@ class Sources:
         return self.read[name]
 
     def _reach(self, wanted: frozenset[str]) -> dict[str, Module]:
-        found: dict[str, Module] = {}
+        modules: dict[str, Module] = {}
         waiting = sorted(wanted)
         for name in waiting:
             if self.module(name) is None:
@@ -139,10 +139,10 @@ class Sources:
         while waiting:
             name = waiting.pop()
             module = self.read[name]
-            if name not in found and module is not None:
-                found[name] = module
+            if name not in modules and module is not None:
+                modules[name] = module
                 waiting.extend(self._next(name, module))
-        return found
+        return modules
 
     def _next(self, name: str, module: Module) -> tuple[str, ...]:
         """The modules that one reaches at once: what it imports may be an attribute of a module, and no module."""
@@ -297,14 +297,14 @@ def _is_type_checking(test: ast.expr) -> bool:
 @cache
 def library_versions(packages: frozenset[str]) -> dict[str, str]:
     """Versions of the libraries that hold these import packages, and of all that those require in turn."""
-    found = {name: library_version(name) for name in packages}
+    versions = {name: library_version(name) for name in packages}
     waiting = sorted(packages)
     while waiting:
         for name in _required(waiting.pop()):
-            if name not in found and library_version(name) != "absent":
-                found[name] = library_version(name)
+            if name not in versions and library_version(name) != "absent":
+                versions[name] = library_version(name)
                 waiting.append(name)
-    return dict(sorted(found.items()))
+    return dict(sorted(versions.items()))
 
 
 @cache
@@ -312,8 +312,8 @@ def library_version(package: str) -> str:
     """Version of the distribution that holds an import package; 'absent' when it is not installed."""
     metadata = _metadata(package)
     # `importlib.metadata.version` parses the whole description as an e-mail, 5 ms for each library
-    found = metadata and re.search(r"^Version: (.+)$", metadata, re.MULTILINE)
-    return "absent" if metadata is None else found[1].strip() if found else "unknown"
+    match = metadata and re.search(r"^Version: (.+)$", metadata, re.MULTILINE)
+    return "absent" if metadata is None else match[1].strip() if match else "unknown"
 
 
 @cache
@@ -328,9 +328,9 @@ def _metadata(package: str) -> str | None:
     from importlib.metadata import PackageNotFoundError, distribution  # here, since it brings readers of e-mail
 
     try:
-        found = distribution(DISTRIBUTIONS.get(package, package))
+        installed = distribution(DISTRIBUTIONS.get(package, package))
     except PackageNotFoundError:
         return None
     # in a checkout that is on the path itself, the program's own stands under its older name
-    text = found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
+    text = installed.read_text("METADATA") or installed.read_text("PKG-INFO") or ""
     return text.partition("\n\n")[0]  # the rest describes the library

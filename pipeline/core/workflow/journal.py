@@ -76,10 +76,10 @@ class Journal:
         """What an earlier attempt left of a piece; None where there is nothing, or something is damaged."""
         import numpy as np
 
-        found = self._read(name)
-        if found is None:
+        entry = self._read(name)
+        if entry is None:
             return None
-        arrays, notes = found
+        arrays, notes = entry
         chunks, rows = [(int(count), str(digest)) for count, digest in notes["chunks"]], []
         for k, (_, digest) in enumerate(chunks):
             more = self._read(f"{name}-{k}", digest)

@@ -71,16 +71,16 @@ class Task:
 
 def in_order(tasks: list[Task]) -> list[Task]:
     """`tasks` and all their inputs, each once, inputs first."""
-    found: dict[int, Task] = {}
+    ordered: dict[int, Task] = {}
 
     def visit(task: Task) -> None:
         for above in task.inputs.values():
             visit(above)
-        found.setdefault(id(task), task)
+        ordered.setdefault(id(task), task)
 
     for task in tasks:
         visit(task)
-    return list(found.values())
+    return list(ordered.values())
 
 
 def facts(task: Task, digests: Mapping[str, str], sources: Sources) -> dict[str, str]:
@@ -107,26 +107,26 @@ def flatten(node: Any, place: str = "") -> list[tuple[str, str]]:
     Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
     date or a nan that somebody wrote into a recipe) is kept as text; the stage will refuse it.
     """
-    found: list[tuple[str, str]] = []
-    _gather(node, place, found)
-    return found
+    leaves: list[tuple[str, str]] = []
+    _gather(node, place, leaves)
+    return leaves
 
 
-def _gather(node: Any, place: str, found: list[tuple[str, str]]) -> None:
+def _gather(node: Any, place: str, leaves: list[tuple[str, str]]) -> None:
     """`flatten` into a list: a report has tens of thousands of leaves."""
     text = _plain(node)
     if text is not None:
-        found.append((place, text))
+        leaves.append((place, text))
         return
     if isinstance(node, Mapping) and node:
         items = ((str(name), value) for name, value in node.items())
     elif isinstance(node, (list, tuple)) and any(isinstance(x, (dict, list, tuple, Mapping)) for x in node):
         items = ((str(n), value) for n, value in enumerate(node))
     else:
-        found.append((place, _JSON.encode(node)))
+        leaves.append((place, _JSON.encode(node)))
         return
     for name, value in items:
-        _gather(value, f"{place}.{name}" if place else name.lstrip("."), found)
+        _gather(value, f"{place}.{name}" if place else name.lstrip("."), leaves)
 
 
 def _plain(node: Any) -> str | None:

@@ -75,7 +75,7 @@ def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
 
 def size(path: Path) -> int:
     """Bytes of a generated file and of what was compiled of it."""
-    return sum(found.stat().st_size for found in (path, path.with_suffix(CODE)) if found.is_file())
+    return sum(file.stat().st_size for file in (path, path.with_suffix(CODE)) if file.is_file())
 
 
 def _used(path: Path) -> float:

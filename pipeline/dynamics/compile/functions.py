@@ -151,11 +151,11 @@ class Entry:
         return {}
 
     def _function(self, name: str) -> Callable:
-        found = self._known.get(name)
-        if found is None:
+        function = self._known.get(name)
+        if function is None:
             address = self.late.address() if name == LATE else self.addresses[name]
-            found = self._known[name] = interpreted[address] if INTERPRETED else PROTOTYPES[name](address)
-        return found
+            function = self._known[name] = interpreted[address] if INTERPRETED else PROTOTYPES[name](address)
+        return function
 
 
 def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
@@ -261,12 +261,12 @@ def reached(source: str) -> dict[str, str]:
 
     Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
     """
-    found: dict[str, str] = {}
+    source_texts: dict[str, str] = {}
     waiting = sorted(sources.imported(source))
     while waiting:
         name = waiting.pop()
-        module = SOURCES.module(name) if name.startswith(CODE) and name not in found else None
+        module = SOURCES.module(name) if name.startswith(CODE) and name not in source_texts else None
         if module is not None and not module.package:
-            found[name] = module.digest
+            source_texts[name] = module.digest
             waiting.extend(module.own)
-    return found
+    return source_texts

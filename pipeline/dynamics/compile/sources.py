@@ -39,12 +39,12 @@ Imports = list[tuple[str, str]]  #: (module, name) each
 
 def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
     """Source by name of what it compiles, in the order of which calls which."""
-    found = {"evaluate": _evaluate(parts)}
+    by_name = {"evaluate": _evaluate(parts)}
     if parts.closures:
-        found["project"] = _project(parts)
+        by_name["project"] = _project(parts)
     if integrators.INTEGRATORS[scheme.integrator].retracts:
-        found["retract"] = _retract(parts)
-    return found | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
+        by_name["retract"] = _retract(parts)
+    return by_name | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
 
 
 def modules(scene: Scene) -> tuple[str, ...]:
@@ -52,8 +52,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
     Raises InputError when a name is not listed in its family.
     """
-    found, parts = {part.module for part in named(scene)}, most_parts(scene)
-    return tuple(sorted(found.union(*(_composed(parts, scheme) for scheme in schemes(scene)))))
+    names, parts = {part.module for part in named(scene)}, most_parts(scene)
+    return tuple(sorted(names.union(*(_composed(parts, scheme) for scheme in schemes(scene)))))
 
 
 @cache

@@ -81,8 +81,8 @@ def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Bounds:
         for q in asked:
             adjoint = lever.adjoint(shown(model, poses, q.owner, turning=q.kind == "orientation"))
             if not whole or adjoint.free > FREE:
-                for found in clearance.values():
-                    found[q.name] = np.inf
+                for bound in clearance.values():
+                    bound[q.name] = np.inf
                 continue
             for name in loose:
                 reach = lever.clearance(name, adjoint.rows) * _play(full.contacts()[name], load[name])
@@ -160,26 +160,26 @@ def _wrenches(joint: Constraint, poses: Sequence[Placement]) -> np.ndarray:
     from flexclear.pipeline.dynamics.model.constraints import prescribed
 
     A, B = joint.frames(poses)
-    found = demands(joint.edge.kind, A, B)[1]
-    return np.vstack([found, prescribed(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else found
+    demanded = demands(joint.edge.kind, A, B)[1]
+    return np.vstack([demanded, prescribed(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else demanded
 
 
 def shown(model: Model, poses: Sequence[Placement], body: str, *, turning: bool) -> np.ndarray:
     """Motion of a body, (3, 6 (links - 1)): of its centre of mass [m], or its turn [rad]."""
     i = model.mechanism.link_of[body]
-    found = np.zeros((3, 6 * (len(poses) - 1)))
+    matrix = np.zeros((3, 6 * (len(poses) - 1)))
     if i == 0:
-        return found
+        return matrix
     turn, shift = slice(6 * i - 6, 6 * i - 3), slice(6 * i - 3, 6 * i)
     if turning:
-        found[:, turn] = np.eye(3)
-        return found
+        matrix[:, turn] = np.eye(3)
+        return matrix
     link = model.mechanism.links[i]
     middle = poses[i].of(Placement(link.inertia.com if link.inertia is not None else np.zeros(3))).p
     arm = centre(model, poses, body) - middle
-    found[:, shift] = model.mechanism.length * np.eye(3)
-    found[:, turn] = -np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
-    return found
+    matrix[:, shift] = model.mechanism.length * np.eye(3)
+    matrix[:, turn] = -np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
+    return matrix
 
 
 def centre(model: Model, poses: Sequence[Placement], body: str) -> np.ndarray:
@@ -232,7 +232,7 @@ def openings(
     i = model.mechanism.link_of[name]
     place = poses[i].of(model.mechanism.links[i].places[name])
     frames = [str(frame) for frame in bundle["frame"].values]
-    found, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, Carried]()
+    matrix, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, Carried]()
     for body, frame in _carried(model.scene, name).items():
         k = frames.index(frame)
         u = place.R @ bundle["frame_translation_shape"].values[k]
@@ -245,41 +245,41 @@ def openings(
             unit = np.where(np.any(wrench[:, 3:] != 0.0, axis=1), 1.0 / lever.length, 1.0)
             for end, sign in ((constraint.edge.frame_a, -1.0), (constraint.edge.frame_b, 1.0)):
                 if _held_by(end, body, name, frame):
-                    found[rows] += sign * unit[:, None] * (wrench @ twist)
-    return found, carried
+                    matrix[rows] += sign * unit[:, None] * (wrench @ twist)
+    return matrix, carried
 
 
 def _ports(scene: Scene, name: str) -> dict[str, tuple[str, float]]:
     """The joints of a body: frame of the body, and the sign of the wrench that acts on it."""
-    found = {}
+    ports = {}
     for joint, part in scene.joint.items():
         for end, sign in zip(part.between, (-1.0, 1.0), strict=True):
             body, _, frame = end.partition(".")
             if body == name:
-                found[joint] = (frame, sign)
-    return found
+                ports[joint] = (frame, sign)
+    return ports
 
 
 def _carried(scene: Scene, name: str) -> dict[str, str]:
     """Bodies fixed to a body, by its frame that carries them; the body itself by each frame with another joint."""
     fixed = [part.between for part in scene.joint.values() if part.type == "fixed"]
-    found: dict[str, str] = {}
+    carriers: dict[str, str] = {}
     open_ends = []
     for a, b in fixed:
         for here, there in ((a, b), (b, a)):
             if here.partition(".")[0] == name:
-                found[there.partition(".")[0]] = here.partition(".")[2]
+                carriers[there.partition(".")[0]] = here.partition(".")[2]
                 open_ends.append(there.partition(".")[0])
     while open_ends:
         body = open_ends.pop()
         for a, b in fixed:
             for here, there in ((a, b), (b, a)):
                 other = there.partition(".")[0]
-                if here.partition(".")[0] == body and other not in found and other != name:
-                    found[other] = found[body]
+                if here.partition(".")[0] == body and other not in carriers and other != name:
+                    carriers[other] = carriers[body]
                     open_ends.append(other)
     own = [frame for joint, (frame, _) in _ports(scene, name).items() if scene.joint[joint].type != "fixed"]
-    return found | {f"{name}.{frame}": frame for frame in own}
+    return carriers | {f"{name}.{frame}": frame for frame in own}
 
 
 def _held_by(end: str, carried: str, name: str, frame: str) -> bool:

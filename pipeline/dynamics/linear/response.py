@@ -85,17 +85,19 @@ def response(
     forces = np.hstack(
         [clearance_response.modal_forces(model, motions, n, b, loads, every)[once] for n, b in bundles.items()]
     )
-    joints, found = constraints(model.mechanism), list[Response]()
+    joints, responses = constraints(model.mechanism), list[Response]()
     for row in np.unique(np.linspace(0, len(once) - 1, LOOKS).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
         assembled = _assembled(model, clearance_response.lever_of(model, joints, poses), poses, bundles)
         if assembled is None:
             return unknown
-        found.append(_at(assembled, forces, time, chosen))
-    worst = {q.name: max(r.influence[q.name] for r in found) for q in chosen}
-    felt = [r for r in found if np.isfinite(r.excited)]
+        responses.append(_at(assembled, forces, time, chosen))
+    worst = {q.name: max(r.influence[q.name] for r in responses) for q in chosen}
+    felt = [r for r in responses if np.isfinite(r.excited)]
     excited = min((r.excited for r in felt), default=np.nan)
-    return Response(min(r.first for r in found), excited, max((r.amplification for r in felt), default=np.nan), worst)
+    return Response(
+        min(r.first for r in responses), excited, max((r.amplification for r in felt), default=np.nan), worst
+    )
 
 
 @dataclass(frozen=True)
@@ -219,11 +221,11 @@ def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Seq
             influence[q.name] = float((amplitude @ (size * omega**2)).max())
         else:
             influence[q.name] = np.inf
-    found = first_excited(forces, assembled.modes[-forces.shape[1] :])
-    if found is None:
+    excitation = first_excited(forces, assembled.modes[-forces.shape[1] :])
+    if excitation is None:
         return Response(float(omega[0] / (2.0 * np.pi)), np.nan, np.nan, influence)
-    reached = (np.abs(still) + amplitude)[:, found].max() / np.abs(still[:, found]).max()
-    first, excited = (float(omega[k] / (2.0 * np.pi)) for k in (0, found))
+    reached = (np.abs(still) + amplitude)[:, excitation].max() / np.abs(still[:, excitation]).max()
+    first, excited = (float(omega[k] / (2.0 * np.pi)) for k in (0, excitation))
     return Response(first, excited, float(reached), influence)
 
 
@@ -251,14 +253,14 @@ def vibration(f: np.ndarray, omega: np.ndarray, time: np.ndarray) -> np.ndarray:
     steps = np.diff(time)
     slope = np.diff(still, axis=0) / steps[:, None]
     z = -still[0] + 1j * slope[0] / omega  # d + i times minus its rate over omega, in the turning frame
-    found = np.empty(still.shape)
-    found[0] = np.abs(z)
+    amplitude = np.empty(still.shape)
+    amplitude[0] = np.abs(z)
     for k, step in enumerate(steps):
         z = z * np.exp(1j * omega * step)
         if k + 1 < len(slope):
             z = z + 1j * (slope[k + 1] - slope[k]) / omega
-        found[k + 1] = np.abs(z)
-    return found
+        amplitude[k + 1] = np.abs(z)
+    return amplitude
 
 
 def _reaction(assembled: _Assembled, joint: str) -> np.ndarray:

@@ -69,11 +69,11 @@ class Arrays:
 @cache
 def _neighbours() -> dict[int, tuple[bool, int | None]]:
     """Of each wiring or number table, by its place: whether it is wiring, and the place of the one after it."""
-    found: dict[int, tuple[bool, int | None]] = {}
+    neighbours: dict[int, tuple[bool, int | None]] = {}
     for array in ("h", "f"):
         places = [table.place for table in m.TABLES[array]]
-        found |= {place: (array == "h", after) for place, after in zip(places, [*places[1:], None], strict=True)}
-    return found
+        neighbours |= {place: (array == "h", after) for place, after in zip(places, [*places[1:], None], strict=True)}
+    return neighbours
 
 
 def rows(table: Any, entries: Any) -> np.ndarray:

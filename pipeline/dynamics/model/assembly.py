@@ -65,14 +65,14 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
 
 def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> Mechanism:
     """The mechanism with links without poses put where the joints allow it; InputError where they do not."""
-    found = assemblies(mechanism, joints, placed, starts)
-    if not found:
+    candidates = assemblies(mechanism, joints, placed, starts)
+    if not candidates:
         _refuse_starts(mechanism, joints, placed, starts)
         driven = any(joint.values for joint in joints)
         if driven and assemblies(mechanism, [replace(joint, values={}) for joint in joints], placed, starts):
             raise _out_of_reach(mechanism, joints)
         raise _impossible(mechanism, joints, [link.start for link in mechanism.links])
-    return replace(settled(mechanism, found[0].poses), choice=chosen(mechanism, joints, found, starts))
+    return replace(settled(mechanism, candidates[0].poses), choice=chosen(mechanism, joints, candidates, starts))
 
 
 def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:

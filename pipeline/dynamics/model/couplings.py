@@ -91,12 +91,12 @@ def _coupling(mechanism: Mechanism, name: str) -> Coupling:
 
 def _side(mechanism: Mechanism, text: str, place: str) -> Side:
     scene = mechanism.scene
-    joint, found = named_coordinate(scene, text, place)
+    joint, coordinate = named_coordinate(scene, text, place)
     frames = scene.joint[joint].between
     sites = [mechanism.site(frame) for frame in frames]
     if sites[0].link == sites[1].link:
         raise InputError(place, f"the bodies of joint '{joint}' move as one", "name another joint")
-    return Side(joint, found, *sites)
+    return Side(joint, coordinate, *sites)
 
 
 def tables(

@@ -75,15 +75,15 @@ def misses(
     """
     placed = given_links(mechanism)
     driven = [joint for joint in joints if joint.values and {joint.link_a, joint.link_b} <= placed]
-    found = [miss for joint in driven for miss in _of_joint(joint, poses)]
+    collected = [miss for joint in driven for miss in _of_joint(joint, poses)]
     for link in mechanism.links:
         edge = link.branch.edge
         if edge is None or edge.kind != PATH or link.massless:
             continue
         site = mechanism.site(edge.frame_b)
         if site.link in placed:
-            found += _of_path(mechanism, edge, poses[site.link].of(start_place(mechanism, site)), given)
-    return [miss for miss in found if miss.drive not in given]
+            collected += _of_path(mechanism, edge, poses[site.link].of(start_place(mechanism, site)), given)
+    return [miss for miss in collected if miss.drive not in given]
 
 
 def given_links(mechanism: Mechanism) -> set[int]:
@@ -129,12 +129,12 @@ def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str,
         yield Miss(name, f"[drive.{name}]", rule, what, float(now[k]), value, k >= 3, True)
 
 
-def refuse_far(mechanism: Mechanism, found: Sequence[Miss]) -> None:
+def refuse_far(mechanism: Mechanism, far: Sequence[Miss]) -> None:
     """InputError for poses given that contradict a joint's drive by more than a mend may move them.
 
     What a path leads is put where the path begins, however far that is, and told: the path says where the body is.
     """
-    for miss in found:
+    for miss in far:
         if miss.of_path:
             continue
         limit = FAR_ANGLE if miss.turning else FAR * mechanism.length
@@ -176,7 +176,7 @@ def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
 
     now: frames of all links at the start.
     """
-    found = []
+    corrections = []
     for i in sorted(given_links(mechanism) - {0}):
         before, after = mechanism.placed[i], now[i]
         apart = float(np.linalg.norm(after.p - before.p)) / mechanism.length
@@ -184,9 +184,11 @@ def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
         amounts = [f"moved by {apart * mechanism.length:.3g} m"] if apart > WRITTEN else []
         amounts += [f"turned by {turned:.3g} rad ({np.degrees(turned):.3g} deg)"] if turned > WRITTEN else []
         if amounts:
-            found.append((apart + turned, f"{', '.join(mechanism.links[i].group.places)} {' and '.join(amounts)}"))
-    if not found:
+            corrections.append(
+                (apart + turned, f"{', '.join(mechanism.links[i].group.places)} {' and '.join(amounts)}")
+            )
+    if not corrections:
         return []
-    told = [text for _, text in sorted(found, reverse=True)]
+    told = [text for _, text in sorted(corrections, reverse=True)]
     more = [f"and {len(told) - MOST} more bodies"] if len(told) > MOST else []
     return [f"the start was mended so that joints and drives fit: {'; '.join([*told[:MOST], *more])}"]

@@ -159,24 +159,24 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
 
     y: state at the start.  frames, sites: of all links and sites there, named fields of LINK_FRAMES and SITE_FRAMES.
     """
-    wanted, found, unit = with_velocities(model), [], _units(model)
+    wanted, changes, unit = with_velocities(model), [], _units(model)
     given = _given(wanted)
     limit = WRITTEN * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
     for name, row in zip(wanted, given, strict=True):
         apart = np.abs(centre_of(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
         if np.nanmax(apart / unit) > limit:
             turning, moving = np.fmax.reduce(apart.reshape(2, 3), axis=1, initial=0.0)
-            found.append(
+            changes.append(
                 f"the start velocities given for {name} were mended so that joints and drives allow them: by up to "
                 f"{moving:.3g} m/s and {turning:.3g} rad/s"
             )
     for rate in given_rates(model):
         apart = abs(rate.of(sites, y[model.speeds]) - rate.wanted)
         if apart > WRITTEN * (_slow(model) * rate.size + abs(rate.wanted)):
-            found.append(
+            changes.append(
                 f"the start velocity {rate.place} was mended so that joints and drives allow it: by {apart:.3g}"
             )
-    return found
+    return changes
 
 
 def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
@@ -184,7 +184,7 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
 
     Raises InputError where they are far from that.
     """
-    found = []
+    changes = []
     for i, q in model.mechanism.deformation.items():
         mine, name = model.numbering.modal_positions[i], model.links[i].flexible
         apart, largest = float(np.max(np.abs(z[mine] - y[mine]))), float(np.max(np.abs(q), initial=0.0))
@@ -196,11 +196,11 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
                 "give another one, or replace a joint by one that leaves more motion",
             )
         if apart > WRITTEN * max(largest, WRITTEN * unit):
-            found.append(
+            changes.append(
                 f"the deformation given for {name} was mended so that joints and drives allow it: by up to {apart:.3g} "
                 "m"
             )
-    return found
+    return changes
 
 
 def _given(wanted: dict[str, RigidBody | FlexibleBody]) -> np.ndarray:

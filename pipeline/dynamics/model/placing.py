@@ -51,7 +51,7 @@ def assemblies(
     """
     hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
     known = {(j.name, k): value for j in joints for k, value in j.values.items()}
-    random, found, aim = np.random.default_rng(0), list[Assembly](), dict[tuple[str, int], float]()
+    random, distinct, aim = np.random.default_rng(0), list[Assembly](), dict[tuple[str, int], float]()
     for k in range(GUESSES):
         guess = _guess(mechanism, joints, placed, hints | known, random if k else None, k / GUESSES)
         if k == 0:
@@ -62,12 +62,12 @@ def assemblies(
         if poses is None or opposite(joints, poses) is not None:
             continue
         made = Assembly(poses, _coordinates(joints, poses))
-        if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME for other in found):
-            found.append(made)
+        if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME for other in distinct):
+            distinct.append(made)
         if not _isolated(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < NEAR:
             break  # a mechanism that can move is assembled where it was first looked for
     return sorted(
-        found,
+        distinct,
         key=lambda one: (
             _distance(mechanism, joints, one.coordinates, hints),
             _distance(mechanism, joints, one.coordinates, aim),
@@ -76,24 +76,24 @@ def assemblies(
 
 
 def chosen(
-    mechanism: Mechanism, joints: Sequence[Constraint], found: Sequence[Assembly], starts: Sequence[Given]
+    mechanism: Mechanism, joints: Sequence[Constraint], candidates: Sequence[Assembly], starts: Sequence[Given]
 ) -> str:
     """What is said of several assemblies of which the scene chooses none; else nothing."""
-    first = found[0]
-    if len(found) < 2 or not _isolated(mechanism, list(joints), first.poses):
+    first = candidates[0]
+    if len(candidates) < 2 or not _isolated(mechanism, list(joints), first.poses):
         return ""
     hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
-    told = [_distance(mechanism, joints, one.coordinates, hints) for one in found]
+    told = [_distance(mechanism, joints, one.coordinates, hints) for one in candidates]
     if hints and told[1] - told[0] > SAME:
         return ""
     units = {(j.name, k): c for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
-    apart = {key: abs(first.coordinates[key] - found[1].coordinates[key]) for key in first.coordinates}
+    apart = {key: abs(first.coordinates[key] - candidates[1].coordinates[key]) for key in first.coordinates}
     name, k = max(apart, key=lambda key: apart[key])
     coordinate, several = units[name, k], len([key for key in units if key[0] == name]) > 1
     label = f"{name}.{coordinate.name}" if several else name
-    values = ", ".join(f"{one.coordinates[name, k]:.4g}" for one in found[1:])
+    values = ", ".join(f"{one.coordinates[name, k]:.4g}" for one in candidates[1:])
     return (
-        f"the joints can be assembled in {len(found)} ways, and the scene does not say in which: it starts with "
+        f"the joints can be assembled in {len(candidates)} ways, and the scene does not say in which: it starts with "
         f"{label} at {first.coordinates[name, k]:.4g} {coordinate.unit}, elsewhere it is at {values}; "
         f"[start.joint.{label}] near = ... chooses"
     )
@@ -143,13 +143,13 @@ def _motion(
 
 
 def _coordinates(joints: Sequence[Constraint], poses: Sequence[Placement]) -> dict[tuple[str, int], float]:
-    found = dict[tuple[str, int], float]()
+    coordinates = dict[tuple[str, int], float]()
     for joint in joints:
         A, B = joint.frames(poses)
         declared, relative = joint_class(joint.edge.kind), A.inverse().of(B)
         now = declared.coordinates(relative.R, relative.p)
-        found |= {(joint.name, k): float(now[k]) for k in range(len(declared.COORDINATES))}
-    return found
+        coordinates |= {(joint.name, k): float(now[k]) for k in range(len(declared.COORDINATES))}
+    return coordinates
 
 
 def _distance(mechanism: Mechanism, joints: Sequence[Constraint], one: Hints, other: Hints) -> float:

@@ -155,14 +155,14 @@ def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
 
 def coordinates_of_rows(model: Model, h: np.ndarray, chosen: np.ndarray) -> np.ndarray:
     """Which free coordinates the closures of the chosen kept rows depend on; masks (kept rows,) -> (nv,)."""
-    support, found = model.arrays.table(m.SUPPORT)["coordinate"], np.zeros(model.nv, dtype=bool)
+    support, mask = model.arrays.table(m.SUPPORT)["coordinate"], np.zeros(model.nv, dtype=bool)
     for c in model.arrays.table(m.CLOSURES, h):
         if np.any(chosen[c["kept0"] : c["kept0"] + c["n_kept"]]):
-            found[support[c["support0"] : c["support0"] + c["n_support"]]] = True
+            mask[support[c["support0"] : c["support0"] + c["n_support"]]] = True
     for body in model.arrays.table(m.FLEXES):  # of which a closure may depend on some shapes
         modes = slice(body["c0"], body["c0"] + body["n_modes"])
-        found[modes] = np.any(found[modes])
-    return found
+        mask[modes] = np.any(mask[modes])
+    return mask
 
 
 def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:

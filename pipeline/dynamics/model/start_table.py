@@ -45,7 +45,7 @@ def given_coordinates(scene: Scene) -> list[Given]:
 
     Raises InputError for joints and coordinates that are not there, and for units that do not fit.
     """
-    found = []
+    rows = []
     for joint, coordinates in (scene.start.joint if scene.start is not None else {}).items():
         for name, start in coordinates.items():
             place = f"[start.joint.{joint}.{name}]" if name else f"[start.joint.{joint}]"
@@ -59,8 +59,8 @@ def given_coordinates(scene: Scene) -> list[Given]:
                     ("velocity", rate),
                 )
             ]
-            found.append(Given(joint, number, coordinate, place, *values))
-    return found
+            rows.append(Given(joint, number, coordinate, place, *values))
+    return rows
 
 
 def _measure(value: float | str | None, dimension: str, place: str) -> float | None:

@@ -48,10 +48,10 @@ def ends(scene: Scene, length: float) -> list[tuple[str, End]]:
 
     length: size of the mechanism [m].
     """
-    found = []
+    listed = []
     for name, stop in scene.stop.items():
-        found += [(f"{name}.{side}", end) for side, end in _both(scene, name, stop, length).items()]
-    return found
+        listed += [(f"{name}.{side}", end) for side, end in _both(scene, name, stop, length).items()]
+    return listed
 
 
 def _both(scene: Scene, name: str, stop: Stop, length: float) -> dict[str, End]:

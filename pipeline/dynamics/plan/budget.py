@@ -99,11 +99,11 @@ class Search:
 def with_doubt(search: Search, apart: Mapping[str, Influence], soft: bool, more: float = 0.0) -> dict[str, Influence]:
     """With what pilots may be wrong by, what flexible bodies may change of the impacts, and a share `more`."""
     kinds = {q.name: q.kind for q in search.pilots.chosen}
-    found = {}
+    doubled = {}
     for name, i in apart.items():
         share = more + OF_PILOT + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
-        found[name] = Influence(i.difference, i.uncertainty + share * i.difference)
-    return found
+        doubled[name] = Influence(i.difference, i.uncertainty + share * i.difference)
+    return doubled
 
 
 def too_much(most: Mapping[str, float], wanted: Mapping[str, float]) -> str:

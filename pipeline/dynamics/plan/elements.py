@@ -71,5 +71,5 @@ def _matrix(bundle: xr.Dataset) -> np.ndarray:
     """Motions of all frames under unit loads there, shape (6 frames, 6 frames), in the body frame."""
     shapes = np.concatenate([bundle["frame_translation_shape"].values, bundle["frame_rotation_shape"].values], axis=1)
     moved = shapes.reshape(-1, shapes.shape[-1])
-    found: np.ndarray = moved @ np.linalg.solve(bundle["modal_stiffness"].values, moved.T)
-    return found
+    compliance: np.ndarray = moved @ np.linalg.solve(bundle["modal_stiffness"].values, moved.T)
+    return compliance

@@ -139,10 +139,10 @@ class Pilots:
         if key not in self.points:
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
             starts = members if scene.contacts() or scene.stop else 0
-            found = Runner(mine, kept(scene.owners(), self.chosen), starts).run(members_apart(scene))
-            self.points[key] = found
-            self.evaluations += found.evaluations
-            self.work += found.evaluations * self._variables(mine)
+            measured = Runner(mine, kept(scene.owners(), self.chosen), starts).run(members_apart(scene))
+            self.points[key] = measured
+            self.evaluations += measured.evaluations
+            self.work += measured.evaluations * self._variables(mine)
         return self.points[key]
 
     def modes(self, level: int, bodies: Collection[str]) -> dict[str, int]:
@@ -163,13 +163,13 @@ class Pilots:
 
         Raises SolverError where it is refused then, too, for another reason than that it takes long.
         """
-        found = self.point(gone, share=share, members=members)
-        if found.refused and TAKES_LONG not in found.refused:
+        point = self.point(gone, share=share, members=members)
+        if point.refused and TAKES_LONG not in point.refused:
             self.refused_loose = True
-            found = self.point(gone, share=share, members=members, rtol=RTOL)
-        if found.refused and TAKES_LONG not in found.refused:
-            raise SolverError(f"{self.scene.name}: the scene cannot be run as it stands: {found.refused}")
-        return found
+            point = self.point(gone, share=share, members=members, rtol=RTOL)
+        if point.refused and TAKES_LONG not in point.refused:
+            raise SolverError(f"{self.scene.name}: the scene cannot be run as it stands: {point.refused}")
+        return point
 
     def between(self, a: Point, b: Point) -> dict[str, Influence]:
         """How far two of them are apart in each quantity; infinitely where one of them was refused."""

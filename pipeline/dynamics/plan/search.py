@@ -104,10 +104,10 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
     free = [effect for effect in loose if effect.owner not in asked]
     if not free:
         return
-    pilots, found = search.pilots, dict[str, Mapping[str, float]]()
+    pilots, bounded = search.pilots, dict[str, Mapping[str, float]]()
     if rigid is not None and any(q.kind in OF_POSE for q in pilots.chosen):
-        found = dict(bounds(pilots.scene, rigid, pilots.chosen).clearance)
-    reach = {effect.name: found.get(effect.owner, {}) for effect in free}
+        bounded = dict(bounds(pilots.scene, rigid, pilots.chosen).clearance)
+    reach = {effect.name: bounded.get(effect.owner, {}) for effect in free}
     total = summed(reach.values(), search.wanted)
     if search.fits(total, BY_BOUND):
         search.spend(total)
@@ -214,13 +214,17 @@ def _with_margin(influence: Mapping[str, float]) -> dict[str, float]:
     return {name: OF_RESPONSE * value for name, value in influence.items()}
 
 
-def _vibrating(found: Response) -> str:
+def _vibrating(estimated: Response) -> str:
     """The first vibration of the assembled mechanism, and how large loads of the motion make the first they excite."""
-    first = f"the mechanism's first frequency is {found.first:.3g} Hz"
-    if np.isnan(found.excited):
+    first = f"the mechanism's first frequency is {estimated.first:.3g} Hz"
+    if np.isnan(estimated.excited):
         return f"{first}, and the loads of the ideal motion excite no vibration"
-    which = "that vibration" if found.excited == found.first else f"the first they excite, of {found.excited:.3g} Hz,"
-    size = f"{found.amplification:.2g} times its quasi-static value"
+    which = (
+        "that vibration"
+        if estimated.excited == estimated.first
+        else f"the first they excite, of {estimated.excited:.3g} Hz,"
+    )
+    size = f"{estimated.amplification:.2g} times its quasi-static value"
     return f"{first}, and the loads of the ideal motion take {which} to {size}"
 
 
@@ -295,14 +299,14 @@ def _chosen(search: Search) -> Chosen:
 
 def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dict[str, Mesh]:
     """The finite elements of bodies that stay flexible, judged by what their flexibility does."""
-    scene, found = search.pilots.scene, {}
+    scene, numbers = search.pilots.scene, {}
     for body, (given, finer) in meshes.items():
         decision = search.decisions.get(f"body.{body}.modes")
         if decision is not None and decision.kept:
             bending = {n: v + decision.uncertainty.get(n, 0.0) for n, v in decision.estimate.items()}
             duration = scene.time.end - scene.time.start
-            found[body] = mesh(given, search.pilots.bundles[body], finer, bending, search.wanted, duration)
-    return found
+            numbers[body] = mesh(given, search.pilots.bundles[body], finer, bending, search.wanted, duration)
+    return numbers
 
 
 def _finished(

@@ -28,9 +28,9 @@ def smooth(pilots: Pilots, gone: Sequence[Effect], wanted: Mapping[str, float], 
     """
     if not pilots.variant(gone).flexible():
         return _loosest(pilots, gone, wanted, DEFAULT, TRIED, RTOL, level)
-    found = _loosest(pilots, gone, wanted, SMOOTH, STIFF_TRIED, SMOOTH_RTOL, level)
-    if found.rtol > SMOOTH_RTOL or _within(found.error, wanted):
-        return found
+    choice = _loosest(pilots, gone, wanted, SMOOTH, STIFF_TRIED, SMOOTH_RTOL, level)
+    if choice.rtol > SMOOTH_RTOL or _within(choice.error, wanted):
+        return choice
     unknown, own = dict.fromkeys(wanted, np.nan), own_method(pilots.scene)
     if own is None:
         return Chosen(DEFAULT, TIGHT, unknown, level)

@@ -100,13 +100,13 @@ def subject(scene: Scene) -> str:
 
 def references(scene: Scene) -> str:
     """Publications of the methods that the scene's parts stand for, one a line."""
-    found = list[str]()
+    sources = list[str]()
     for name in sorted({part.module for part in named(scene)}):
         module = import_module(name)
         own = [thing for thing in vars(module).values() if getattr(thing, "__module__", None) == name]
         for thing in (module, *own):
-            found += cited(getattr(thing, "__doc__", None))
-    return "\n".join(dict.fromkeys(found))
+            sources += cited(getattr(thing, "__doc__", None))
+    return "\n".join(dict.fromkeys(sources))
 
 
 def attributes(scene: Scene) -> dict[str, str]:
@@ -230,12 +230,12 @@ def _joints(model: Model) -> dict[str, object]:
     """Names of the joints, their types, and what they join."""
     joints, frames = model.scene.joint, model.mechanism.frames
     between = [joint.between for joint in joints.values()]
-    found: dict[str, object] = {"joint": list(joints)}
-    found["joint_type"] = ("joint", [joint.type for joint in joints.values()])
+    coordinates: dict[str, object] = {"joint": list(joints)}
+    coordinates["joint_type"] = ("joint", [joint.type for joint in joints.values()])
     for k, side in enumerate(("first", "second")):
-        found[f"joint_{side}_frame"] = ("joint", [pair[k] for pair in between])
-        found[f"joint_{side}_body"] = ("joint", [frames[pair[k]].body for pair in between])
-    return found if joints else {"joint": []}
+        coordinates[f"joint_{side}_frame"] = ("joint", [pair[k] for pair in between])
+        coordinates[f"joint_{side}_body"] = ("joint", [frames[pair[k]].body for pair in between])
+    return coordinates if joints else {"joint": []}
 
 
 def _modes(motions: Motions) -> Part:

@@ -67,15 +67,15 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
     with abreast(engine, wanted.members, width(), progress) as crews:
         if crews is None:
-            found = side_by_side(alone, wanted.members, done)
+            runs = side_by_side(alone, wanted.members, done)
         else:
 
             def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
                 with crews.place() as place:
                     return alone(k, alive, place)
 
-            found = side_by_side(member, wanted.members, done, crews.lanes)
-    members, reasons = [one for one, _ in found], [switched for _, switched in found if switched]
+            runs = side_by_side(member, wanted.members, done, crews.lanes)
+    members, reasons = [one for one, _ in runs], [switched for _, switched in runs if switched]
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
     told = {"switched": f"{len(reasons)} of {wanted.members} members, the first {reasons[0]}"} if reasons else {}
     told |= attributes(scene) | {"title": f"{wanted.members} motions of {subject(scene)}"}

@@ -141,9 +141,9 @@ class Motions:
 
     def positions(self, names: Sequence[str]) -> np.ndarray:
         """Origins of named frames, kernels' origin, shape (time, frame, 3)."""
-        found = np.take(self.seen.frame_position, [self._frames[name] for name in names], axis=1)
-        self._bend(found, names)
-        return found
+        origins = np.take(self.seen.frame_position, [self._frames[name] for name in names], axis=1)
+        self._bend(origins, names)
+        return origins
 
     @cached_property
     def every_frame(self) -> np.ndarray:
@@ -152,7 +152,7 @@ class Motions:
             return self.seen.frame_position
         return self.positions(list(self._frames))
 
-    def _bend(self, found: np.ndarray, names: Sequence[str]) -> None:
+    def _bend(self, positions: np.ndarray, names: Sequence[str]) -> None:
         """Move those frames, of which some are named, that are on bent bodies."""
         if self.model.mechanism.all_rigid:
             return
@@ -163,7 +163,7 @@ class Motions:
                 label = name.partition(".")[2]
                 S = bundle["frame_translation_shape"].sel(frame=label).values
                 bent = place.p + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
-                found[:, k] = link.p + turned(link.R, bent)
+                positions[:, k] = link.p + turned(link.R, bent)
 
     @cached_property
     def frame_positions(self) -> dict[str, np.ndarray]:

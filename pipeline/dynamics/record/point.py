@@ -104,15 +104,15 @@ class Runner:
         if in_sections(self.kept):
             values, count = _sections(engine, self.kept, alive)
             return values, {}, count
-        found, count = list[Values](), 0
+        rows, count = list[Values](), 0
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, alive, other)
             with self._looking:
-                found.append(_kept(last, trajectory, self.kept))
+                rows.append(_kept(last, trajectory, self.kept))
             count += trajectory.counters["evaluations"]
         if not self.members:
-            return found[0], {}, count
-        stacked = {name: np.stack([values[name] for values in found]) for name in found[0]}
+            return rows[0], {}, count
+        stacked = {name: np.stack([values[name] for values in rows]) for name in rows[0]}
         means = {name: values.mean(axis=0) for name, values in stacked.items()}
         return means, {name: values.std(axis=0, ddof=1) for name, values in stacked.items()}, count
 
@@ -166,11 +166,11 @@ def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Kept]) -> Value
             continue
         if one.quantity.name not in series:
             series[one.quantity.name] = _series(motions, forces, one)
-        found = series[one.quantity.name]
+        recorded = series[one.quantity.name]
         if one.reduction == "series":
-            value = found[_regular(engine, trajectory.time)]
+            value = recorded[_regular(engine, trajectory.time)]
         else:
-            value = reduced(trajectory.time, found, one.reduction)
+            value = reduced(trajectory.time, recorded, one.reduction)
         values[one.name] = value if "axis" in one.dims or "quat" in one.dims else value.reshape(value.shape[:1])
     return values
 

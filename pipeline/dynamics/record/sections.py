@@ -58,7 +58,7 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     count = wanted.transient + wanted.periods
     followed = range(wanted.transient, min(count, wanted.transient + wanted.exponent_periods))
     tape, begin = _Tape(names, engine.start + wanted.phase), Cursor()
-    kept = _Kept.found(engine, start)
+    kept = _Recorder.of(engine, start)
     if kept is not None and kept.state is not None:
         remember(engine, kept.state.arrays)
         tape.unpack(kept.state.arrays)
@@ -104,7 +104,7 @@ def section_period(scene: Scene) -> float:
 
 
 @dataclass
-class _Kept:
+class _Recorder:
     """What the task's journal knows of these sections: what an earlier attempt left, if anything."""
 
     journal: Journal
@@ -113,13 +113,13 @@ class _Kept:
     state: State | None
 
     @staticmethod
-    def found(engine: Engine, start: np.ndarray) -> _Kept | None:
+    def of(engine: Engine, start: np.ndarray) -> _Recorder | None:
         """None where nothing is kept."""
         current, begun = journal.current(), journal.seconds()
         if current is None:
             return None
         name = current.name(digest(engine, start))
-        return _Kept(current, name, begun, current.find(name))
+        return _Recorder(current, name, begun, current.find(name))
 
     def keep(self, arrays: Mapping[str, np.ndarray], tape: _Tape) -> None:
         """From here on the work can go on without the pieces that led here; the tape is as it is until the next."""

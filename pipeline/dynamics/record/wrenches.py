@@ -57,12 +57,12 @@ def path_wrenches(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, n
 
 def _tree(model: Model, seen: Observed) -> dict[str, Wrench]:
     moment, force = (seen.link_wrenches[field] for field in ("moment", "force"))
-    found = dict[str, Wrench]()
+    wrenches = dict[str, Wrench]()
     for i, link in enumerate(model.links):
         if link.branch.edge is not None:
             sign = -1.0 if link.branch.reverse else 1.0
-            found[link.branch.edge.name] = sign * moment[:, i], sign * force[:, i]
-    return found
+            wrenches[link.branch.edge.name] = sign * moment[:, i], sign * force[:, i]
+    return wrenches
 
 
 def _closures(model: Model, seen: Observed) -> dict[str, Wrench]:

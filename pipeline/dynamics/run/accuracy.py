@@ -92,23 +92,25 @@ class Search:
         errors = {q.name: max(quantities.error(run, r, q) for r in witnesses) for q in wanted}
         return Attempt(rtol, run, errors, max(errors[q.name] / w for q, w in wanted.items()))
 
-    def cheapest(self, found: Attempt) -> Attempt:
+    def cheapest(self, attempt: Attempt) -> Attempt:
         """The attempt, or the run that told its error, where another method made that for less.
 
         How far the two are apart is the error of either at most, unless both err alike; runs that are tighter than both
         are asked as well.
         """
-        finer = found.rtol * FINER
+        finer = attempt.rtol * FINER
         other = self.runs.get(finer)
-        if found.share > ENOUGH or other is None or other.attrs["evaluations"] >= found.run.attrs["evaluations"]:
-            return found
+        if attempt.share > ENOUGH or other is None or other.attrs["evaluations"] >= attempt.run.attrs["evaluations"]:
+            return attempt
         tighter = [run for rtol, run in self.runs.items() if rtol < finer]
         if not tighter:
-            return replace(found, rtol=finer, run=other)
+            return replace(attempt, rtol=finer, run=other)
         wanted = self.wanted(other)
-        errors = {q.name: max(found.errors[q.name], *(quantities.error(other, r, q) for r in tighter)) for q in wanted}
+        errors = {
+            q.name: max(attempt.errors[q.name], *(quantities.error(other, r, q) for r in tighter)) for q in wanted
+        }
         share = max(errors[q.name] / w for q, w in wanted.items())
-        return Attempt(finer, other, errors, share) if share <= ENOUGH else found
+        return Attempt(finer, other, errors, share) if share <= ENOUGH else attempt
 
     def saves(self, rtol: float, looser: float) -> bool:
         """Whether a run at a looser tolerance is foreseen to be so much cheaper that it is worth to be made.

@@ -84,9 +84,9 @@ def directions(engine: Engine, y: np.ndarray) -> list[Direction]:
     """All directions that the drives and the given velocities leave, from the state at the start; few or none."""
     sampler = Sampler(engine)
     seen = _Pose(engine, y)
-    found = seen.directions()
+    tangents = seen.directions()
     sampler.restore()
-    return found
+    return tangents
 
 
 class _Pose:
@@ -265,7 +265,7 @@ def _heard(forms: _Forms, free: np.ndarray) -> np.ndarray:
 
 def _roots(forms: _Forms, homogeneous: bool) -> list[np.ndarray]:
     """Zeros of the forms; of homogeneous ones those of unit length.  Gauss-Newton from starts of a fixed seed."""
-    k, found = forms.B.shape[1], list[np.ndarray]()
+    k, roots = forms.B.shape[1], list[np.ndarray]()
     size = max(float(np.max(np.abs(forms.A), initial=0.0)), float(np.max(np.abs(forms.B), initial=0.0)))
     for start in np.random.default_rng(0).normal(size=(STARTS * k, k)):
         a = start / (np.linalg.norm(start) if homogeneous else 1.0)
@@ -276,6 +276,6 @@ def _roots(forms: _Forms, homogeneous: bool) -> list[np.ndarray]:
             step, *_ = np.linalg.lstsq(gradient, -value, rcond=1e-10)
             a = a + step
         left = np.linalg.norm(np.append(forms.value(a), size * (a @ a - 1.0) if homogeneous else 0.0))
-        if left <= SAME * size and not any(np.linalg.norm(a - b) <= SAME * (1.0 + np.linalg.norm(b)) for b in found):
-            found.append(a)
-    return found
+        if left <= SAME * size and not any(np.linalg.norm(a - b) <= SAME * (1.0 + np.linalg.norm(b)) for b in roots):
+            roots.append(a)
+    return roots

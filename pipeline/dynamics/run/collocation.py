@@ -152,44 +152,44 @@ def collocate(
         used = _far_from_singular(samples, SLOW_LEAST)
     if used.sum() < FEWEST:
         return None
-    found, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
+    evaluated, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
     blur = SLOWLY if lead is not None and lead.turn == 0.0 else max(1.0, (NEAR / share) ** 2)
     for _ in range(TURNS if lead is not None and lead.turn > 0.0 else 1):
-        size = _sizes(sampler.engine, y, [s.slope for s in found])
-        iterated = _iterate(sampler, t, y, span, nodes, found, blur * size)
+        size = _sizes(sampler.engine, y, [s.slope for s in evaluated])
+        iterated = _iterate(sampler, t, y, span, nodes, evaluated, blur * size)
         if iterated is None:
             return None
-        found, slopes, left = iterated
+        evaluated, slopes, left = iterated
         if lead is None or lead.turn == 0.0:
             break
-        better = _speeds_at_start(sampler.engine, y, nodes, [s.y for s in found])
+        better = _speeds_at_start(sampler.engine, y, nodes, [s.y for s in evaluated])
         if not np.max(np.abs(better - y) / size) <= lead.turn:
             return None
         y = better
     series = _series(nodes, slopes, y, span)
-    made = Collocation(t, span, series, found[-1].independence, sampler.evaluations - began)
+    made = Collocation(t, span, series, evaluated[-1].independence, sampler.evaluations - began)
     unresolved = _sensitivity(nodes, slopes, span, blur * size)
     sound = left <= EXACT and unresolved <= SENSITIVE and _open(sampler, made, nodes) <= blur * EXACT
     return made if sound else None
 
 
 def _iterate(
-    sampler: Sampler, t: float, y: np.ndarray, span: float, nodes: np.ndarray, found: list[Sample], size: np.ndarray
+    sampler: Sampler, t: float, y: np.ndarray, span: float, nodes: np.ndarray, evaluated: list[Sample], size: np.ndarray
 ) -> tuple[list[Sample], np.ndarray, float] | None:
     """Picard's iteration from the slopes at the nodes: what is there at last, its slopes, what closing changed."""
-    slopes = np.array([s.slope for s in found])
+    slopes = np.array([s.slope for s in evaluated])
     weights, last, rough = _integrals(nodes, nodes), np.inf, np.inf
     states = y + span * weights @ slopes
     for k in range(ROUNDS):
-        found = [sampler.sample(t + x * span, state) for x, state in zip(nodes, states, strict=True)]
-        if not all(s.sound for s in found):
+        evaluated = [sampler.sample(t + x * span, state) for x, state in zip(nodes, states, strict=True)]
+        if not all(s.sound for s in evaluated):
             return None
-        slopes = np.array([s.slope for s in found])
-        left = float(np.max(np.abs([s.y for s in found] - states) / size))
+        slopes = np.array([s.slope for s in evaluated])
+        left = float(np.max(np.abs([s.y for s in evaluated] - states) / size))
         before, states = states, y + span * weights @ slopes
         change = float(np.max(np.abs(states - before) / size))
         if change <= ROUNDING or (change <= NOISE and change > HELPS * last):
-            return found, slopes, left
+            return evaluated, slopes, left
         unresolved = _sensitivity(nodes, slopes, span, size)
         if not change <= WORSE * last or (k >= EARLY and unresolved > SENSITIVE and unresolved > HELPS * rough):
             return None

@@ -94,16 +94,16 @@ class Engine:
     def pieces(self) -> np.ndarray:
         """Piece of every law between each break and the next, shape (breaks - 1, laws)."""
         starts, laws = self.model.arrays.table(m.PIECES)["start"], self.model.arrays.table(m.LAWS)
-        middles, found = 0.5 * (self.breaks[:-1] + self.breaks[1:]), np.zeros((len(self.breaks) - 1, len(laws)), int)
+        middles, indices = 0.5 * (self.breaks[:-1] + self.breaks[1:]), np.zeros((len(self.breaks) - 1, len(laws)), int)
         for k, (first, count) in enumerate(laws):
             passed = np.searchsorted(starts[first : first + count], middles, side="right")
-            found[:, k] = first + np.maximum(passed - 1, 0)
-        return found
+            indices[:, k] = first + np.maximum(passed - 1, 0)
+        return indices
 
     def segments(self, times: np.ndarray | float, *, after: bool) -> np.ndarray:
         """Number of the segment between breaks that holds each time; on a break, that before it or that `after` it."""
-        found = np.searchsorted(self.breaks, times, side="right" if after else "left") - 1
-        return np.asarray(np.minimum(np.maximum(found, 0), len(self.breaks) - 2))
+        index = np.searchsorted(self.breaks, times, side="right" if after else "left") - 1
+        return np.asarray(np.minimum(np.maximum(index, 0), len(self.breaks) - 2))
 
     def select_pieces_after(self, t: float) -> None:
         """Put the pieces in force that hold right after `t`; an earlier run leaves those of its end."""
@@ -121,10 +121,10 @@ class Engine:
     def connect(self) -> None:
         """Let the steps evaluate with straight code where there is some for the rows solved for."""
         kept, known = self.kept.tobytes(), self.straight
-        found = None
+        compiled = None
         if known.used and kept in known.rows:
-            found = known.crew.wait if known.crew and known.crew.kept == kept else known.addresses.get(kept)
-        self.h[m.RATES] = found or self.h[m.EVALUATE]
+            compiled = known.crew.wait if known.crew and known.crew.kept == kept else known.addresses.get(kept)
+        self.h[m.RATES] = compiled or self.h[m.EVALUATE]
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
         """Step to the end of the segment or of the budget, in this thread or by the crew."""

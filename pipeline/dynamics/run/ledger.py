@@ -111,29 +111,29 @@ def balance(model: Model, seen: Observed) -> Balance:
 def require_closed(model: Model, trajectory: Trajectory, seen: Observed) -> None:
     """SolverError when the run diverges, or its ledger is off by more than the scene's tolerance."""
     _require_bounded(model, trajectory, seen)
-    found, solver = balance(model, seen), model.scene.solver
+    energies, solver = balance(model, seen), model.scene.solver
     tolerance = solver.ledger_tolerance or usual(solver)
-    allowed = tolerance * found.exchanged + found.rounding
-    if found.error[found.worst] <= allowed:
+    allowed = tolerance * energies.exchanged + energies.rounding
+    if energies.error[energies.worst] <= allowed:
         return
-    first = int(np.argmax(~(found.error <= allowed)))
+    first = int(np.argmax(~(energies.error <= allowed)))
     raise SolverError(
         f"at t = {trajectory.time[first]:.6g} s: the energy balance does not close: the error is up to "
-        f"{found.error[found.worst]:.3g} J where {found.exchanged:.3g} J are exchanged (tolerance {tolerance:g}, "
-        f"[solver.ledger_tolerance]); lost so far: {_losses(model, found.totals, first)}; "
+        f"{energies.error[energies.worst]:.3g} J where {energies.exchanged:.3g} J are exchanged "
+        f"(tolerance {tolerance:g}, [solver.ledger_tolerance]); lost so far: {_losses(model, energies.totals, first)}; "
         "choose a smaller rtol or step, or another integrator"
     )
 
 
 def warnings(model: Model, seen: Observed) -> list[str]:
     """Sentence about an energy error above a hundredth of what is exchanged, which the scene's tolerance allows."""
-    found = balance(model, seen)
-    error = float(found.error[found.worst])
-    if error <= DOUBTFUL * found.exchanged + found.rounding:
+    energies = balance(model, seen)
+    error = float(energies.error[energies.worst])
+    if error <= DOUBTFUL * energies.exchanged + energies.rounding:
         return []
     return [
-        f"the energy balance is off by {error:.3g} J, {100.0 * error / found.exchanged:.2g} % of the "
-        f"{found.exchanged:.3g} J that are exchanged: choose a smaller rtol or step"
+        f"the energy balance is off by {error:.3g} J, {100.0 * error / energies.exchanged:.2g} % of the "
+        f"{energies.exchanged:.3g} J that are exchanged: choose a smaller rtol or step"
     ]
 
 

@@ -108,9 +108,9 @@ class Suit:
             other = min((one for one in seen if one != at), key=lambda known: abs(np.log(known / at)))
             told = float(np.log(seen[other] / seen[at]) / np.log(at / other))
             power = float(np.clip(told, LEAST_POWER, LARGEST_POWER))
-        found: float = seen[at] * (at / rtol) ** power
+        expected: float = seen[at] * (at / rtol) ** power
         # where stability limited the run, a looser tolerance saves nothing
-        return max(found, min(self.least, seen[at])) if name == DEFAULT else found
+        return max(expected, min(self.least, seen[at])) if name == DEFAULT else expected
 
     def cost(self, name: str, rtol: float) -> float:
         """What a run is foreseen to take, in evaluations of the default method; nothing where only a run can tell."""
@@ -193,14 +193,14 @@ class Suit:
         return Judges(self._panel(rtol), replace(self, told={}, left=(0.0, 0.0))._panel(rtol))
 
     def _panel(self, rtol: float) -> Panel:
-        found = {}
+        panel = {}
         for name in self.names:
             heir, most = self.heir(name, rtol)
             if not heir:
                 continue
             every = max(int(LOOK * most), LEAST_LOOK)
-            found[name] = (Judge(every, self._verdict(name, heir, max(most, WORTH))), heir)
-        return found
+            panel[name] = (Judge(every, self._verdict(name, heir, max(most, WORTH))), heir)
+        return panel
 
     def _verdict(self, name: str, heir: str, most: float) -> Callable[[Engine, Sequence[Look]], str]:
         """Why an integrator is to be given up for one that takes so much."""

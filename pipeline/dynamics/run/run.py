@@ -73,8 +73,8 @@ def placed(scene: Scene) -> Scene:
     """The scene whose joints and drives place the bodies where the run begins: itself, unless it begins elsewhere."""
     if scene.start is None or scene.start.at is None:
         return scene
-    found: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
-    return found
+    scene_placed: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
+    return scene_placed
 
 
 def driven(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
@@ -94,8 +94,8 @@ def begun(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -
     if scene.start is None or scene.start.at is None:
         return scene, ""
     begin = lookup(STARTS, scene.start.at, where="[start.at]")
-    found: tuple[Scene, str] = begin(scene, bundles, progress)
-    return found
+    started: tuple[Scene, str] = begin(scene, bundles, progress)
+    return started
 
 
 def engines(

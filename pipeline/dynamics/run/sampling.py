@@ -61,7 +61,7 @@ def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
 
 
 def _controllers(engine: Engine) -> list[_Sampled]:
-    model, found = engine.model, []
+    model, controllers = engine.model, []
     for k, (name, _) in enumerate(model.loads):
         load = model.scene.load[name]
         if isinstance(load, SampledPid):
@@ -69,5 +69,5 @@ def _controllers(engine: Engine) -> list[_Sampled]:
             numbers = model.arrays.table(m.LOAD_NUMBERS)["value"][row["number0"] : row["number0"] + 7]
             states = slice(int(row["internal0"]), int(row["internal0"]) + 3)
             part = lookup(LOADS, load.type, where=f"[load.{name}]")
-            found.append(_Sampled(row, numbers, part, states, load.period))
-    return found
+            controllers.append(_Sampled(row, numbers, part, states, load.period))
+    return controllers

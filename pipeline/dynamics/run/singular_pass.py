@@ -160,16 +160,16 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
 
     kept = engine.kept.copy()
     engine.keep(np.ones(len(kept), dtype=bool))
-    low, found = np.array([least(t) for t in times]), list[float]()
+    low, times_of_passes = np.array([least(t) for t in times]), list[float]()
     bounded = np.concatenate([[np.inf], low, [np.inf]])
     for k in np.flatnonzero((low <= bounded[:-2]) & (low <= bounded[2:])):
         bracket = float(times[max(int(k) - 1, 0)]), float(times[min(int(k) + 1, LOOKS)])
         t = float(minimize_scalar(least, bounds=bracket, method="bounded", options={"xatol": NEAR * made.span}).x)
         t = _between(least, float(min((t, *bracket), key=least)), NEARLY * made.span, bracket)
-        if least(t) < VANISHED * np.max(low) and not (found and t - found[-1] < SAME * made.span):
-            found.append(t)
+        if least(t) < VANISHED * np.max(low) and not (times_of_passes and t - times_of_passes[-1] < SAME * made.span):
+            times_of_passes.append(t)
     engine.keep(kept)
-    return tuple(_pass(sampler, made, t) for t in found)
+    return tuple(_pass(sampler, made, t) for t in times_of_passes)
 
 
 def _between(least: Callable[[float], float], t: float, aside: float, bracket: tuple[float, float]) -> float:

@@ -53,10 +53,10 @@ def start_motion(engine: Engine, y: np.ndarray) -> StartMotion:
     """
     choices = engine.model.scene.start.branch if engine.model.scene.start is not None else ()
     if np.any(y[engine.model.speeds] != 0.0) and not choices:
-        found, turn = [branches.by_speeds(engine, y)], SAME
+        motions, turn = [branches.by_speeds(engine, y)], SAME
     else:
-        found, turn = _chosen(engine, branches.directions(engine, y), choices), ANY
-    way = _along(engine, found[0], turn) if found else None
+        motions, turn = _chosen(engine, branches.directions(engine, y), choices), ANY
+    way = _along(engine, motions[0], turn) if motions else None
     if way is None:
         raise SolverError(engine.mobility.start_refusal)
     engine.keep(way.kept)

@@ -125,15 +125,18 @@ def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
         joint = contact.joint
         if joint.initial_approach_speed is not None:
             continue
-        found, remedy = f"its surfaces start {depth:.3g} m deep in each other", "enlarge the clearance"
-        found += f" (clearance {joint.clearance:.3g} m)"
+        problem, remedy = f"its surfaces start {depth:.3g} m deep in each other", "enlarge the clearance"
+        problem += f" (clearance {joint.clearance:.3g} m)"
         if isinstance(joint, End):
             unit = "rad" if joint.coordinate.turning else "m"
-            found, remedy = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}", "move the end"
+            problem, remedy = (
+                f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}",
+                "move the end",
+            )
         elif contact.name in loose(engine.model.scene):
             remedy = "begin where the joint would be without clearance ([start] at = 'ideal'), " + remedy
         raise InputError(
             f"[{contact.place}]",
-            found,
+            problem,
             f"move a body, {remedy}, or declare the speed at which this contact began as initial_approach_speed",
         )

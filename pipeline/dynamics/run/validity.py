@@ -47,7 +47,7 @@ class Flexible:
 
 def flexibles(model: Model) -> list[Flexible]:
     """The flexible links of a model, and by what each is judged."""
-    found = []
+    bodies = []
     for i, coordinates in sorted(model.numbering.modal_positions.items()):
         name, bundle = str(model.links[i].flexible), model.links[i].bundle
         assert bundle is not None
@@ -57,7 +57,7 @@ def flexibles(model: Model) -> list[Flexible]:
         along = offsets @ axis
         stiffened = getattr(model.scene.body[name], "stiffening", None) is not None
         least = 0.0 if stiffened else float(np.linalg.eigvalsh(bundle["modal_stiffness"].values)[0])
-        found.append(
+        bodies.append(
             Flexible(
                 name,
                 i,
@@ -69,7 +69,7 @@ def flexibles(model: Model) -> list[Flexible]:
                 float(np.sqrt(max(least, 0.0))),
             )
         )
-    return found
+    return bodies
 
 
 def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
@@ -138,13 +138,13 @@ def largest(shapes: np.ndarray, q: np.ndarray, floor: float) -> tuple[int, float
     """
     bound = np.abs(q) @ np.linalg.norm(shapes, axis=1).max(axis=0, initial=0.0)
     order = np.argsort(-bound, kind="stable")
-    found = (0, 0.0)
+    peak = (0, 0.0)
     for first in range(0, len(order), ROWS):
         rows = order[first : first + ROWS]
-        if not bound[rows[0]] > max(floor, found[1]):
+        if not bound[rows[0]] > max(floor, peak[1]):
             break
         sizes = np.linalg.norm(np.einsum("nam,tm->tna", shapes, q[rows]), axis=2).max(axis=1)
         best = int(np.argmax(sizes))
-        if sizes[best] > found[1]:
-            found = int(rows[best]), float(sizes[best])
-    return found
+        if sizes[best] > peak[1]:
+            peak = int(rows[best]), float(sizes[best])
+    return peak

@@ -65,8 +65,8 @@ def straight(rates: Callable, wiring: wired.Wiring, *, exact: bool = False) -> A
     @intrinsic
     def run(typingctx: Any, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            found = program(rates, wiring)
-            Emitter(builder, found, _places(builder, found, [values]), exact=exact).emit()
+            tape = program(rates, wiring)
+            Emitter(builder, tape, _places(builder, tape, [values]), exact=exact).emit()
             return context.get_dummy_value()
 
         return types.void(h, f, w, n, y, dy), generate
@@ -101,17 +101,17 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
     @intrinsic
     def run(typingctx: Any, places: Any, numbers: Any) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            found, (places, numbers) = made(), values
+            tape, (places, numbers) = made(), values
             given = [_arguments(builder, places, lane, lanes) for lane in range(lanes)]
             side_by_side = builder.bitcast(numbers, ir.VectorType(ir.DoubleType(), lanes).as_pointer())
-            row = {place: k for k, place in enumerate(_numbers(found))}
+            row = {place: k for k, place in enumerate(_numbers(tape))}
 
             def number(place: int) -> Any:
                 loaded = builder.load(builder.gep(side_by_side, [_INTEGER(row[place])]))
                 loaded.align = 8
                 return loaded
 
-            Emitter(builder, found, _places(builder, found, given), lanes, exact=True, number=number).emit()
+            Emitter(builder, tape, _places(builder, tape, given), lanes, exact=True, number=number).emit()
             return context.get_dummy_value()
 
         return types.void(places, numbers), generate
@@ -119,9 +119,9 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
     return note, run
 
 
-def _numbers(found: Program) -> list[int]:
+def _numbers(tape: Program) -> list[int]:
     """Places in f of all that a program loads from there."""
-    return sorted({place for array, place in loads(found) if array == "f" and isinstance(place, int)})
+    return sorted({place for array, place in loads(tape) if array == "f" and isinstance(place, int)})
 
 
 def exactly(kernel: Any) -> Any:
@@ -140,13 +140,13 @@ def _arguments(builder: ir.IRBuilder, places: Any, lane: int, lanes: int) -> lis
     return [builder.inttoptr(word, kind.as_pointer()) for word, kind in zip(words, kinds, strict=False)] + words[4:]
 
 
-def _places(builder: ir.IRBuilder, found: Program, given: list[Any]) -> Callable:
+def _places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
     """Where the code finds an element of an array in a lane: in a stretch whose begin it has looked up first.
 
     given: h, f, w, n, y and dy of each lane.
     """
     begins = dict[Any, Any]()
-    places = [(array, place) for array, place, _ in found.stores] + loads(found)
+    places = [(array, place) for array, place, _ in tape.stores] + loads(tape)
     stretches = sorted({(array, wired.split(place)[0]) for array, place in places if isinstance(place, int)})
     for lane, (h, f, w, n, y, dy) in enumerate(given):
         builder.store(y, builder.gep(n, [_INTEGER(m.STATE)]))

@@ -186,6 +186,6 @@ class _Names:
         self._trace, self._module = trace, module
 
     def __getattr__(self, name: str) -> Any:
-        found = self._trace.plain(getattr(self._module, name))
-        setattr(self, name, found)
-        return found
+        attribute = self._trace.plain(getattr(self._module, name))
+        setattr(self, name, attribute)
+        return attribute

@@ -26,8 +26,8 @@ def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -
     """
     bench, rest = equilibrium(placed(scene), bundles, progress, None, None, False)
     progress(None, f"begins at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
-    found = resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time), scene.contacts())
-    return found, bench.engine.model.mechanism.choice
+    rest_state = resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time), scene.contacts())
+    return rest_state, bench.engine.model.mechanism.choice
 
 
 def placed(scene: Scene) -> Scene:

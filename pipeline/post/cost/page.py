@@ -54,8 +54,8 @@ def sections(scenes: tuple[Studied, ...]) -> str:
 
 def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
     """One paragraph: the cheapest way to each accuracy, what a digit costs, how far it holds, what limits the scene."""
-    found = {target: cheapest(study, target) for target in TARGETS}
-    had = {target: choice for target, choice in found.items() if choice is not None}
+    choices = {target: cheapest(study, target) for target in TARGETS}
+    had = {target: choice for target, choice in choices.items() if choice is not None}
     text = "; ".join(f"{target:g} takes {c.name} ({c.evaluations:.0f} evaluations)" for target, c in had.items())
     said = [
         f"{text}." if had else "None of the accuracies asked for can be had for all quantities; see the tables below."

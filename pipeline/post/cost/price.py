@@ -25,14 +25,14 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
     """
     rows = []
     for target in TARGETS:
-        found = cheapest(study, target)
-        if found is None:
+        choice = cheapest(study, target)
+        if choice is None:
             best = min(_choices(study), key=lambda c: c.error, default=NOTHING)
             rows.append((f"{target:g}", "cannot be had", "–", "–", f"{best.error:.1e} at best", best.worst))
         else:
-            seconds = f"{found.seconds:.3f}"
+            seconds = f"{choice.seconds:.3f}"
             rows.append(
-                (f"{target:g}", found.name, f"{found.evaluations:.0f}", seconds, f"{found.error:.1e}", found.worst)
+                (f"{target:g}", choice.name, f"{choice.evaluations:.0f}", seconds, f"{choice.error:.1e}", choice.worst)
             )
     return Table(title, COLUMNS, tuple(rows), (*_notes(study), *notes))
 
@@ -77,7 +77,7 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 
 
 def _choices(study: xr.Dataset) -> list[Choice]:
-    found = []
+    choices = []
     unsure = study["reference_uncertainty"].fillna(0.0)
     for group, word in INTEGRATION.items():
         if f"error_by_{group}" not in study:
@@ -92,8 +92,8 @@ def _choices(study: xr.Dataset) -> list[Choice]:
                 worst = str(study["quantity"].values[int(np.argmax(error.values))])
                 evaluations, seconds = float(one[f"evaluations_by_{group}"]), float(one[f"cpu_seconds_by_{group}"])
                 unit = " s" if word == "step" else ""
-                found.append(Choice(f"{m}, {word} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
-    return found
+                choices.append(Choice(f"{m}, {word} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
+    return choices
 
 
 def _notes(study: xr.Dataset) -> list[str]:

@@ -56,8 +56,8 @@ Choice = Callable[[Sequence[Point]], Point | None]
 
 
 def _model(points: Sequence[Point], runs: Mapping[str, xr.Dataset], choice: Choice) -> xr.Dataset | None:
-    found = choice(points) if points else None
-    return None if found is None else runs[found.key]
+    chosen = choice(points) if points else None
+    return None if chosen is None else runs[chosen.key]
 
 
 def _own(points: Sequence[Point]) -> Point | None:

@@ -39,8 +39,8 @@ def estimate(values: np.ndarray) -> Estimate:
 
 def relative_error(values: np.ndarray) -> float:
     """Half the interval of the mean as a share of the mean; NaN where that is zero."""
-    found = estimate(values)
-    return 0.5 * (found.high - found.low) / abs(found.mean) if found.mean else np.nan
+    mean = estimate(values)
+    return 0.5 * (mean.high - mean.low) / abs(mean.mean) if mean.mean else np.nan
 
 
 def growing(members: int) -> list[int]:
@@ -94,10 +94,10 @@ def table(ensembles: dict[str, xr.Dataset], title: str) -> Table:
     for name, ensemble in ensembles.items():
         for contact in ensemble["contact"].values:
             for statistic, unit in STATISTICS.items():
-                found = estimate(ensemble[statistic].sel(contact=contact).values.astype(float))
-                interval = f"{found.low:.4g} to {found.high:.4g}"
+                mean = estimate(ensemble[statistic].sel(contact=contact).values.astype(float))
+                interval = f"{mean.low:.4g} to {mean.high:.4g}"
                 label = f"{contact} {statistic.replace('_', ' ')}" + (f" ({unit})" if unit != "1" else "")
-                rows.append((name, label, f"{found.mean:.4g}", f"{found.deviation:.2g}", interval))
+                rows.append((name, label, f"{mean.mean:.4g}", f"{mean.deviation:.2g}", interval))
     notes = (
         "Statistical errors of ensemble means, not pointwise errors: beyond its horizon a single run is one draw "
         f"out of many. Intervals: 95 %, bootstrap with {RESAMPLES} resamples of the members.",

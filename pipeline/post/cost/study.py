@@ -104,8 +104,8 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
 
 def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
     """Whether an error is so large that the reference can measure it; same shape as ``error_by_<group>``."""
-    found: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
-    return found
+    mask: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
+    return mask
 
 
 def _reason(refused: xr.Dataset) -> str:
@@ -152,9 +152,9 @@ def cost(run: xr.Dataset, name: str) -> float:
 
 def recording(study: xr.Dataset) -> float:
     """Processor time of the record of one run [s]: of as many rows whatever the integration took, so one median."""
-    found = [study[f"recording_seconds_by_{group}"].values.ravel() for group in ("tolerance", "step")
+    times = [study[f"recording_seconds_by_{group}"].values.ravel() for group in ("tolerance", "step")
              if f"recording_seconds_by_{group}" in study]  # fmt: skip
-    values = np.concatenate([*found, [np.nan]])
+    values = np.concatenate([*times, [np.nan]])
     return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")
 
 

@@ -49,25 +49,25 @@ def make(
 ) -> dict[str, bytes]:
     """``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
     chosen = [str(q) for q in study["quantity"].values]
-    found = curves(study)
+    drawn = curves(study)
     rows, recorded = -(-len(chosen) // COLUMNS), recording(study)
     with style():
         figure, axes = grid(rows, COLUMNS, (10.5, 1.1 + 2.7 * rows))
         for k, ax in enumerate(axes.ravel()):
             if k < len(chosen):
                 bound = MARGIN * float(study["reference_uncertainty"].values[k])
-                _panel(ax, chosen[k], k, (found, others), marks, bound)
+                _panel(ax, chosen[k], k, (drawn, others), marks, bound)
                 _mark_recording(ax, recorded)
             else:
                 ax.set_visible(False)
-        _legend(figure, found, others, marks)
+        _legend(figure, drawn, others, marks)
         heading(figure, title, _subtitle(study))
         return files(name, figure)
 
 
 def curves(study: xr.Dataset) -> list[Curve]:
     """All integrators of a study, those with a tolerance and those with a step."""
-    found = []
+    lines = []
     for group in ("tolerance", "step"):
         if f"error_by_{group}" not in study:
             continue
@@ -76,8 +76,8 @@ def curves(study: xr.Dataset) -> list[Curve]:
         for m in study[method].values:
             seconds = study[f"cpu_seconds_by_{group}"].sel({method: m}).values
             error = study[f"error_by_{group}"].sel({method: m}).values
-            found.append(Curve(str(m), seconds, error, told.sel({method: m}).values))
-    return found
+            lines.append(Curve(str(m), seconds, error, told.sel({method: m}).values))
+    return lines
 
 
 def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
@@ -92,15 +92,15 @@ def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
 
 def peers(study: xr.Dataset, tracks: Sequence[Mapping[str, Any]]) -> list[Curve]:
     """Curves of another program's runs. tracks: name, note, seconds [s] and errors [SI] by quantity."""
-    found = []
+    lines = []
     for track in tracks:
         seconds = np.array(track["seconds"], dtype=float)
         error = np.full((len(seconds), study.sizes["quantity"]), np.nan)
         for k, name in enumerate(study["quantity"].values):
             if str(name) in track["error"]:
                 error[:, k] = np.array(track["error"][str(name)], dtype=float) / float(study["scale"][k])
-        found.append(Curve(track["name"], seconds, error, np.isfinite(error), track["note"]))
-    return found
+        lines.append(Curve(track["name"], seconds, error, np.isfinite(error), track["note"]))
+    return lines
 
 
 def _panel(
@@ -112,13 +112,13 @@ def _panel(
     bound: float,
 ) -> None:
     """One quantity. curves_of: ours, and others'. bound: error below which the reference tells nothing."""
-    found, others = curves_of
-    for curve in (*found, *others):
+    own, others = curves_of
+    for curve in (*own, *others):
         color, mark = look(curve, others)
         pick = np.isfinite(curve.error[:, k]) & curve.told[:, k]
         ax.plot(curve.seconds[pick], curve.error[pick, k], mark, color=color, linewidth=1.0, markersize=4.5, ls="-")
-    seconds = np.concatenate([c.seconds for c in found])
-    error = np.concatenate([np.where(c.told[:, k], c.error[:, k], np.nan) for c in found])
+    seconds = np.concatenate([c.seconds for c in own])
+    error = np.concatenate([np.where(c.told[:, k], c.error[:, k], np.nan) for c in own])
     front = pareto(seconds, error)
     ax.plot(seconds[front], error[front], color=INK, linewidth=3.0, alpha=0.18, zorder=0)
     for m in marks:
@@ -155,9 +155,9 @@ def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
     return SOFT, "xd+*"[list(others).index(curve) % 4] if curve in others else "x"
 
 
-def _legend(figure: object, found: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
+def _legend(figure: object, own: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
     handles: list[Artist] = []
-    for curve in (*found, *others):
+    for curve in (*own, *others):
         color, mark = look(curve, others)
         handles.append(Line2D([], [], color=color, marker=mark, label=curve.name))
     handles.append(Line2D([], [], color=INK, linewidth=3.0, alpha=0.18, label="Pareto front"))

@@ -85,12 +85,12 @@ def _ratio(timing: xr.Dataset, way: str, name: str) -> str:
 def ratios(timing: xr.Dataset, way: str) -> dict[str, float]:
     """CPU time of the integration over the ideal model's, of the models that the paper's table has."""
     base = made(timing[f"{way}_integration_seconds"].sel(scene=REFERENCE))
-    found = {}
+    by_scene = {}
     for scene in TABLE10:
         own = made(timing[f"{way}_integration_seconds"].sel(scene=scene)) if scene in timing.scene.values else base[:0]
         if scene != REFERENCE and own.size and base.size:
-            found[scene] = float(np.median(own) / np.median(base))
-    return found
+            by_scene[scene] = float(np.median(own) / np.median(base))
+    return by_scene
 
 
 def _notes(timing: xr.Dataset) -> tuple[str, ...]:
@@ -148,23 +148,23 @@ def growth(angle: float) -> float:
 
 def _verdict(timing: xr.Dataset, way: str) -> str:
     """Our ratios by one way against the paper's, as one range."""
-    found = {scene: ratio / TABLE10[scene] for scene, ratio in ratios(timing, way).items()}
-    if not found:
+    deviations = {scene: ratio / TABLE10[scene] for scene, ratio in ratios(timing, way).items()}
+    if not deviations:
         return f"{WAYS[way].capitalize()}: no model of the paper's table besides the ideal one could be timed."
-    least, most = min(found, key=found.__getitem__), max(found, key=found.__getitem__)
+    least, most = min(deviations, key=deviations.__getitem__), max(deviations, key=deviations.__getitem__)
     return (
         f"{WAYS[way].capitalize()}: our ratios are "
-        f"{rounded(found[least], 2)} ({least}) to {rounded(found[most], 2)} ({most}) "
+        f"{rounded(deviations[least], 2)} ({least}) to {rounded(deviations[most], 2)} ({most}) "
         "times the paper's."
     )
 
 
 def _which(timing: xr.Dataset) -> str:
     """Which of the paper's ratios come out of counting the steps of a damped method at its tolerance."""
-    found = {s: _steps(timing, s) for s in TABLE10 if s in timing.scene.values and s != REFERENCE}
-    told = ", ".join(f"{scene} {_number(ratio)} (paper {TABLE10[scene]:g})" for scene, ratio in found.items())
-    near = [s for s, ratio in found.items() if 1.0 / NEAR < ratio / TABLE10[s] < NEAR]
-    other = ", ".join(f"{scene} {_number(_steps(timing, scene, 'size'))}" for scene in found)
+    steps = {s: _steps(timing, s) for s in TABLE10 if s in timing.scene.values and s != REFERENCE}
+    told = ", ".join(f"{scene} {_number(ratio)} (paper {TABLE10[scene]:g})" for scene, ratio in steps.items())
+    near = [s for s, ratio in steps.items() if 1.0 / NEAR < ratio / TABLE10[s] < NEAR]
+    other = ", ".join(f"{scene} {_number(_steps(timing, scene, 'size'))}" for scene in steps)
     return (
         f"Steps at the paper's tolerance over the ideal model's: {told}. Within a factor of {NEAR:g} of the paper's "
         f"ratio: {', '.join(near) or 'none'}. Read as a share of the mechanism's size (rtol "

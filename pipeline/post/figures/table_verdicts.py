@@ -148,9 +148,9 @@ def _length(far: float) -> str:
 
 def _slight_vibration(data: Data) -> Outcome:
     ideal = measured.reaction(data, IDEAL)
-    found = {m: measured.reaction(data, m) for m in FAR}
-    told = ", ".join(f"{mode_set(m)} {force:.0f} N" for m, force in found.items())
-    return _verdict(*(force / ideal - 1.0 < SLIGHT for force in found.values())), f"ideal {ideal:.0f} N; {told}"
+    reactions = {m: measured.reaction(data, m) for m in FAR}
+    told = ", ".join(f"{mode_set(m)} {force:.0f} N" for m, force in reactions.items())
+    return _verdict(*(force / ideal - 1.0 < SLIGHT for force in reactions.values())), f"ideal {ideal:.0f} N; {told}"
 
 
 def _consistent(data: Data) -> Outcome:
@@ -247,13 +247,13 @@ def _dashpot(data: Data) -> Outcome:
     """Vibration as the root mean square of the platform's acceleration minus the ideal one, at the outputs."""
     ideal = measured.vertical(data[f"{IDEAL.scene}:run"])
     rigid = float(np.sqrt(np.mean(apart(data, CSJ, measured.vertical) ** 2)))
-    found = {}
+    rows = {}
     for model in FAR_CSJ:
         members = data[f"{model.scene}:ensemble"].acceleration.sel(body=PLATFORM, axis="z").values
-        found[model] = float(np.sqrt(np.mean((members - ideal) ** 2, axis=1)).mean())
+        rows[model] = float(np.sqrt(np.mean((members - ideal) ** 2, axis=1)).mean())
     count = {m: float(data[f"{m.scene}:ensemble"].impact_count.sel(contact=JOINT).mean()) for m in FAR_CSJ}
-    told = "; ".join(f"{mode_set(m)} {found[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in FAR_CSJ)
-    return _verdict(*(size < rigid for size in found.values())), (
+    told = "; ".join(f"{mode_set(m)} {rows[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in FAR_CSJ)
+    return _verdict(*(size < rigid for size in rows.values())), (
         f"vibration CSJ {rigid:.0f} m/s² and {int(data[f'{CSJ.scene}:post'].impact_count.sel(contact=JOINT))} impacts; "
         f"{told}; without structural damping the rod takes no energy out of the mechanism"
     )
@@ -305,9 +305,9 @@ def _costs(*models: Model) -> Callable[[Data], Outcome]:
     def told(data: Data) -> Outcome:
         tests, words = [], []
         for way, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
-            found = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
-            tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in found.items()))
-            words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {_ratio(r)}" for m, r in found.items()))
+            costs = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
+            tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in costs.items()))
+            words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {_ratio(r)}" for m, r in costs.items()))
         printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
         return _verdict(*tests), f"printed {printed}; at {'; at '.join(words)}"
 
@@ -323,11 +323,11 @@ def _becomes_chaotic(data: Data) -> Outcome:
     if not SECTIONS.is_file():
         return _one_stroke(data)
     with SECTIONS.open(newline="", encoding="utf-8") as file:
-        found = {row["scene"]: row for row in csv.DictReader(file)}
+        rows = {row["scene"]: row for row in csv.DictReader(file)}
     wanted = {CSJ: "quasi-periodic", FAR_CSJ_FREE: "chaotic", FAR_CSJ_FIXED: "chaotic", FAR_CSJ_CB: "chaotic"}
-    told = [f"{mode_set(model) or model.label} {_motion(found[model.scene])}" for model in wanted]
-    return _verdict(*(found[model.scene]["verdict"] == motion for model, motion in wanted.items())), (
-        f"over {found[CSJ.scene]['periods']} repeated strokes: {'; '.join(told)} (chaos.md)"
+    told = [f"{mode_set(model) or model.label} {_motion(rows[model.scene])}" for model in wanted]
+    return _verdict(*(rows[model.scene]["verdict"] == motion for model, motion in wanted.items())), (
+        f"over {rows[CSJ.scene]['periods']} repeated strokes: {'; '.join(told)} (chaos.md)"
     )
 
 

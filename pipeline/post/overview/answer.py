@@ -47,7 +47,7 @@ def answer(compared: xr.Dataset | None, run: xr.Dataset | None, doubts: Sequence
 
 def _effects(compared: xr.Dataset) -> list[str]:
     """A sentence for each quantity: by how much the scene differs from its ideal, and whether that is told apart."""
-    found = []
+    sentences = []
     last = compared.sizes["run"] - 1
     for j, name in enumerate(str(q) for q in compared["quantity"].values):
         unit = str(compared["unit"].values[j])
@@ -72,21 +72,21 @@ def _effects(compared: xr.Dataset) -> list[str]:
             told = f"changes slightly, by up to <b class='n'>{value}</b>{part}"
         else:
             told = f"changes by up to <b class='n'>{value}</b>{part}"
-        found.append(f"<b>{html.escape(name)}</b>: {told}.")
-    return found
+        sentences.append(f"<b>{html.escape(name)}</b>: {told}.")
+    return sentences
 
 
 def _impacts(run: xr.Dataset) -> list[str]:
     """A sentence for each contact of the scene, ends of stops among them."""
-    found = []
+    sentences = []
     for name in (str(c) for c in run["contact"].values) if "contact" in run.coords else ():
         unit = quantities.unit(run, Quantity(name, "peak_force"))
         count, peak = (quantities.events(run, Quantity(name, kind)) for kind in ("impact_times", "peak_force"))
-        found.append(
+        sentences.append(
             f"<b>{html.escape(name)}</b>: {impacts(len(count)).capitalize()}; the contact "
             f"{'force' if unit == 'N' else 'torque'} reaches <b class='n'>{measured(float(peak[0]), np.nan, unit)}</b>."
         )
-    return found
+    return sentences
 
 
 def _horizon(run: xr.Dataset) -> list[str]:
@@ -137,7 +137,7 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
         "stops": list(scene.get("stop", {})),
         "gears": list(scene.get("gear", {})),
     }
-    return {name: ", ".join(found) if found else "not in the scene" for name, found in there.items()}
+    return {name: ", ".join(listed) if listed else "not in the scene" for name, listed in there.items()}
 
 
 def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[str, str]:

@@ -120,8 +120,8 @@ def _at(own: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 
 def _contacts(runs: Mapping[str, xr.Dataset]) -> list[str]:
-    found = [str(name) for run in runs.values() if "contact" in run.coords for name in run["contact"].values]
-    return list(dict.fromkeys(found))
+    names = [str(name) for run in runs.values() if "contact" in run.coords for name in run["contact"].values]
+    return list(dict.fromkeys(names))
 
 
 def _impacts(runs: Mapping[str, xr.Dataset]) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:

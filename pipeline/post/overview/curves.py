@@ -46,8 +46,8 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
         return [_force(run, quantity.owner) for run in runs]
     if quantity.kind == "orientation":
         return [_turned(run, quantity) if has(run, quantity) else None for run in runs]
-    found = [quantities.series(run, quantity) if has(run, quantity) else None for run in runs]
-    there = [values for values in found if values is not None]
+    lines = [quantities.series(run, quantity) if has(run, quantity) else None for run in runs]
+    there = [values for values in lines if values is not None]
     if quantity.kind in BY_COMPONENT and there:
         k = int(first_largest(np.max([np.ptp(values, axis=0) for values in there], axis=0)))
         title = f"{quantity.owner}: {quantity.kind.replace('_', ' ')} along {'xyz'[k]}"
@@ -58,7 +58,7 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
         None
         if values is None
         else Curve(title, quantities.unit(run, quantity), run["time"].values, _drawn(values, quantity, k), NONE)
-        for run, values in zip(runs, found, strict=True)
+        for run, values in zip(runs, lines, strict=True)
     ]
 
 

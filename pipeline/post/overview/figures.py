@@ -44,16 +44,16 @@ def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | N
     post = derive(run) if post is None else post
     first = [quantity.owner for quantity in watched]
     with style.style():
-        found = _motion(run, post, first) | _energy(run)
+        panels = _motion(run, post, first) | _energy(run)
         if post.sizes["joint"]:
-            found |= _reactions(run, post, first)
+            panels |= _reactions(run, post, first)
         if "contact" in run.sizes:
-            found |= contacts(run, post, first)
+            panels |= contacts(run, post, first)
         if "wear_volume" in post:
-            found |= _wear(run, post)
+            panels |= _wear(run, post)
         if "joint_bearing_load" in run:
-            found |= _friction(run, first)
-    return found
+            panels |= _friction(run, first)
+    return panels
 
 
 def _chosen(names: Sequence[str], first: Sequence[str], size: np.ndarray, most: int) -> list[int]:

@@ -110,17 +110,17 @@ def downloads(files: Mapping[str, bytes]) -> str:
 
 def in_folder(page: bytes) -> dict[str, bytes]:
     """The same page as ``index.html`` with its pictures and films as files beside it, by name."""
-    found: dict[str, bytes] = {}
+    files: dict[str, bytes] = {}
     suffix = {kind: name for name, kind in TYPES.items()}
 
     def apart(match: re.Match[str]) -> str:
         content = base64.b64decode(match[2])
-        name = f"files/{len(found) + 1:03d}.{suffix[match[1]]}"
-        found[name] = content
+        name = f"files/{len(files) + 1:03d}.{suffix[match[1]]}"
+        files[name] = content
         return f"src='{name}'"
 
     text = re.sub(r"src='data:((?:image|video)/[\w+.-]+);base64,([A-Za-z0-9+/=]+)'", apart, page.decode())
-    return {"index.html": text.encode(), **found}
+    return {"index.html": text.encode(), **files}
 
 
 def _code(text: str) -> str:

@@ -45,8 +45,8 @@ def _html(text: str) -> str:
 
 
 def _pictures(text: str, folder: Path, wanted: Sequence[str] | None) -> str:
-    def shown(found: re.Match[str]) -> str:
-        name, alt = found[1], found[2]
+    def shown(match: re.Match[str]) -> str:
+        name, alt = match[1], match[2]
         path = folder / name
         if not path.is_file() or (wanted is not None and not name.endswith(tuple(wanted))):
             return ""

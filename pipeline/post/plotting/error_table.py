@@ -83,10 +83,10 @@ MEANING = (
 
 def comparison(who: str, deviation: Deviation, printed: MaximumError) -> str:
     """A sentence with the ratios; says zero where there is nothing to divide."""
-    found = ratios(deviation, printed)
-    if max(found.values()) < NOTHING:
+    percentages = ratios(deviation, printed)
+    if max(percentages.values()) < NOTHING:
         return f"{who}: ours are zero, up to rounding."
-    text = ", ".join(f"{name} {ratio:.2g}" for name, ratio in found.items())
+    text = ", ".join(f"{name} {ratio:.2g}" for name, ratio in percentages.items())
     return f"{who}: ours over the paper's: {text}."
 
 

@@ -121,14 +121,14 @@ def difference(
     axes.margins(y=0.12)
     for motion, post in zip(others, posts, strict=bool(posts)):
         _band(axes, quantity, motion, post, reference)
-    found = {motion.model.scene: deviation(quantity, motion, reference) for motion in others}
+    differences = {motion.model.scene: deviation(quantity, motion, reference) for motion in others}
     for motion in others:
-        time, values = found[motion.model.scene]
+        time, values = differences[motion.model.scene]
         _curve(axes, motion, values, 0.9, time)
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_xlabel("time (s)")
     axes.set_ylabel(f"minus ideal\n{quantity.unit}")
-    _scale(axes, [float(np.abs(values).max()) for _, values in found.values()])
+    _scale(axes, [float(np.abs(values).max()) for _, values in differences.values()])
 
 
 def _scale(axes: Axes, sizes: Sequence[float]) -> None:

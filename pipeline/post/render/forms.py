@@ -79,7 +79,7 @@ def shapes(told: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
 
     Raises InputError for files that cannot be read.
     """
-    found = []
+    drawn = []
     for shape in told:
         kind = shape["type"]
         if kind == "box":
@@ -91,8 +91,8 @@ def shapes(told: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
         else:
             part = shape_files.read(folder / shape["file"], float(shape.get("unit", 1.0)))
         pose = Pose.model_validate(shape.get("pose", {}))
-        found.append(surfaces.moved(part, np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())))
-    return surfaces.merged(found)
+        drawn.append(surfaces.moved(part, np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())))
+    return surfaces.merged(drawn)
 
 
 def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
@@ -188,8 +188,8 @@ def _plane(places: np.ndarray, width: float) -> np.ndarray | None:
 
 def _apart(places: Sequence[np.ndarray], same: float) -> np.ndarray:
     """The places, those closer than `same` to an earlier one left out, shape (n, 3)."""
-    found: list[np.ndarray] = []
+    offsets: list[np.ndarray] = []
     for place in places:
-        if all(np.linalg.norm(place - other) > same for other in found):
-            found.append(place)
-    return np.array(found).reshape(-1, 3)
+        if all(np.linalg.norm(place - other) > same for other in offsets):
+            offsets.append(place)
+    return np.array(offsets).reshape(-1, 3)

@@ -108,15 +108,15 @@ def mechanism(run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks |
 
 def _cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible]) -> np.ndarray:
     """Corners of the boxes of all parts, and points of flexible bodies, at some outputs of the run."""
-    found = []
+    clouds = []
     for step in np.unique(np.linspace(0, run.sizes["time"] - 1, SAMPLES).astype(int)):
         for part in parts:
             low, high = part.surface.points.min(axis=0), part.surface.points.max(axis=0)
             corners = np.where(_CORNERS, high, low)
             matrix = part_pose(run, part, int(step))
-            found.append(corners @ matrix[:3, :3].T + matrix[:3, 3])
-        found += [placed(run, body, int(step))[0][::7] for body in flexible]
-    return np.concatenate(found) if found else run.position.values[0]
+            clouds.append(corners @ matrix[:3, :3].T + matrix[:3, 3])
+        clouds += [placed(run, body, int(step))[0][::7] for body in flexible]
+    return np.concatenate(clouds) if clouds else run.position.values[0]
 
 
 def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
@@ -171,12 +171,12 @@ def frame_pose(told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], frame
 
 def _seats(told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset]) -> dict[str, list[Seat]]:
     """Where joints sit on each body."""
-    found: dict[str, list[Seat]] = {}
+    by_body: dict[str, list[Seat]] = {}
     for joint in told.get("joint", {}).values():
         for k, frame in enumerate(joint["between"]):
             origin, axes = frame_pose(told, bundles, frame)
-            found.setdefault(frame.partition(".")[0], []).append(Seat(frame, origin, axes, joint["type"], k == 0))
-    return found
+            by_body.setdefault(frame.partition(".")[0], []).append(Seat(frame, origin, axes, joint["type"], k == 0))
+    return by_body
 
 
 def _bodies(

@@ -47,10 +47,13 @@ def pace(run: xr.Dataset, seconds: float | None = None, slower: float | None = N
 
 def strongest(run: xr.Dataset) -> np.ndarray:
     """When the strongest impacts begin [s], at most SHOWN, ascending; none without contacts."""
-    found = impacts(run)
-    if "impact_time" not in found:
+    all_impacts = impacts(run)
+    if "impact_time" not in all_impacts:
         return np.empty(0)
-    times, force = np.asarray(found["impact_time"][1]), np.nan_to_num(np.asarray(found["impact_peak_force"][1]))
+    times, force = (
+        np.asarray(all_impacts["impact_time"][1]),
+        np.nan_to_num(np.asarray(all_impacts["impact_peak_force"][1])),
+    )
     kept: list[float] = []
     least = 4.0 * AROUND * float(run["time"].values[-1] - run["time"].values[0])
     for k in np.argsort(-force, kind="stable"):

@@ -98,9 +98,9 @@ def _first(names: Iterable[object], watch: Sequence[str]) -> int | None:
 
 def _body(run: xr.Dataset, watch: Sequence[str]) -> int:
     """The first watched body; else the one that moves farthest."""
-    found = _first(run.body.values, watch)
-    if found is not None:
-        return found
+    name = _first(run.body.values, watch)
+    if name is not None:
+        return name
     way = np.linalg.norm(run.position.values - run.position.values[:1], axis=-1)
     return int(np.argmax(way.max(axis=0)))
 

@@ -25,29 +25,29 @@ LONGEST, THICK = 0.3, 0.006
 
 def series(drawn: Mechanism, steps: np.ndarray, name: str = "motion") -> dict[str, bytes]:
     """``motion.pvd`` and the files that it names, by name."""
-    found: dict[str, bytes] = {}
+    files: dict[str, bytes] = {}
     entries = []
     largest = max((float(np.linalg.norm(f, axis=-1).max(initial=0.0)) for _, _, f in _forces(drawn.run)), default=0.0)
     for k, step in enumerate(steps):
         time = float(drawn.run["time"].values[step])
         bodies, arrows = f"{name}_{k:04d}.vtp", f"{name}_forces_{k:04d}.vtp"
-        found[bodies] = _bodies(drawn, int(step))
+        files[bodies] = _bodies(drawn, int(step))
         entries.append((time, 0, "bodies", bodies))
         if largest > 0.0:
-            found[arrows] = _arrows(drawn, int(step), largest)
+            files[arrows] = _arrows(drawn, int(step), largest)
             entries.append((time, 1, "forces", arrows))
-    found[f"{name}.pvd"] = collection(
+    files[f"{name}.pvd"] = collection(
         [
             f'<DataSet timestep="{time!r}" part="{part}" name="{group}" file={quoteattr(file)}/>'
             for time, part, group, file in entries
         ]
     )
-    return found
+    return files
 
 
 def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> dict[str, bytes]:
     """``<name>.pvd``, a series with the number of the mode for time, and the files that it names."""
-    found, lines = {}, []
+    files, lines = {}, []
     rest, _ = surface(bundle, np.zeros(bundle.sizes["mode"]))
     triangles = surfaces.triangulated(faces(bundle))
     for k, frequency in enumerate(bundle["frequency"].values):
@@ -55,9 +55,9 @@ def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> dict[str, bytes]:
         points, _ = surface(bundle, q)
         file = f"{name}_{k + 1:03d}.vtp"
         data = {"displacement": points - rest, "frequency_Hz": np.full(len(points), float(frequency))}
-        found[file] = vtp(surfaces.shaded(points, triangles), data)
+        files[file] = vtp(surfaces.shaded(points, triangles), data)
         lines.append(f'<DataSet timestep="{k + 1}" part="0" name="mode" file={quoteattr(file)}/>')
-    return found | {f"{name}.pvd": collection(lines)}
+    return files | {f"{name}.pvd": collection(lines)}
 
 
 def collection(lines: list[str]) -> bytes:

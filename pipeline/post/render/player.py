@@ -145,8 +145,8 @@ def _steps(run: xr.Dataset, looks: Looks, frames: int) -> np.ndarray:
     """The outputs that are shown."""
     times = pace.pace(run, looks.duration, looks.impact_slowdown).times
     times = times[np.unique(np.linspace(0, times.size - 1, frames).astype(int))]
-    found: np.ndarray = np.clip(np.searchsorted(run["time"].values, times - 1e-12), 0, run.sizes["time"] - 1)
-    return found
+    steps: np.ndarray = np.clip(np.searchsorted(run["time"].values, times - 1e-12), 0, run.sizes["time"] - 1)
+    return steps
 
 
 def _rounded(run: xr.Dataset, steps: np.ndarray) -> list[float]:

@@ -51,12 +51,12 @@ def sheet(drawn: Mechanism, told: Vibrations) -> np.ndarray:
 
 def _cloud(told: Vibrations) -> np.ndarray:
     """Points that stand for all that is drawn, at both ends of each vibration that is shown."""
-    found = []
+    clouds = []
     for piece in told.pieces:
         for k in range(min(len(told.labels), SHOWN)):
             way = told.scale[k] * piece.moved[k, 0, ::5]
-            found += [piece.surface.points[::5] + way, piece.surface.points[::5] - way]
-    return np.concatenate(found)
+            clouds += [piece.surface.points[::5] + way, piece.surface.points[::5] - way]
+    return np.concatenate(clouds)
 
 
 class _Scene:

@@ -101,12 +101,12 @@ def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexibl
     """
     bent = {body.index: body for body in flexible}
     frames = [str(name) for name in linear["frame"].values]
-    found = {}
+    motions = {}
     for k, name in enumerate(str(body) for body in run["body"].values):
         at = next((i for i, frame in enumerate(frames) if frame.partition(".")[0] == name), None)
         zero = np.zeros((linear.sizes["vibration"], 2, 3))
         if at is None:
-            found[k] = (zero, zero)
+            motions[k] = (zero, zero)
             continue
         move, turn = linear["frame_translation"].values[:, :, at], linear["frame_rotation"].values[:, :, at]
         if k in bent:
@@ -117,8 +117,8 @@ def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexibl
             turn = turn - q @ own["frame_rotation_shape"].values.T @ R.T
             move = move - q @ (own["frame_translation_shape"].values - centre).T @ R.T
         arm = run["position"].values[0, k] - run["frame_position"].values[0, at]
-        found[k] = (move + np.cross(turn, arm), turn)
-    return found
+        motions[k] = (move + np.cross(turn, arm), turn)
+    return motions
 
 
 def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray) -> np.ndarray:

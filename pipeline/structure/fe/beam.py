@@ -125,7 +125,7 @@ def per_point(mesh: xr.Dataset, name: str) -> np.ndarray:
 def _stiffness(mesh: xr.Dataset) -> dict[str, np.ndarray]:
     E, G = per_point(mesh, "youngs_modulus"), per_point(mesh, "shear_modulus")
     area, second = at_points(mesh, "area"), at_points(mesh, "second_moment")
-    found = {
+    matrices = {
         "stretch": E * area,
         "twist": G * second[..., 0],
         "bend_w": E * second[..., 1],
@@ -134,8 +134,8 @@ def _stiffness(mesh: xr.Dataset) -> dict[str, np.ndarray]:
     }
     if mesh.attrs["theory"] == "timoshenko":
         share = at_points(mesh, "shear_coefficient")
-        found |= {"shear_v": G * area * share[..., 1], "shear_w": G * area * share[..., 2]}
-    return found
+        matrices |= {"shear_v": G * area * share[..., 1], "shear_w": G * area * share[..., 2]}
+    return matrices
 
 
 def _inertia(mesh: xr.Dataset) -> dict[str, np.ndarray]:

@@ -57,16 +57,16 @@ def _constants(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[Se
     """Material and section constants of the cells; at the middle of a tapered one, with profiles about it."""
     tapers = any(part.end_section is not None for part in parts)
     pieces = [_segment_constants(recipe, part, tapers) for part in parts]
-    found = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+    joined = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
     for name in ("product_moment", "inertia_product"):
-        if not found[name].any():
-            del found[name]
-    if np.isnan(found["shear_coefficient"]).any():
+        if not joined[name].any():
+            del joined[name]
+    if np.isnan(joined["shear_coefficient"]).any():
         for name in ("shear_coefficient", "shear_coefficient_profile"):
-            found.pop(name, None)
-    dims = {name: ("cell", "axis") if values.ndim == 2 else ("cell",) for name, values in found.items()}
-    dims |= {f"{name}_profile": ("cell", "point", *dims[name][1:]) for name in TAPERED if name in found}
-    return {name: (dims[name], values) for name, values in found.items()}
+            joined.pop(name, None)
+    dims = {name: ("cell", "axis") if values.ndim == 2 else ("cell",) for name, values in joined.items()}
+    dims |= {f"{name}_profile": ("cell", "point", *dims[name][1:]) for name in TAPERED if name in joined}
+    return {name: (dims[name], values) for name, values in joined.items()}
 
 
 def _segment_constants(
@@ -74,7 +74,7 @@ def _segment_constants(
 ) -> dict[str, np.ndarray]:
     n, material = part.elements, part.material or recipe.material
     middle = _section(recipe, part, (np.arange(n) + 0.5) / n)
-    found = middle | {
+    values = middle | {
         name: np.full(n, getattr(material, name)) for name in ("youngs_modulus", "shear_modulus", "density")
     }
     if tapers:
@@ -83,10 +83,10 @@ def _segment_constants(
             at_points = points[name].reshape(n, len(POINTS), *points[name].shape[1:])
             at_middle = middle[name][:, None]
             # without rotary inertia the middle is zero, and so is every point
-            found[f"{name}_profile"] = np.divide(
+            values[f"{name}_profile"] = np.divide(
                 at_points, at_middle, out=np.ones_like(at_points), where=at_middle != 0.0
             )
-    return found
+    return values
 
 
 def _section(recipe: StraightBeamRecipe | SegmentedBeamRecipe, part: Segment, s: np.ndarray) -> dict[str, np.ndarray]:
@@ -140,8 +140,8 @@ def _attributes(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[S
     }
 
 
-def _types(found: Any) -> str:
-    return " ".join(dict.fromkeys(section.type for section in found))
+def _types(types: Any) -> str:
+    return " ".join(dict.fromkeys(section.type for section in types))
 
 
 def _node_at(x: np.ndarray, place: float, where: str) -> int:

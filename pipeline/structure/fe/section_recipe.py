@@ -140,15 +140,15 @@ def inertia(start: Any, end: Any | None, given: Any | None, s: Value) -> tuple[V
     of equal area does with its area.
     """
     if given is not None and given.type == "equal-area-square":
-        found = sections.square(constants(start, end, s).area ** 0.5)
+        values = sections.square(constants(start, end, s).area ** 0.5)
     elif given is not None:
         return inertia(given, None, None, s)
     else:
-        found = constants(start, end, s)
+        values = constants(start, end, s)
     if start.type == "general" and start.inertia is not None and given is None:
         # given apart, about the axes of the section
         return (*start.inertia, 0.0)
-    return found.polar, found.second_y, found.second_z, found.product
+    return values.polar, values.second_y, values.second_z, values.product
 
 
 def shear_coefficient(start: Any, end: Any | None, s: Value, poisson: float) -> tuple[Value, Value] | None:

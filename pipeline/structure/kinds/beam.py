@@ -46,8 +46,8 @@ def _place(beam: Beam) -> np.ndarray:
 
 def _interfaces(mesh: xr.Dataset, beam: Beam) -> tuple[Interface, ...]:
     columns = ("frame", "frame_node", "frame_position", "frame_rotation")
-    found = zip(*(mesh[name].values for name in columns), strict=True)
-    return tuple(Interface(str(name), x, R, _node(beam, int(node))) for name, node, x, R in found)
+    rows = zip(*(mesh[name].values for name in columns), strict=True)
+    return tuple(Interface(str(name), x, R, _node(beam, int(node))) for name, node, x, R in rows)
 
 
 def _ends(mesh: xr.Dataset, beam: Beam) -> tuple[Interface, ...]:

@@ -62,9 +62,9 @@ def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vector
 def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:
     """Smallest share of the compliance between the interfaces (of a single one: of the free body), and where."""
     whole = full(flexibility, interfaces)
-    found = shares(of_basis(flexibility, interfaces, vectors), whole)
+    fractions = shares(of_basis(flexibility, interfaces, vectors), whole)
     if len(interfaces) > 1:
-        found[np.arange(len(found)), np.arange(len(found))] = 1.0
-    i, j, d = np.unravel_index(int(np.argmin(found)), found.shape)
+        fractions[np.arange(len(fractions)), np.arange(len(fractions))] = 1.0
+    i, j, d = np.unravel_index(int(np.argmin(fractions)), fractions.shape)
     held = "with nothing held" if i == j else f"with '{interfaces[j].name}' held"
-    return float(found[i, j, d]), f"{DIRECTIONS[d]} of '{interfaces[i].name}' {held}"
+    return float(fractions[i, j, d]), f"{DIRECTIONS[d]} of '{interfaces[i].name}' {held}"

@@ -117,13 +117,13 @@ def _rigid_frequency(model: Model, first: float) -> np.ndarray:
     return np.sort(eigen.frequency(values))
 
 
-def _nothing_missed(model: Model, held: sp.csr_array, found: int, between: float) -> None:
+def _nothing_missed(model: Model, held: sp.csr_array, count: int, between: float) -> None:
     """Sylvester's law of inertia: K - s M has as many negative pivots as there are eigenvalues below s."""
     shifted = sp.csr_array(model.stiffness - between * model.mass)
     dofs = own_dofs(held)
     extra, place = 0, model.place
     if held.shape[0] == 0:
-        found += model.rigid.shape[1]
+        count += model.rigid.shape[1]
     elif dofs is not None:
         free = np.setdiff1d(np.arange(model.size), dofs)
         shifted, place = sp.csr_array(shifted[free][:, free]), place[free]
@@ -135,6 +135,6 @@ def _nothing_missed(model: Model, held: sp.csr_array, found: int, between: float
         )
         place = np.vstack([place, np.zeros((extra, 3))])
     below = negative_pivots(shifted, place, extra) - extra
-    if below != found:
+    if below != count:
         where = float(eigen.frequency(np.array([between]))[0])
-        raise SolverError(f"modes: {below} frequencies lie below {where:.6g} Hz, the eigensolver found {found}")
+        raise SolverError(f"modes: {below} frequencies lie below {where:.6g} Hz, the eigensolver found {count}")

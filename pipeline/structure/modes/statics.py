@@ -102,8 +102,8 @@ class Border:
     def _finish(self, free: np.ndarray, right: np.ndarray, values: np.ndarray | float) -> np.ndarray:
         c = self.held.shape[0]
         right[:c] *= self.scale[:, None]
-        found = scipy.linalg.lu_solve(self.system, right)
-        result = free - self.answer @ (self.scale[:, None] * found[:c]) + self.flexibility.model.rigid @ found[c:]
+        solution = scipy.linalg.lu_solve(self.system, right)
+        result = free - self.answer @ (self.scale[:, None] * solution[:c]) + self.flexibility.model.rigid @ solution[c:]
         if self.dofs is not None:
             # what is held is held exactly, not to rounding
             result[self.dofs] = values

@@ -75,7 +75,7 @@ def _shapes(maps: Maps, vectors: np.ndarray) -> np.ndarray:
 
 
 def _fibres(mesh: xr.Dataset) -> dict[str, Any]:
-    found: list[Outline] = []
+    outlines: list[Outline] = []
     types = tuple(mesh.attrs["section"].split())
     poisson = 0.5 * mesh["youngs_modulus"].values / mesh["shear_modulus"].values - 1.0
     area, second = (_at_ends(mesh, name) for name in CONSTANTS)
@@ -87,13 +87,13 @@ def _fibres(mesh: xr.Dataset) -> dict[str, Any]:
             maps = outline(types, given, float(poisson[cell]))
             if maps is None:
                 return {}
-            found.append(maps)
-    most = max(len(maps.stress) for maps in found)
+            outlines.append(maps)
+    most = max(len(maps.stress) for maps in outlines)
     # sections of other types may have fewer fibres: their last one again
-    filled = [np.pad(m.stress, ((0, most - len(m.stress)), (0, 0), (0, 0)), mode="edge") for m in found]
+    filled = [np.pad(m.stress, ((0, most - len(m.stress)), (0, 0), (0, 0)), mode="edge") for m in outlines]
     return {
         "fibre_stress": (("section", "fibre", "stress", "section_load"), np.stack(filled)),
-        "section_round": (("section",), np.array([maps.round for maps in found], dtype=np.int8)),
+        "section_round": (("section",), np.array([maps.round for maps in outlines], dtype=np.int8)),
     }
 
 

@@ -39,8 +39,8 @@ def read(path: Path, where: str) -> sp.coo_array:
 
     Raises ResourceError when its header promises more than memory can hold, and as `apart.read` does.
     """
-    found = apart.read(entries, path, where, apart.allowed())
-    return sp.coo_array((found["value"], (found["row"], found["column"])), shape=tuple(found["shape"]))
+    matrix = apart.read(entries, path, where, apart.allowed())
+    return sp.coo_array((matrix["value"], (matrix["row"], matrix["column"])), shape=tuple(matrix["shape"]))
 
 
 def entries(path: Path, where: str, allowed: float) -> dict[str, Any]:
@@ -54,8 +54,8 @@ def entries(path: Path, where: str, allowed: float) -> dict[str, Any]:
             warnings.simplefilter("ignore")  # of a file without entries, which is told below
             # one more than there should be: packed files have no end that their size tells
             held = np.loadtxt(file, comments="%", ndmin=2, max_rows=count + 1)
-    found = _sparse(held, rows, columns, count, symmetric) if layout else _dense(held, rows, columns, symmetric)
-    return {"shape": list(found.shape), "row": found.row, "column": found.col, "value": found.data}
+    matrix = _sparse(held, rows, columns, count, symmetric) if layout else _dense(held, rows, columns, symmetric)
+    return {"shape": list(matrix.shape), "row": matrix.row, "column": matrix.col, "value": matrix.data}
 
 
 def read_unknowns(path: Path, count: int) -> dict[str, Any]:
@@ -63,8 +63,8 @@ def read_unknowns(path: Path, count: int) -> dict[str, Any]:
 
     node: numbers.  component: texts.  position: shape (rows, 3).  Raises `apart.UnreadableError`.
     """
-    found: dict[str, Any] = apart.read(unknowns, path, count)
-    return found
+    table: dict[str, Any] = apart.read(unknowns, path, count)
+    return table
 
 
 def unknowns(path: Path, count: int) -> dict[str, Any]:

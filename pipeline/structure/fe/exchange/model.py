@@ -128,7 +128,7 @@ def _from_moments(mesh: xr.Dataset, vectors: np.ndarray) -> Integrals:
 
 def _interfaces(mesh: xr.Dataset, component: np.ndarray) -> tuple[Interface, ...]:
     n, node, place = mesh.sizes["unknown"], mesh["unknown_node"].values, mesh["unknown_position"].values
-    found = []
+    interfaces = []
     for k, name in enumerate(mesh["frame"].values):
         tied = mesh["tie_node"].values[mesh["tie_frame"].values == k]
         rows = np.array([[_unknown(node, component, t, c, str(name)) for c in range(3)] for t in tied])
@@ -141,17 +141,17 @@ def _interfaces(mesh: xr.Dataset, component: np.ndarray) -> tuple[Interface, ...
             pick = sp.csr_array((np.ones(rows.size), (np.arange(rows.size), rows.ravel())), shape=(rows.size, n))
             motion = sp.csr_array(average @ pick)
         position, rotation = mesh["frame_position"].values[k], mesh["frame_rotation"].values[k]
-        found.append(Interface(str(name), position, rotation, motion))
-    return tuple(found)
+        interfaces.append(Interface(str(name), position, rotation, motion))
+    return tuple(interfaces)
 
 
 def _unknown(node: np.ndarray, component: np.ndarray, number: int, wanted: int, frame: str) -> int:
-    found = np.flatnonzero((node == number) & (component == wanted))
-    if len(found) != 1:
+    indices = np.flatnonzero((node == number) & (component == wanted))
+    if len(indices) != 1:
         raise InputError(
-            f"mesh recipe [frames.{frame}]", f"node {number} has {len(found)} unknowns {COMPONENTS[wanted]}"
+            f"mesh recipe [frames.{frame}]", f"node {number} has {len(indices)} unknowns {COMPONENTS[wanted]}"
         )
-    return int(found[0])
+    return int(indices[0])
 
 
 def _families(place: np.ndarray, component: np.ndarray) -> Families:

@@ -43,12 +43,12 @@ class Element:
     def face_nodes(self) -> np.ndarray:
         """All nodes of each face, shape (faces, nodes): corners, those between each and the next, the middle."""
         at = {frozenset(part): node for node, part in self.between.items()}
-        found = []
+        faces = []
         for face in self.faces:
             sides = zip(face, (*face[1:], face[0]), strict=True)
             parts = [frozenset(side) for side in sides] + [frozenset(face)]
-            found.append([*face, *(at[part] for part in parts if part in at)])
-        return np.array(found)
+            faces.append([*face, *(at[part] for part in parts if part in at)])
+        return np.array(faces)
 
     @property
     def corners(self) -> int:
@@ -113,8 +113,8 @@ def shape_functions(name: str, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
     element = ELEMENTS[name]
     places = np.asarray(element.basis.doflocs)
     # scikit-fem's order to VTK's
-    found = [int(np.argmin(np.abs(places - place).sum(axis=1))) for place in element.local]
-    pairs = [element.basis.lbasis(points, i) for i in found]
+    order = [int(np.argmin(np.abs(places - place).sum(axis=1))) for place in element.local]
+    pairs = [element.basis.lbasis(points, i) for i in order]
     value = np.stack([np.broadcast_to(phi, points.shape[1:]) for phi, _ in pairs], axis=1)
     gradient = np.stack([np.broadcast_to(slope, points.shape).T for _, slope in pairs], axis=1)
     return value, gradient

@@ -51,7 +51,7 @@ def cut(nodes: np.ndarray, cells: np.ndarray, element: str) -> tuple[np.ndarray,
 def _tetrahedra(element: str) -> np.ndarray:
     """Nodes of 24 tetrahedra in the unit cube: centre, face centre and an edge, shape (24, nodes, 3)."""
     corners = ELEMENTS["hex8"].local
-    found = []
+    cells = []
     for face in HEX_FACES:
         middle = corners[list(face)].mean(axis=0)
         for a, b in zip(face, (*face[1:], face[0]), strict=True):
@@ -59,8 +59,8 @@ def _tetrahedra(element: str) -> np.ndarray:
             four = np.array([corners[a], corners[b], middle, np.full(3, 0.5)])
             four = four if np.linalg.det(four[1:] - four[0]) > 0.0 else four[[1, 0, 2, 3]]
             middles = [0.5 * (four[i] + four[j]) for i, j in TET_EDGES] if element == "tet10" else []
-            found.append(np.vstack([four, *middles]))
-    return np.array(found)
+            cells.append(np.vstack([four, *middles]))
+    return np.array(cells)
 
 
 def _patch(place: object, cells_s: int, cells_t: int) -> tuple[np.ndarray, np.ndarray]:

@@ -73,7 +73,7 @@ def _materials(recipe: SolidRecipe, geometry: Geometry, place: str) -> tuple[lis
 
 
 def _frames(recipe: SolidRecipe, geometry: Geometry, place: str) -> dict[str, Any]:
-    found: dict[str, list[Any]] = {name: [] for name in ("node", "weight", "frame", "position", "rotation")}
+    columns: dict[str, list[Any]] = {name: [] for name in ("node", "weight", "frame", "position", "rotation")}
     taken = np.full(len(geometry.nodes), -1, dtype=np.int64)
     names = list(recipe.frames)
     for k, (name, frame) in enumerate(recipe.frames.items()):
@@ -90,19 +90,19 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, place: str) -> dict[str, An
             taken[nodes] = k
             if taken.min() >= 0:
                 raise InputError(where, "rigid ties take every node of the body", "tie fewer nodes, or their mean")
-        found["node"].append(nodes)
-        found["weight"].append(weight)
-        found["frame"].append(np.full(len(nodes), k))
-        found["position"].append(ties.centre(x, weight) if frame.position is None else np.array(frame.position))
-        found["rotation"].append(quaternion_to_matrix(frame.orientation().as_quaternion()))
+        columns["node"].append(nodes)
+        columns["weight"].append(weight)
+        columns["frame"].append(np.full(len(nodes), k))
+        columns["position"].append(ties.centre(x, weight) if frame.position is None else np.array(frame.position))
+        columns["rotation"].append(quaternion_to_matrix(frame.orientation().as_quaternion()))
     return {
         "frame": (("frame",), names),
         "frame_tie": (("frame",), [frame.tie for frame in recipe.frames.values()]),
-        "frame_position": (("frame", "axis"), np.array(found["position"])),
-        "frame_rotation": (("frame", "axis", "axis2"), np.array(found["rotation"])),
-        "tie_node": (("tie",), np.concatenate(found["node"])),
-        "tie_weight": (("tie",), np.concatenate(found["weight"])),
-        "tie_frame": (("tie",), np.concatenate(found["frame"])),
+        "frame_position": (("frame", "axis"), np.array(columns["position"])),
+        "frame_rotation": (("frame", "axis", "axis2"), np.array(columns["rotation"])),
+        "tie_node": (("tie",), np.concatenate(columns["node"])),
+        "tie_weight": (("tie",), np.concatenate(columns["weight"])),
+        "tie_frame": (("tie",), np.concatenate(columns["frame"])),
     }
 
 

@@ -113,7 +113,7 @@ def _unknowns(mesh: xr.Dataset) -> _Unknowns:
 
 
 def _interfaces(mesh: xr.Dataset, unknowns: _Unknowns) -> tuple[Interface, ...]:
-    size, found = len(unknowns.place), []
+    size, interfaces = len(unknowns.place), []
     for k, name in enumerate(mesh["frame"].values):
         position, rotation = mesh["frame_position"].values[k], mesh["frame_rotation"].values[k]
         if k in unknowns.first:
@@ -124,8 +124,8 @@ def _interfaces(mesh: xr.Dataset, unknowns: _Unknowns) -> tuple[Interface, ...]:
             nodes, weight = mesh["tie_node"].values[tied], mesh["tie_weight"].values[tied]
             x = mesh["node_position"].values[nodes]
             motion = sp.csr_array(ties.mean(x, weight, nodes, position, mesh.sizes["node"]) @ unknowns.spread)
-        found.append(Interface(str(name), position, rotation, motion))
-    return tuple(found)
+        interfaces.append(Interface(str(name), position, rotation, motion))
+    return tuple(interfaces)
 
 
 def _families(unknowns: _Unknowns) -> Families:
@@ -142,8 +142,8 @@ def _families(unknowns: _Unknowns) -> Families:
 def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
     """The boundary: faces with nodes between their corners are cut into several."""
     geometry = Geometry(mesh.attrs["element"], mesh["node_position"].values, mesh["cell_node"].values, {}, {})
-    found = face_nodes(geometry, *boundary(geometry))
-    pieces = found[:, _cut(ELEMENTS[geometry.element].face_nodes.shape[1])].reshape(-1, len(_cut(found.shape[1])[0]))
+    faces = face_nodes(geometry, *boundary(geometry))
+    pieces = faces[:, _cut(ELEMENTS[geometry.element].face_nodes.shape[1])].reshape(-1, len(_cut(faces.shape[1])[0]))
     used, cell = np.unique(pieces, return_inverse=True)
     translation = sp.csr_array(spread[(3 * used[:, None] + np.arange(3)).ravel()])
     # a solid has no rotations of its own

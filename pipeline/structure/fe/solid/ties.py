@@ -33,14 +33,14 @@ def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
         if on.region not in regions:
             hint = suggestion(on.region, regions) if regions else "the mesh names none; choose by plane or cylinder"
             raise InputError(f"{where}.region", f"no region is called '{on.region}'", hint)
-        found = regions[on.region]
+        nodes = regions[on.region]
     else:
-        found = _on_surface(geometry, on)
-    if found.size == 0:
+        nodes = _on_surface(geometry, on)
+    if nodes.size == 0:
         x = geometry.nodes
         box = " to ".join(str([float(f"{v:.6g}") for v in end]) for end in (x.min(axis=0), x.max(axis=0)))
         raise InputError(where, f"selects no node; the body lies within {box} m", "check the place and the units")
-    return found
+    return nodes
 
 
 def _regions(geometry: Geometry) -> dict[str, np.ndarray]:
