@@ -39,11 +39,11 @@ def compiled(names: list[str], place: Workplace) -> list[str]:
         return _all(graphs([str(new.write(kind, Path(folder) / kind)[0]) for kind in USUAL]), apart)
 
 
-def _all(wanted: Sequence[Graph], place: Workplace) -> list[str]:
-    outcome = place.bring([task for graph in wanted for task in graph.bodies().values()])
+def _all(requested: Sequence[Graph], place: Workplace) -> list[str]:
+    outcome = place.bring([task for graph in requested for task in graph.bodies().values()])
     check(outcome)
-    place.monitor.start(len(wanted))
-    for graph in wanted:
+    place.monitor.start(len(requested))
+    for graph in requested:
         known = {name: place.store.load(outcome.records[id(task)]) for name, task in graph.bodies().items()}
         name = place.monitor.begin(graph.scene.name, "kernels")
         _compile(
@@ -53,7 +53,7 @@ def _all(wanted: Sequence[Graph], place: Workplace) -> list[str]:
         )
         place.monitor.finish(name, failed=False)
     place.monitor.end()
-    return [graph.scene.name for graph in wanted]
+    return [graph.scene.name for graph in requested]
 
 
 def _compile(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) -> None:

@@ -32,7 +32,7 @@ FACTS, LOG, FILES = "facts.json", "log.txt", "files"
 #: bytes that are unpacked at most, and characters of a log that are kept
 LARGEST, LONGEST = 1 << 30, 200_000
 #: last lines of what was said that are shown of each
-TOLD = 5
+REPORTED = 5
 #: variables of the environment that change what is computed, or where
 VARIABLES = ("FLEXCLEAR_", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_")
 #: no date: equal content gives equal bytes
@@ -99,7 +99,7 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
     now = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
     then = {**facts["libraries"], "python": facts["python"]}
     told += [f"{k} is {now[k]} here, {v} there" for k, v in sorted(then.items()) if now.get(k, v) != v]
-    ending = [text.strip().splitlines()[-TOLD:] for text in (log, said)]
+    ending = [text.strip().splitlines()[-REPORTED:] for text in (log, said)]
     told += [f"{where}: {line}" for where, lines in zip(("there", "here"), ending, strict=True) for line in lines]
     return done.returncode == facts["exit_code"], "\n".join(told)
 

@@ -100,11 +100,11 @@ def _of_sweep(path: Path) -> tuple[list[FlexclearError], Seen]:
     """Its own mistakes and those of its scene."""
     from flexclear.stages import sweep, sweep_plan
 
-    wanted, scene = sweep.read(path)
+    requested, scene = sweep.read(path)
     errors, seen = examined(str(scene.path))
     if not errors:
-        errors = _collect([lambda: sweep_plan.plan(wanted, scene, str(path))])
-    return errors, replace(seen, summary=f"a sweep over {', '.join(wanted.vary)} of {scene.name}: {seen.summary}")
+        errors = _collect([lambda: sweep_plan.plan(requested, scene, str(path))])
+    return errors, replace(seen, summary=f"a sweep over {', '.join(requested.vary)} of {scene.name}: {seen.summary}")
 
 
 def _of_recipe(path: Path) -> tuple[list[FlexclearError], Seen]:

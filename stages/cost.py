@@ -82,7 +82,7 @@ def study(scene: Scene, place: Workplace, peers: Sequence[Track] = (), integrato
     peers: runs of other programs, see `stages.cost_peers`.  integrators: see `cost_design.runs`.
     Raises InputError when the scene has nothing to measure.
     """
-    chosen = scene.wanted()
+    chosen = scene.requested()
     designs = cost_design.runs(scene, _highest(scene, place), integrators)
     names = [quantity.name for quantity in chosen]
     compiled, more = _kernels(designs), {"quantities": names}

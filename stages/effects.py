@@ -57,8 +57,8 @@ def bring(scene: Scene, place: Workplace, members: int = s4_watched.MEMBERS) -> 
     if not chosen:
         raise InputError(str(scene.path or scene.name), "nothing in it is watched", "name quantities in [view] watch")
     by_name = {effect.name: effect for effect in there}
-    wanted = s8_effects.variants_of(there)
-    scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in wanted}
+    requested = s8_effects.variants_of(there)
+    scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in requested}
     tasks = {gone: s4_watched.task(variant, chosen, members) for gone, variant in scenes.items()}
     done = s8_effects.task(scene, there, chosen, tasks, members)
     outcome = place.bring([done])

@@ -53,9 +53,9 @@ def text(linear: xr.Dataset) -> str:
         f"{'':>4} {'frequency':>14} {'damping':>10}  most kinetic energy in",
         f"{'':>4} {'Hz':>14} {'ratio':>10}",
     ]
-    share = linear["energy_share"].max("moving_body").values
+    fraction = linear["energy_share"].max("moving_body").values
     columns = [linear[name].values for name in ("vibration", "frequency", "damping_ratio", "decay_rate", "dominant")]
-    for number, hertz, damping, rate, name, part in zip(*columns, share, strict=True):
+    for number, hertz, damping, rate, name, part in zip(*columns, fraction, strict=True):
         # what is damped so far has two rates and no frequency: two rows of one motion
         alone = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
         lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){alone}")

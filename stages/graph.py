@@ -197,8 +197,8 @@ class Graph:
 
     def up_to(self, stage: str) -> list[Task]:
         """All tasks of the scene up to a stage, that stage included."""
-        wanted = STAGES[: STAGES.index(stage) + 1]
-        return [task for name in wanted for task in self.of(name).values()]
+        requested = STAGES[: STAGES.index(stage) + 1]
+        return [task for name in requested for task in self.of(name).values()]
 
     def of(self, stage: str) -> dict[str, Task]:
         """Tasks of one stage by body; by the empty name where there is one for the whole scene."""

@@ -55,9 +55,9 @@ def command(options: argparse.Namespace) -> None:
         raise run.MissedAccuracyError("\n".join(missed))
 
 
-def told(wanted: list[Graph], place: Workplace) -> list[Planned]:
+def told(requested: list[Graph], place: Workplace) -> list[Planned]:
     """The plans of scenes, brought up to date and printed."""
-    plans = [bring(graph.scene, place) for graph in wanted]
+    plans = [bring(graph.scene, place) for graph in requested]
     print(*(plan.text() for plan in plans), sep="\n")
     return plans
 
@@ -205,7 +205,7 @@ def verify(planned: Planned, place: Workplace) -> list[str]:
 
     compared = beside(planned, place)
     print(as_markdown(verified(compared)))
-    wanted = planned.scene.accuracy
+    requested = planned.scene.accuracy
     over = [
         f"{planned.scene.name}: the plan misses {name}: {error:.3g} instead of {most:.3g} {unit}"
         for name, unit, error, most in zip(
@@ -213,7 +213,7 @@ def verify(planned: Planned, place: Workplace) -> list[str]:
         )
         if error > most
     ]
-    return over if wanted is None or not wanted.allow_missed else []
+    return over if requested is None or not requested.allow_missed else []
 
 
 def beside(planned: Planned, place: Workplace) -> xr.Dataset:

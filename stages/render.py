@@ -42,7 +42,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring them up to date and say where they are."""
-    wanted = _wanted(options.what, options.format)
+    requested = _requested(options.what, options.format)
     if options.at is not None and options.what != "vibrations":
         raise InputError("--at", "belongs to --what vibrations")
     try:
@@ -50,9 +50,9 @@ def command(options: argparse.Namespace) -> None:
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
     graphs, place = run.graphs(options.scenes, options.set), workplace(options)
-    tasks = {graph.scene.name: _tasks(graph, wanted, options.what is not None, time) for graph in graphs}
+    tasks = {graph.scene.name: _tasks(graph, requested, options.what is not None, time) for graph in graphs}
     made = [task for group in tasks.values() for task in group]
-    if len(graphs) > 1 and wanted == [("modes", "html")]:
+    if len(graphs) > 1 and requested == [("modes", "html")]:
         made.append(_beside(graphs))
     outcome = place.bring(made)
     for task in made:
@@ -62,7 +62,7 @@ def command(options: argparse.Namespace) -> None:
     check(outcome)
 
 
-def _wanted(what: str | None, kind: str | None) -> list[tuple[str, str]]:
+def _requested(what: str | None, kind: str | None) -> list[tuple[str, str]]:
     """What is to be made.  Raises InputError for what cannot be shown so."""
     if what is None and kind is None:
         return list(USUAL)
@@ -77,9 +77,9 @@ def _wanted(what: str | None, kind: str | None) -> list[tuple[str, str]]:
     return [(what, kind)]
 
 
-def _tasks(graph: Graph, wanted: list[tuple[str, str]], asked: bool, time: float | None) -> list:
+def _tasks(graph: Graph, requested: list[tuple[str, str]], asked: bool, time: float | None) -> list:
     """One task for each; of what is usual, modes only where there are some."""
-    there = [pair for pair in wanted if asked or pair[0] != "modes" or graph.scene.flexible()]
+    there = [pair for pair in requested if asked or pair[0] != "modes" or graph.scene.flexible()]
     with run.in_file(graph.scene.path):
         return [graph.picture(what, kind, time) for what, kind in there]
 
@@ -106,7 +106,7 @@ def _tell(place: Workplace, folder: str, files: list[str]) -> None:
 
 def rendered(scene: Scene, place: Workplace | None = None) -> Path:
     """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
-    place, wanted = place or workplace(), Graph(scene)
+    place, requested = place or workplace(), Graph(scene)
     run.require_names(scene)
-    check(place.bring(list(wanted.render.values()), jobs=1))
-    return place.store.root / wanted.simulate.folder
+    check(place.bring(list(requested.render.values()), jobs=1))
+    return place.store.root / requested.simulate.folder

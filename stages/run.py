@@ -59,25 +59,25 @@ def command(options: argparse.Namespace) -> None:
         check_target(options.out)
     if options.verify and not options.planned:
         raise InputError("--verify", "tells the true error of a plan, and no plan is asked for", "add --planned")
-    wanted = graphs(options.scenes, options.set)
+    requested = graphs(options.scenes, options.set)
     place = workplace(options)
-    plans = import_module("flexclear.stages.plan").told(wanted, place) if options.planned else []
-    wanted = [Graph(plan.planned) for plan in plans] or wanted
-    for graph in wanted:
+    plans = import_module("flexclear.stages.plan").told(requested, place) if options.planned else []
+    requested = [Graph(plan.planned) for plan in plans] or requested
+    for graph in requested:
         check_run(graph.scene, place.store.root)
         taken = owner.claim(graph.scene, place.store)
         if taken is not None:
             place.monitor.say(taken)
-    outcome = place.bring([task for graph in wanted for task in graph.up_to(options.to)])
+    outcome = place.bring([task for graph in requested for task in graph.up_to(options.to)])
     check(outcome)
     if options.to == "bundle":
-        print("\n\n".join(filter(None, (deficits(graph, place, outcome) for graph in wanted))))
+        print("\n\n".join(filter(None, (deficits(graph, place, outcome) for graph in requested))))
     if options.out is not None:
-        copy_run(wanted[0], place, options.out)
-    for graph in wanted if options.to in ("simulate", "ensemble", "post") else ():
+        copy_run(requested[0], place, options.out)
+    for graph in requested if options.to in ("simulate", "ensemble", "post") else ():
         told(place.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
     missed = [text for plan in plans if options.verify for text in plan.missed()]
-    conclude(wanted, place, outcome, missed)
+    conclude(requested, place, outcome, missed)
 
 
 def scene_arguments(parser: argparse.ArgumentParser) -> None:
@@ -239,10 +239,10 @@ def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome, plans:
             continue
         for sentence in filter(None, record.said.get("warnings", "").split("\n")):
             place.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
-        verdict, wanted = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
-        if verdict != "met" and wanted is not None:
+        verdict, requested = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
+        if verdict != "met" and requested is not None:
             text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is kept"
-            if wanted.allow_missed:
+            if requested.allow_missed:
                 place.monitor.say(text)
             else:
                 missed.append(f"{text}\n  hint: ask for less, or write allow_missed = true in [accuracy]")

@@ -57,7 +57,7 @@ def task(scene: Scene) -> Task:
             "simulate": simulate,
             "title": scene.title,
             "elements": counts,
-            "units": {q.name: unit_of(scene, q) for q in scene.wanted()},
+            "units": {q.name: unit_of(scene, q) for q in scene.requested()},
         },
         context={"name": scene.name, "limits": scene.limits.written()},
         inputs=inputs,
@@ -110,9 +110,9 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     dataset = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
     progress(None, "chart")
-    wanted = dict(zip(dataset["quantity"].values.tolist(), dataset["wanted"].values.tolist(), strict=True))
+    requested = dict(zip(dataset["quantity"].values.tolist(), dataset["wanted"].values.tolist(), strict=True))
     result: dict[str, Any] = {"nc": dataset} | files("plan", shown.table(dataset))
-    return result | chart("plan", shown.drawn(dataset), f"What the accuracy calls for: {params['title']}", wanted)
+    return result | chart("plan", shown.drawn(dataset), f"What the accuracy calls for: {params['title']}", requested)
 
 
 def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> Any:

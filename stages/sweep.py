@@ -31,7 +31,7 @@ NAME = "sweep"
 #: what a sweep without a file is called
 UNNAMED = "sweep"
 #: finished points are stored after so many seconds, later after that share of the time so far
-OFTEN, SHARE = 2.0, 0.01
+OFTEN, FRACTION = 2.0, 0.01
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -63,11 +63,11 @@ def command(options: argparse.Namespace) -> None:
             run.check_target(options.out)
     place = workplace(options)
     paths = [run.find_scene(name) for name in options.sweeps]
-    wanted = [sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path)]]
-    if options.out is not None and options.out.suffix != sweep_large.SUFFIX and sweep_large.is_large(wanted[0]):
+    requested = [sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path)]]
+    if options.out is not None and options.out.suffix != sweep_large.SUFFIX and sweep_large.is_large(requested[0]):
         raise InputError(f"--out {options.out}", "the dataset is larger than memory", "let its name end in .zarr")
     with engine(width(options.workers), options.scheduler) as workers, place.limited():
-        for path, plan in zip(paths, wanted, strict=True):
+        for path, plan in zip(paths, requested, strict=True):
             folder = place.store.root / "sweeps" / scene_name(path).removeprefix("sweeps/")
             _show(plan, bring(plan, workers, place, folder), folder, options.out)
 
@@ -126,7 +126,7 @@ class _Desk:
         self.fresh += len(finished)
         self.refused += sum(bool(point.refused) for _, point in finished)
         since = now() - self.begun
-        if now() - self.stored > max(OFTEN, SHARE * since):
+        if now() - self.stored > max(OFTEN, FRACTION * since):
             self.store()
         told = f", {self.refused} refused" if self.refused else ""
         rate = self.fresh / since if since > 0.0 else 0.0
@@ -163,9 +163,11 @@ def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path
             place.store.show_families(shown, {family.folder[0]: family.facts for family in ready.families})
         kept = () if large else plan.kept
         points = {key: point for family in ready.families for key, point in family.find(place.store, kept).items()}
-        wanted = {job.key: job for job in ready.jobs}
-        desk = _Desk(ready, place, len(wanted), {key: points[key] for key in wanted if key in points}, large=large)
-        missing = [job for key, job in wanted.items() if key not in desk.done]
+        requested = {job.key: job for job in ready.jobs}
+        desk = _Desk(
+            ready, place, len(requested), {key: points[key] for key in requested if key in points}, large=large
+        )
+        missing = [job for key, job in requested.items() if key not in desk.done]
         try:
             if missing:
                 _run(desk, workers, missing)

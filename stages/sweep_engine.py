@@ -19,13 +19,13 @@ from flexclear.pipeline.core.workflow.schedule import TICK
 from flexclear.stages.sweep_points import source_digest, work
 
 #: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
-SHARE, MOST, QUEUED = 0.5, 1000, 2
+BATCH_SECONDS, MOST, QUEUED = 0.5, 1000, 2
 #: towards the end less is handed out, a share of what is left, so that all workers finish together; least seconds of it
 LEAST = 0.02
 #: evaluations of a point from which on it is run beside others, and of all that wait, for which code is made
 WORTH, WORTH_CODE = 5_000, 5_000_000
 #: so many, where each worker has as many, and seconds of work of several times as many: fewer wait for their last ones
-ABREAST, SHARE_ABREAST = 8, 5.0
+ABREAST, BATCH_SECONDS_TOGETHER = 8, 5.0
 #: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
 PER_WORKER = 5e-3
 #: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
@@ -104,7 +104,7 @@ class Engine:
                 done(list(zip(mine, points, strict=True)), seconds)
                 evaluations = sum(point.evaluations for point in points) / len(points)
                 first, lost = not pace, 0  # what the first one took held compiling and fetching
-                pace = max(1e-6, seconds / len(mine)) if not first else SHARE / 2.0
+                pace = max(1e-6, seconds / len(mine)) if not first else BATCH_SECONDS / 2.0
 
     def _given(
         self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool, abreast: bool
@@ -133,8 +133,8 @@ def _portion(left: int, pace: float, width: int, abreast: bool) -> int:
     abreast: whether they are run side by side; of few, most would wait for the last one.
     """
     asking = PER_WORKER * width
-    share = SHARE_ABREAST if abreast else SHARE
-    seconds = min(max(share, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
+    seconds_of_work = BATCH_SECONDS_TOGETHER if abreast else BATCH_SECONDS
+    seconds = min(max(seconds_of_work, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
     if abreast and left < ABREAST * width:  # the last ones
         return max(ABREAST // 2, ceil(left / width))
     if abreast:

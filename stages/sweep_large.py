@@ -43,7 +43,7 @@ def is_large(plan: Plan) -> bool:
 
     Raises ResourceError where it cannot be written in slabs either.
     """
-    allowed = plan.scene.limits.memory or machine.SHARE * machine.memory()
+    allowed = plan.scene.limits.memory or machine.FRACTION * machine.memory()
     need = HELD * plan_size(plan)
     if need > allowed and find_spec("zarr") is None:
         machine.require_memory(need, "the sweep's dataset", f"keep less, or {INSTALL}: it is then on disk", allowed)
@@ -59,7 +59,7 @@ def require_small(plan: Plan) -> None:
 def plan_size(plan: Plan) -> float:
     """Bytes of all that is kept."""
     lengths = dimensions(plan.time, plan.sections)
-    each = sum(prod(lengths[dim] for dim in one.dims) for one in plan.kept) * len(plan.shares)
+    each = sum(prod(lengths[dim] for dim in one.dims) for one in plan.kept) * len(plan.statistics)
     return 8.0 * each * prod(plan.design.shape)
 
 

@@ -112,7 +112,7 @@ class Plan:
         attributes |= {"members": self.sweep.members} if self.sweep.members else {}
         keys = [job.key for job in self.jobs]
         return results.dataset(
-            self.design, self.kept, keys, points, self.time, self.sections, self.turning, attributes, self.shares
+            self.design, self.kept, keys, points, self.time, self.sections, self.turning, attributes, self.statistics
         )
 
     def rows(self, first: int, last: int) -> Plan:
@@ -135,10 +135,10 @@ class Plan:
         return (self.scene.sections or Sections()).periods
 
     @property
-    def shares(self) -> list[str]:
+    def statistics(self) -> list[str]:
         """Of `points.SHARES`, those that are asked for."""
         asked = {"values": True, "error": self.sweep.error, "deviation": self.sweep.members}
-        return [share for share, wanted in asked.items() if wanted]
+        return [statistic for statistic, requested in asked.items() if requested]
 
 
 def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
@@ -272,19 +272,19 @@ def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
             yield axis, edited(base, chosen)
 
 
-def prepare(wanted: Plan, place: Workplace) -> Plan:
+def prepare(requested: Plan, place: Workplace) -> Plan:
     """The plan with its families, whose flexible bodies are brought up to date first, and its points by key."""
-    points = wanted.design.points()
-    groups = _groups(wanted.scene, points)
-    graphs = {text: Graph(edited(wanted.scene, first), shown=False) for text, first in groups.items()}
+    points = requested.design.points()
+    groups = _groups(requested.scene, points)
+    graphs = {text: Graph(edited(requested.scene, first), shown=False) for text, first in groups.items()}
     with without_main():
         outcome = place.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
     check(outcome)
-    modules = _modules(wanted)
+    modules = _modules(requested)
     families = {}
     for text, graph in graphs.items():
         records = {name: outcome.records[id(task)] for name, task in graph.simulate.inputs.items()}
-        sections = any(one.reduction == "sections" for one in wanted.kept)
+        sections = any(one.reduction == "sections" for one in requested.kept)
         simulate = s4_simulate.params(graph.scene, sections=sections)
         task = Task(
             stage="sweep",
@@ -292,28 +292,28 @@ def prepare(wanted: Plan, place: Workplace) -> Plan:
             run="flexclear.stages.sweep_points:work",
             params={
                 "simulate": _without_varied(simulate, points[0], groups[text]),
-                "keep": [one.name for one in wanted.kept],
-                "members": wanted.sweep.members or 0,
-                "error": wanted.sweep.error,
+                "keep": [one.name for one in requested.kept],
+                "members": requested.sweep.members or 0,
+                "error": requested.sweep.error,
             },
             folder="",
             modules=modules,
         )
         given = facts(task, {name: record.digest for name, record in records.items()}, place.sources)
         inputs = {name: place.store.load(record) for name, record in records.items()}
-        keep = tuple(one.name for one in wanted.kept)
+        keep = tuple(one.name for one in requested.kept)
         limited = {**simulate, "limits": graph.scene.limits.written()}  # no facts, and a point may ask for more
-        work = Work(key(given), limited, inputs, keep, wanted.sweep.members or 0, wanted.sweep.error)
+        work = Work(key(given), limited, inputs, keep, requested.sweep.members or 0, requested.sweep.error)
         families[text] = Family(work, given)
     jobs = []
     for point in points:
-        text, own = _group(wanted.scene, point)
+        text, own = _group(requested.scene, point)
         family = families[text].key
         # what decides the bodies is in the family's scene, whose bodies are numbers by now
         rest = {name: value for name, value in point.items() if name not in own}
         name, (stage, _) = _point_key(family, point), families[text].folder
         jobs.append(Job(name, family, rest, place.store.path(stage, name, "part").with_suffix("")))
-    return replace(wanted, families=tuple(families.values()), jobs=tuple(jobs))
+    return replace(requested, families=tuple(families.values()), jobs=tuple(jobs))
 
 
 def _group(scene: Scene, point: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
@@ -327,10 +327,10 @@ def _groups(scene: Scene, points: Sequence[Mapping[str, Any]]) -> dict[str, dict
     return dict(_group(scene, point) for point in points)
 
 
-def _modules(wanted: Plan) -> tuple[str, ...]:
+def _modules(requested: Plan) -> tuple[str, ...]:
     """Modules that any point reaches by the names of its parts: values that are no numbers may name others."""
-    modules = set(s4_simulate.modules(wanted.scene))
-    for _, scene in _worded(wanted.scene, wanted.design):
+    modules = set(s4_simulate.modules(requested.scene))
+    for _, scene in _worded(requested.scene, requested.design):
         modules |= set(s4_simulate.modules(scene))
     return tuple(sorted(modules))
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 #: equal error: of the velocity of the body with most joints, relative, over this first share of the run, where
 #: all scenes can still be predicted point by point
-EQUAL_ERROR, SHARE = 1e-6, 0.05
+EQUAL_ERROR, FRACTION = 1e-6, 0.05
 #: this share of a run, unmeasured, fetches its code
 WARM = 0.01
 #: Wang & Wang (2019), sec. 5: predictor-corrector with this step [s]; which one, they do not say
@@ -56,15 +56,15 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         tolerance["tolerance"][name] = damped.solver.rtol
         tolerance["size"][name] = TOLERANCE / equal.length
         costs["size"][name], _ = _measured(damped_scene(scene, TOLERANCE / equal.length), reduced, checked=False)
-        for way, wanted in (("step", paper_scene(scene)), ("tolerance", damped)):
-            costs[way][name], why = _measured(wanted, reduced, checked=way == "step")
+        for way, requested in (("step", paper_scene(scene)), ("tolerance", damped)):
+            costs[way][name], why = _measured(requested, reduced, checked=way == "step")
             refused += [f"{name}: {why}"] if why else []
     data: dict[str, Any] = {}
     for way, costs_of_way in costs.items():
         data |= _variables(way, list(costs_of_way.values()))
     for way, values in tolerance.items():
         data[f"{way}_rtol"] = (("scene",), list(values.values()), {"units": "1"})
-    attributes = {"Conventions": "CF-1.11", "equal_error": EQUAL_ERROR, "share": SHARE, "step": PAPER["step"]}
+    attributes = {"Conventions": "CF-1.11", "equal_error": EQUAL_ERROR, "share": FRACTION, "step": PAPER["step"]}
     attributes |= {"tolerance": TOLERANCE, "damped": DAMPED, "refused": "; ".join(refused)}
     return {"nc": xr.Dataset(data, coords={"scene": list(params)}, attrs=attributes)}
 
@@ -122,14 +122,14 @@ def equal_tolerance(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> float:
     """The tolerance at which a scene has the common error over the first share of its run."""
     from flexclear.pipeline import dynamics
 
-    velocity = next(q.name for q in scene.wanted() if q.kind == "velocity")
-    wanted = {"time.end": _share(scene, SHARE), "accuracy": {velocity: {"relative": EQUAL_ERROR}}}
-    return float(dynamics.simulate(_edited(scene, wanted), bundles, silent).attrs["accuracy_rtol"])
+    velocity = next(q.name for q in scene.requested() if q.kind == "velocity")
+    requested = {"time.end": _share(scene, FRACTION), "accuracy": {velocity: {"relative": EQUAL_ERROR}}}
+    return float(dynamics.simulate(_edited(scene, requested), bundles, silent).attrs["accuracy_rtol"])
 
 
-def _share(scene: Scene, share: float) -> float:
+def _share(scene: Scene, fraction: float) -> float:
     """The end of the first share of a run [s]."""
-    return scene.time.start + share * (scene.time.end - scene.time.start)
+    return scene.time.start + fraction * (scene.time.end - scene.time.start)
 
 
 def _edited(scene: Scene, edit: Mapping[str, Any]) -> Scene:

@@ -78,8 +78,8 @@ def static_rows() -> Iterator[Row]:
         yield {"place_mm": place, "condition": FULL, "count": 0} | row
         for condition in CONDITIONS:
             for count in design.whole_counts(place, condition, max(COUNTS)):
-                share = design.solved(Case(place, condition, count))["compliance_share"]
-                yield {"place_mm": place, "condition": condition, "count": count} | _compliance(share, place)
+                fraction = design.solved(Case(place, condition, count))["compliance_share"]
+                yield {"place_mm": place, "condition": condition, "count": count} | _compliance(fraction, place)
 
 
 def _compliance(values: xr.DataArray, place: int) -> Row:

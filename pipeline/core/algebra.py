@@ -156,8 +156,10 @@ def axis_to_matrix(axis: Sequence[float]) -> np.ndarray:
     square = x * x + y * y  # of the sine of the angle between the two
     if z < 0.0 and square < _OPPOSITE:  # which way to turn is then a matter of rounding
         return axes_to_matrix({"z": [x, y, z], "x": [1.0, 0.0, 0.0]})
-    share = 1.0 / (1.0 + z) if z >= 0.0 else (1.0 - z) / square
-    return np.array([[1.0 - share * x * x, -share * x * y, x], [-share * x * y, 1.0 - share * y * y, y], [-x, -y, z]])
+    fraction = 1.0 / (1.0 + z) if z >= 0.0 else (1.0 - z) / square
+    return np.array(
+        [[1.0 - fraction * x * x, -fraction * x * y, x], [-fraction * x * y, 1.0 - fraction * y * y, y], [-x, -y, z]]
+    )
 
 
 def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:

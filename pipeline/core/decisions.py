@@ -57,7 +57,7 @@ class Plan:
     """
 
     decisions: tuple[Decision, ...]
-    wanted: Mapping[str, float]
+    requested: Mapping[str, float]
     integrator: str
     rtol: float
     integration: Mapping[str, float]

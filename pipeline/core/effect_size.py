@@ -31,7 +31,7 @@ RARE = 1e-3
 #: share of a series over which the spread of members is pooled
 POOLED = 0.05
 #: by how much members start apart: a share of the clearance, and the least [m]
-SHARE, LEAST = 1e-3, 1e-8
+FRACTION, LEAST = 1e-3, 1e-8
 #: what is kept of a quantity to compare it by: the series, and of what impacts make large its extreme, which is read
 #: where it is and not at an output
 OF_KIND = {
@@ -72,7 +72,7 @@ def members_apart(scene: Scene) -> Scene:
     these look like influences.
     """
     clearances = [joint.clearance for joint in scene.contacts().values()]
-    apart = max(LEAST, SHARE * min(clearances, default=0.0))
+    apart = max(LEAST, FRACTION * min(clearances, default=0.0))
     changed = scene.model_copy(update={"ensemble": Ensemble(perturbation=apart)})
     changed._name, changed._path = scene.name, scene.path
     return changed

@@ -130,7 +130,7 @@ def limit_itself(memory: float, seconds: float) -> None:
         resource.setrlimit(kind, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
 
 
-def share(source: Any, target: Any) -> bool:
+def share_blocks(source: Any, target: Any) -> bool:
     """Whether an open file could be made to share the bytes of another (Linux, on file systems that can)."""
     fcntl = _module("fcntl")
     if fcntl is None or sys.platform != "linux":

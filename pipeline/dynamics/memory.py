@@ -327,7 +327,7 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # what the last first step with a contact closed could have been, whether the next accepted step is the first one of a
 # segment
 TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
-SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, SHARE, LEFT, BLIND_STEPS = range(13, 22)
+SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, FRACTION, LEFT, BLIND_STEPS = range(13, 22)
 REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(22, 27)
 
 # Integers in n -------------------------------------------------------------------------------------------------------

@@ -114,13 +114,13 @@ def spectrum(series: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def few_lines(series: np.ndarray) -> float:
     """Share of the variance in the LINES largest lines of the spectrum, each with its two neighbours on both sides."""
     _, power = spectrum(series)
-    left, share = power.copy(), 0.0
+    left, fraction = power.copy(), 0.0
     for _ in range(LINES):
         k = int(np.argmax(left))
         around = slice(max(k - 2, 0), k + 3)
-        share += float(left[around].sum())
+        fraction += float(left[around].sum())
         left[around] = 0.0
-    return share
+    return fraction
 
 
 def principal(states: np.ndarray, count: int = 3) -> np.ndarray:

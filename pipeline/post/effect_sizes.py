@@ -172,7 +172,7 @@ def written(value: float, uncertainty: float, unit: str) -> str:
     return f"{rounded(factor * value, 3)} {shown}"
 
 
-def chart(name: str, dataset: xr.Dataset, title: str, wanted: Mapping[str, float] | None = None) -> dict[str, bytes]:
+def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, float] | None = None) -> dict[str, bytes]:
     """Bars of what each effect does alone, a panel for each quantity; a line where an accuracy is wanted.
 
     Uses `dropped` and, where there is one, `added`, of single effects.
@@ -207,8 +207,8 @@ def chart(name: str, dataset: xr.Dataset, title: str, wanted: Mapping[str, float
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")
-            if wanted and np.isfinite(wanted.get(chosen[k], np.nan)):
-                panel.axvline(wanted[chosen[k]], color="#D55E00", lw=1.3, label="wanted accuracy")
+            if requested and np.isfinite(requested.get(chosen[k], np.nan)):
+                panel.axvline(requested[chosen[k]], color="#D55E00", lw=1.3, label="wanted accuracy")
             low, high = panel.get_xlim()
             if high < FEW * low:
                 style.plain(panel.xaxis)

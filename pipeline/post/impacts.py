@@ -59,11 +59,11 @@ def _books(
     time, booked = run["time"].values, dict[str, tuple[tuple[str, ...], np.ndarray]]()
     for name, book in BOOKS.items():
         if book in run:
-            values, shares = run[book].values, np.full(len(contact), np.nan)
+            values, fractions = run[book].values, np.full(len(contact), np.nan)
             names = list(run["contact"].values)
             for i, c in enumerate(names.index(name) for name in contact):
-                shares[i] = np.interp(ended[i], time, values[:, c]) - np.interp(begun[i], time, values[:, c])
-            booked[name] = (("impact",), shares)
+                fractions[i] = np.interp(ended[i], time, values[:, c]) - np.interp(begun[i], time, values[:, c])
+            booked[name] = (("impact",), fractions)
     return booked
 
 

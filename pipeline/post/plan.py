@@ -19,7 +19,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
     units: of the quantities, by name.  nan where nothing was estimated, infinite where nothing bounds it or the events
     differ.
     """
-    names = list(plan.wanted)
+    names = list(plan.requested)
     shape = (len(plan.decisions), len(names))
     estimate, doubt = (np.full(shape, np.nan) for _ in range(2))
     for i, decision in enumerate(plan.decisions):
@@ -42,7 +42,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
             "kept": (("effect",), np.array([int(d.kept) for d in plan.decisions], dtype=np.int8)),
             "evidence": (("effect",), np.array([d.evidence for d in plan.decisions], dtype=object)),
             "reason": (("effect",), np.array([d.reason for d in plan.decisions], dtype=object)),
-            "wanted": (("quantity",), np.array([plan.wanted[name] for name in names])),
+            "wanted": (("quantity",), np.array([plan.requested[name] for name in names])),
             "integration": (("quantity",), np.array([plan.integration.get(name, np.nan) for name in names])),
             "elements": (("body",), np.array([m.given for m in meshes], dtype=np.int64)),
             "elements_called_for": (("body",), np.array([m.called_for for m in meshes], dtype=np.int64)),
@@ -109,8 +109,8 @@ def table(planned: xr.Dataset) -> Table:
         ]
         decision = "keep" if int(part["kept"]) else "drop"
         rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
-    wanted = [written(float(value), 0.0, unit) for value, unit in zip(planned["wanted"].values, units, strict=True)]
-    rows.append(("wanted", "", *wanted, "", ""))
+    requested = [written(float(value), 0.0, unit) for value, unit in zip(planned["wanted"].values, units, strict=True)]
+    rows.append(("wanted", "", *requested, "", ""))
     told = json.loads(planned.attrs["planned"])
     notes = [words(planned)]
     notes += [f"{name} keeps {count} of its modes, which do the same as all." for name, count in told["modes"].items()]
@@ -175,10 +175,10 @@ def verified(planned: xr.Dataset) -> Table:
     for k, name in enumerate(planned["quantity"].values):
         unit = str(planned["unit"].values[k])
         error, chance = float(planned["error"][k]), float(planned["chance"][k])
-        wanted = float(planned["wanted"][k])
-        share = error / wanted
-        verdict = "met" if share <= 1.0 else f"missed, {share:.2g} times"
-        rows.append((str(name), written(wanted, 0.0, unit), written(error, chance, unit), verdict))
+        requested = float(planned["wanted"][k])
+        fraction = error / requested
+        verdict = "met" if fraction <= 1.0 else f"missed, {fraction:.2g} times"
+        rows.append((str(name), written(requested, 0.0, unit), written(error, chance, unit), verdict))
     notes = [
         f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
         f"{int(planned.attrs['planned_evaluations']):,} as planned, of all members together.",

@@ -121,13 +121,13 @@ def contacts(run: xr.Dataset | LabelledArrays) -> Variables:
 
 def _time_share(run: xr.Dataset | LabelledArrays) -> np.ndarray:
     """Share of the run that each contact is closed, from its located begins and ends."""
-    time, share, names = run["time"].values, np.zeros(run.sizes["contact"]), list(run["contact"].values)
+    time, fraction, names = run["time"].values, np.zeros(run.sizes["contact"]), list(run["contact"].values)
     closings = of_kind(run, "closing")
     begun, lasted = run["event_time"].values[closings], run["event_duration"].values[closings]
     lasted = np.where(np.isfinite(lasted), lasted, time[-1] - begun)
     for name, seconds in zip(run["event_contact"].values[closings], lasted, strict=True):
-        share[names.index(name)] += seconds
-    return share / (time[-1] - time[0])
+        fraction[names.index(name)] += seconds
+    return fraction / (time[-1] - time[0])
 
 
 def _peak_force(run: xr.Dataset | LabelledArrays) -> np.ndarray:

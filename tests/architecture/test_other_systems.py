@@ -100,9 +100,9 @@ def test_all_text_is_read_and_written_as_utf_8(root: Path) -> None:
     found = []
     for path in (p for name in ("pipeline", "stages", "benchmarks") for p in sorted((root / name).rglob("*.py"))):
         for node in ast.walk(ast.parse(path.read_bytes())):
-            wanted = _asked(node)
-            if wanted:
-                found += [f"{path.relative_to(root)}:{node.lineno} {name}" for name in wanted]
+            requested = _asked(node)
+            if requested:
+                found += [f"{path.relative_to(root)}:{node.lineno} {name}" for name in requested]
     # a distribution's own reader knows its encoding
     assert [place for place in found if "fingerprint.py" not in place] == []
 

@@ -177,7 +177,7 @@ def test_a_killed_run_goes_on_with_the_straight_code_that_it_had(
 def test_what_an_engine_has_met_before_changes_no_bit(root: Path) -> None:
     """Sections and sweeps run again and again on one engine, and an earlier attempt may have done the first of them."""
     engine = engine_with(check(root, "bricard", **CHANGING))
-    engine.straight.wanted = True
+    engine.straight.requested = True
     start = consistent_start(engine)
     once, again = (trajectory.integrate(engine, start, silent) for _ in range(2))
     assert len(engine.straight.rows) == 2 or config.DISABLE_JIT
@@ -249,8 +249,8 @@ def test_a_run_that_is_asked_to_stop_leaves_what_there_is_marked_and_goes_on_lat
     whole = dynamics.simulate(scene, {}, silent)
     monkeypatch.setattr(stopping, "_why", "")
 
-    def progress(share: float | None, text: str) -> None:
-        if share is not None and share > 0.3:
+    def progress(fraction: float | None, text: str) -> None:
+        if fraction is not None and fraction > 0.3:
             stopping.request("the time is over")
 
     with pytest.raises(StoppedError) as told, journal.kept(tmp_path, "key"):

@@ -23,7 +23,7 @@ from flexclear.stages.as_json import as_json
 from flexclear.stages.new import KINDS, TEMPLATES, write
 from tests.stages.typical_mistakes import MISTAKES
 
-TOLD = dict(
+REPORTED = dict(
     re.findall(r"^## (.+)\n((?:.+\n?)+)", (Path(__file__).parent / "typical_mistakes.txt").read_text(), re.MULTILINE)
 )
 #: sweeps are no scenes, though they lie beside them
@@ -50,7 +50,7 @@ def test_all_beginnings_fit_into_one_folder(tmp_path: Path) -> None:
 
 def test_a_hundred_typical_mistakes_are_all_in_the_table():
     assert len(MISTAKES) >= 100
-    assert set(TOLD) == set(MISTAKES)
+    assert set(REPORTED) == set(MISTAKES)
 
 
 @pytest.mark.parametrize("name", MISTAKES)
@@ -64,7 +64,7 @@ def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, capsys: p
     assert main(["check", str(folder / "slider_crank.toml")]) == (4 if name in TOO_MUCH else 2)
     said = capsys.readouterr().err.replace(f"{folder.resolve()}/", "").replace(f"{folder}/", "")
     # lists of all names that there are grow with the program
-    assert re.sub(r"(known|one of): .*", r"\1: ...", said).strip() == TOLD[name].strip()
+    assert re.sub(r"(known|one of): .*", r"\1: ...", said).strip() == REPORTED[name].strip()
 
 
 @pytest.mark.parametrize(

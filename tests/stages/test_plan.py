@@ -248,11 +248,11 @@ def test_a_plan_keeps_a_rod_that_bends_by_more_than_is_wanted_and_drops_one_that
     moving = edited(leg, {"drive.stroke": load_scene(tmp_path / "leg.toml").drive["stroke"].model_dump(mode="json")})
     moving = edited(moving, {"time.end": 0.02})
     kept = {}
-    for wanted in (1e-4, 1e-8):
-        scene = edited(moving, {"accuracy": {"quantities": {"platform.position": {"absolute": wanted}}}})
+    for requested in (1e-4, 1e-8):
+        scene = edited(moving, {"accuracy": {"quantities": {"platform.position": {"absolute": requested}}}})
         planned, found = fc.plan(scene)
-        kept[wanted] = "rod" in planned.flexible()
-        assert bool(found["kept"].sel(effect="body.rod.modes")) == kept[wanted]
+        kept[requested] = "rod" in planned.flexible()
+        assert bool(found["kept"].sel(effect="body.rod.modes")) == kept[requested]
         assert found.attrs["evaluations"] > 0
     assert kept == {1e-4: False, 1e-8: True}
 

@@ -73,7 +73,7 @@ def test_a_grid_has_its_parameters_as_dimensions_and_coordinates_in_si(root: Pat
 @pytest.fixture
 def evaluated_as_points(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs and sections evaluate as points do, each operation rounded as it stands; else they differ by rounding."""
-    monkeypatch.setattr(engine, "Straight", partial(engine.Straight, wanted=True, exact=True))
+    monkeypatch.setattr(engine, "Straight", partial(engine.Straight, requested=True, exact=True))
 
 
 @pytest.mark.usefixtures("evaluated_as_points")
@@ -155,10 +155,10 @@ def test_more_values_take_the_finished_points_over(root: Path, fresh: Path, aske
 
 def test_refused_points_keep_their_reason_and_are_not_tried_again(root: Path, fresh: Path, asked: list[str]):
     arguments = (root / "scenes/checks/pendulum.toml", {"solver.evaluations": [100, 100_000]}, ["bob.velocity.final"])
-    for wanted in (2, 0):
+    for requested in (2, 0):
         asked.clear()
         found = pipeline.sweep(*arguments, workers=1)
-        assert len(asked) == wanted
+        assert len(asked) == requested
         assert found["status"].values.tolist() == [1, 0]
         assert "evaluations" in str(found["reason"].values[0])
         assert found["reason"].values[1] == ""

@@ -333,8 +333,8 @@ def test_what_a_run_is_to_be_doubted_for_ends_the_command_each_time(project: Pro
 
 
 def test_a_missed_accuracy_ends_with_3_unless_the_scene_allows_it(project: Project, add_scene: AddScene):
-    wanted = SCENE + JOINT + '[accuracy]\nball.position = "1 um"\n'
-    add_scene("wanted", wanted)
+    requested = SCENE + JOINT + '[accuracy]\nball.position = "1 um"\n'
+    add_scene("wanted", requested)
     for _ in range(2):
         done = project.run("run", "tiny/wanted")
         assert done.returncode == 3
@@ -344,7 +344,7 @@ def test_a_missed_accuracy_ends_with_3_unless_the_scene_allows_it(project: Proje
     kept = xr.load_dataset(project.results / "runs" / "tiny" / "wanted" / "run.nc", decode_times=False)
     assert "2 times what is wanted" in kept.attrs["accuracy_verdict"]
     project.calls()
-    add_scene("wanted", wanted + "allow_missed = true\n")
+    add_scene("wanted", requested + "allow_missed = true\n")
     done = project.run("run", "tiny/wanted")
     assert done.returncode == 0
     assert "missed: ball.position" in done.stderr

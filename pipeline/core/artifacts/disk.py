@@ -138,7 +138,7 @@ def copy(source: Path, target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     with temporary(target) as made:
         with source.open("rb") as old, made.open("wb") as new:
-            if not system.share(old, new):
+            if not system.share_blocks(old, new):
                 shutil.copyfileobj(old, new, PIECE)
         status = source.stat()
         os.utime(made, ns=(status.st_atime_ns, status.st_mtime_ns))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.compliance import of_bundle, shares
+from flexclear.pipeline.core.artifacts.compliance import fractions, of_bundle
 from flexclear.pipeline.core.errors import InputError
 
 #: dimensions that count modes
@@ -39,8 +39,8 @@ class Modal:
         if "count" in result.attrs:
             result.attrs["count"] = count
         if "compliance_full" in result and "modal_stiffness" in result:
-            fractions = shares(of_bundle(result), result["compliance_full"].values)
-            result["compliance_share"] = result["compliance_share"].copy(data=fractions)
+            kept_part = fractions(of_bundle(result), result["compliance_full"].values)
+            result["compliance_share"] = result["compliance_share"].copy(data=kept_part)
         return result
 
     def _check(self, count: int) -> None:

@@ -21,7 +21,7 @@ STATUS = ("done", "refused", "not_run")
 DONE, REFUSED, NOT_RUN = range(3)
 #: what is kept of each quantity: its value, and where asked for the difference from a run at a tighter tolerance, or
 #: the standard deviation over members
-SHARES = ("values", "error", "deviation")
+STATISTICS = ("values", "error", "deviation")
 
 
 @dataclass(frozen=True)
@@ -57,16 +57,16 @@ def unpacked(stored: xr.Dataset, kept: Sequence[Kept]) -> dict[str, Point]:
     for k, key in enumerate(arrays["key"]):
         refused = str(arrays["refused"][k])
         values, error, deviation = (
-            {} if refused else {q.name: arrays[name][k] for q in kept if (name := variable(q, share)) in arrays}
-            for share in SHARES
+            {} if refused else {q.name: arrays[name][k] for q in kept if (name := variable(q, statistic)) in arrays}
+            for statistic in STATISTICS
         )
         points[str(key)] = Point(values, error, deviation, int(arrays["evaluations"][k]), refused)
     return points
 
 
-def variable(one: Kept, share: str) -> str:
+def variable(one: Kept, statistic: str) -> str:
     """Name of a variable."""
-    return one.name if share == "values" else f"{one.name}.{share}"
+    return one.name if statistic == "values" else f"{one.name}.{statistic}"
 
 
 def unit(one: Kept, turning: Collection[str]) -> str:
@@ -85,7 +85,7 @@ def dataset(
     sections: int,
     turning: Collection[str],
     attributes: Mapping[str, str | int],
-    shares: Sequence[str] = SHARES[:1],
+    statistics: Sequence[str] = STATISTICS[:1],
 ) -> xr.Dataset:
     """All points of a sweep on its own dimensions; nan where there is no value.
 
@@ -96,10 +96,10 @@ def dataset(
     every = [points.get(key) for key in keys]
     lengths = dimensions(time, sections)
     variables = _arrays(every, kept, dims, shape)
-    for one, share in itertools.product(kept, shares):  # where no point is done
-        if variable(one, share) not in variables:
+    for one, statistic in itertools.product(kept, statistics):  # where no point is done
+        if variable(one, statistic) not in variables:
             inner = [lengths[dim] for dim in one.dims]
-            variables[variable(one, share)] = ((*dims, *one.dims), np.full((*shape, *inner), np.nan))
+            variables[variable(one, statistic)] = ((*dims, *one.dims), np.full((*shape, *inner), np.nan))
     status = [NOT_RUN if p is None else REFUSED if p.refused else DONE for p in every]
     plain = {
         "status": (np.array(status, dtype=np.int8), "what became of the point"),
@@ -139,16 +139,16 @@ def _arrays(
     """Values of points, row by row in the order of the dimensions; nan where there are none."""
     arrays = {}
     done = next((point for point in points if point is not None and not point.refused), None)
-    for share in SHARES if done is not None else ():
+    for statistic in STATISTICS if done is not None else ():
         for one in kept:
-            if one.name not in getattr(done, share):
+            if one.name not in getattr(done, statistic):
                 continue
-            inner = np.shape(getattr(done, share)[one.name])
+            inner = np.shape(getattr(done, statistic)[one.name])
             rows = np.full((len(points), *inner), np.nan)
             for k, point in enumerate(points):
                 if point is not None and not point.refused:
-                    rows[k] = getattr(point, share)[one.name]
-            arrays[variable(one, share)] = ((*dims, *one.dims), rows.reshape((*shape, *inner)))
+                    rows[k] = getattr(point, statistic)[one.name]
+            arrays[variable(one, statistic)] = ((*dims, *one.dims), rows.reshape((*shape, *inner)))
     return arrays
 
 
@@ -160,9 +160,12 @@ def _describe(result: xr.Dataset, axes: Sequence[Axis], kept: Sequence[Kept], tu
         "deviation": "; standard deviation over the members",
     }
     for one in kept:
-        for share, more in words.items():
-            if variable(one, share) in result:
-                result[variable(one, share)].attrs = {"units": unit(one, turning), "long_name": f"{one.meaning}{more}"}
+        for statistic, more in words.items():
+            if variable(one, statistic) in result:
+                result[variable(one, statistic)].attrs = {
+                    "units": unit(one, turning),
+                    "long_name": f"{one.meaning}{more}",
+                }
     for axis in axes:
         units = {"units": udunits(axis.unit)} if udunits(axis.unit) else {}
         result[axis.name].attrs = {"long_name": ", ".join(axis.places), **units}

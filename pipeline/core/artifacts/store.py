@@ -49,7 +49,7 @@ MAIN = "nc"
 #: stands for the key of all artifacts of a stage, such as the batches of a sweep's points
 FAMILY = "family"
 #: attributes of the main file that a command tells, without opening the file
-TOLD = ("warnings", "accuracy_verdict")
+REPORTED = ("warnings", "accuracy_verdict")
 #: lies beside what is shown and is not of the scene as it is now
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
@@ -129,7 +129,7 @@ class Store:
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
                 digests[name] = publish(path, content) if isinstance(content, bytes) else _store(path, content)
-            said = {name: str(value) for name, value in _attributes(product).items() if name in TOLD and value}
+            said = {name: str(value) for name, value in _attributes(product).items() if name in REPORTED and value}
             record = Record(stage, key, digests, dict(facts), said)
             publish(self.path(stage, key, "json"), checked(record.table()))
         return record

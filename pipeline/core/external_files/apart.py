@@ -71,7 +71,7 @@ def _size(path: Path) -> int:
 
 def allowed() -> float:
     """Bytes of memory that what a file holds may take."""
-    return machine.SHARE * machine.memory()
+    return machine.FRACTION * machine.memory()
 
 
 @dataclass

@@ -29,8 +29,8 @@ def kind_of_file(table: Mapping[str, Any]) -> str:
     return max(matches, key=lambda kind: matches[kind])
 
 
-def require_kind(table: Mapping[str, Any], path: Path, wanted: str) -> None:
+def require_kind(table: Mapping[str, Any], path: Path, requested: str) -> None:
     """InputError when the table in a file is of another kind than is wanted."""
     kind = kind_of_file(table)
-    if kind != wanted and (kind != SCENE or TELLING[SCENE] & set(table)):
-        raise InputError(str(path), f"is {kind}, not {wanted}", USE[kind].format(path=path))
+    if kind != requested and (kind != SCENE or TELLING[SCENE] & set(table)):
+        raise InputError(str(path), f"is {kind}, not {requested}", USE[kind].format(path=path))

@@ -59,11 +59,11 @@ def owned(scene: Scene, left: Collection[str]) -> dict[str, Any]:
         if not contacts:
             keys["ensemble"] = None
         if scene.accuracy is not None:
-            wanted = {
+            requested = {
                 n: w.model_dump(exclude_none=True) for n, w in scene.accuracy.quantities.items() if _has(n, owners)
             }
             rest = scene.accuracy.model_dump(exclude={"quantities"}, exclude_none=True)
-            keys["accuracy"] = {**rest, "quantities": wanted} if wanted else None
+            keys["accuracy"] = {**rest, "quantities": requested} if requested else None
         if scene.view is not None and scene.view.watch is not None:
             watched = [name for name in scene.view.watch if _has(name, owners)]
             keys["view.watch"] = watched or None

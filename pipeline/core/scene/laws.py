@@ -338,15 +338,15 @@ def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list
     return points
 
 
-def _column(path: Path, header: list[str], rows: list[list[str]], wanted: object) -> int:
-    if isinstance(wanted, int) and not isinstance(wanted, bool):
-        if rows and not 1 <= wanted <= len(rows[0]):
-            raise ValueError(f"{path.name} has {len(rows[0])} columns, no column {wanted}")
-        return wanted - 1
-    if wanted not in header:
+def _column(path: Path, header: list[str], rows: list[list[str]], requested: object) -> int:
+    if isinstance(requested, int) and not isinstance(requested, bool):
+        if rows and not 1 <= requested <= len(rows[0]):
+            raise ValueError(f"{path.name} has {len(rows[0])} columns, no column {requested}")
+        return requested - 1
+    if requested not in header:
         known = ", ".join(header) or "it has no header; give the column's number"
-        raise ValueError(f"{path.name} has no column '{wanted}'; known: {known}")
-    return header.index(str(wanted))
+        raise ValueError(f"{path.name} has no column '{requested}'; known: {known}")
+    return header.index(str(requested))
 
 
 def _is_number(cell: str) -> bool:

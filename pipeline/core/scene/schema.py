@@ -89,7 +89,7 @@ class Sections(Part):
     bodies: tuple[str, ...] | None = None
 
 
-class Wanted(Part):
+class Request(Part):
     """A wanted accuracy: absolute in SI, or relative to the quantity's own size.
 
     absolute: in the SI unit of the quantity.  relative: share of the largest change of the quantity.
@@ -110,7 +110,7 @@ class Accuracy(Part):
     by_need: whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step.
     """
 
-    quantities: dict[str, Wanted] = Field(default_factory=dict)
+    quantities: dict[str, Request] = Field(default_factory=dict)
     allow_missed: bool = False
     by_need: bool | None = None
 
@@ -120,8 +120,8 @@ class Accuracy(Part):
         plain = {"allow_missed", "by_need", "source"}
         if not isinstance(table, dict) or set(table) <= {"quantities"} | plain:
             return table
-        wanted = {name: value for name, value in table.items() if name not in plain}
-        accuracies = {name: _wanted(name, value) for name, value in _leaves(wanted, "")}
+        requested = {name: value for name, value in table.items() if name not in plain}
+        accuracies = {name: _requested(name, value) for name, value in _leaves(requested, "")}
         return {"quantities": accuracies} | {name: table[name] for name in plain & set(table)}
 
 
@@ -173,7 +173,7 @@ def _leaves(table: dict[str, Any], place: str) -> list[tuple[str, Any]]:
     return leaves
 
 
-def _wanted(name: str, value: Any) -> Any:
+def _requested(name: str, value: Any) -> Any:
     if isinstance(value, dict):
         return value
     if isinstance(value, str) and value.rstrip().endswith("%"):
@@ -303,7 +303,7 @@ class Scene(Part):
             "contact": tuple([*self.contacts(), *self.stop_ends()]),
         }
 
-    def wanted(self) -> list[Quantity]:
+    def requested(self) -> list[Quantity]:
         """The quantities that `[accuracy]` names; without it the usual ones."""
         if self.accuracy is not None and self.accuracy.quantities:
             return [parse(name, self.owners()) for name in self.accuracy.quantities]
@@ -336,7 +336,7 @@ class Scene(Part):
         """The quantities that are looked at: those that `[view]` names, else as `wanted`."""
         if self.view is not None and self.view.watch is not None:
             return [parse(name, self.owners()) for name in self.view.watch]
-        return self.wanted()
+        return self.requested()
 
     def _hosts(self) -> dict[str, str]:
         """For every moving body the body that it is fixed to, or itself."""

@@ -93,33 +93,33 @@ class Sources:
 
         Raises LookupError for a root that is no module of the tree.
         """
-        wanted = frozenset(roots)
-        if wanted not in self.closures:
+        requested = frozenset(roots)
+        if requested not in self.closures:
             self._remember()
             known = dict(self.imports)
-            self.closures[wanted] = self._reach(wanted)
-            for name, module in self.closures[wanted].items():
+            self.closures[requested] = self._reach(requested)
+            for name, module in self.closures[requested].items():
                 if self.imports.get(name, [""])[0] != module.text:
                     self.imports[name] = (module.text, module.digest, sorted(module.own), sorted(module.libraries))
             if self.memo is not None and self.imports != known:
                 with contextlib.suppress(OSError):
                     publish(self.memo, checked(self.imports))
-        return self.closures[wanted]
+        return self.closures[requested]
 
     def code(self, roots: Iterable[str]) -> dict[str, str]:
         """Facts of the code that `roots` reach, by kind and name: digests of modules, versions of libraries.
 
         Many tasks share them: they are not to be changed.
         """
-        wanted = frozenset(roots)
-        if wanted not in self.codes:
-            closure = self.closure(wanted)
+        requested = frozenset(roots)
+        if requested not in self.codes:
+            closure = self.closure(requested)
             libraries = frozenset().union(*(module.libraries for module in closure.values()))
             counting = {name: module for name, module in closure.items() if name not in WORDING}
-            self.codes[wanted] = {f"module {name}": module.digest for name, module in counting.items()} | {
+            self.codes[requested] = {f"module {name}": module.digest for name, module in counting.items()} | {
                 f"library {name}": version for name, version in library_versions(libraries).items()
             }
-        return self.codes[wanted]
+        return self.codes[requested]
 
     def module(self, name: str) -> Module | None:
         """The module called `name`, or None when there is no such file (an attribute, say)."""
@@ -130,9 +130,9 @@ class Sources:
             self.read[name] = None if path is None else self._parse(path, name)
         return self.read[name]
 
-    def _reach(self, wanted: frozenset[str]) -> dict[str, Module]:
+    def _reach(self, requested: frozenset[str]) -> dict[str, Module]:
         modules: dict[str, Module] = {}
-        waiting = sorted(wanted)
+        waiting = sorted(requested)
         for name in waiting:
             if self.module(name) is None:
                 raise LookupError(f"no module {name} under {self.root}")

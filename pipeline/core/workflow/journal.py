@@ -23,7 +23,7 @@ from flexclear.pipeline.core.artifacts.disk import publish, read_whole
 from flexclear.pipeline.core.artifacts.seal import same, sealed
 
 #: how often unfinished work is written [s], and the share of the time that writing may take where it is slow
-EVERY, SHARE = 20.0, 0.05
+EVERY, FRACTION = 20.0, 0.05
 #: what a file of a piece begins with is a digest of so many characters, and a line's end
 DIGEST = 64
 
@@ -93,7 +93,7 @@ class Journal:
 
     def due(self, name: str = "") -> bool:
         """Whether it is time to write; a piece of that name, whenever others were written, as threads do beside it."""
-        return self.clock() - self._saved.get(name, self._written) > max(EVERY, self._took / SHARE)
+        return self.clock() - self._saved.get(name, self._written) > max(EVERY, self._took / FRACTION)
 
     def finish(self, name: str, state: State) -> None:
         """A piece is done; it is written with what is written next."""

@@ -143,8 +143,8 @@ class Monitor:
         known = pace(job.samples)
         if job.since is None or job.fraction is None:
             return known
-        spent, share = self.clock() - job.since[0], job.fraction - job.since[1]
-        return pace([*job.samples, (spent, share)]) if spent > known * share else known
+        spent, fraction = self.clock() - job.since[0], job.fraction - job.since[1]
+        return pace([*job.samples, (spent, fraction)]) if spent > known * fraction else known
 
     def _show(self, text: str) -> None:
         if self.quiet:
@@ -163,8 +163,8 @@ class Monitor:
 
 def pace(samples: list[tuple[float, float]]) -> float:
     """Seconds per share of the work, of samples (seconds, share), the later ones counting more."""
-    faded = [(FADING**k * spent, FADING**k * share) for k, (spent, share) in enumerate(reversed(samples))]
-    return sum(spent for spent, _ in faded) / sum(share for _, share in faded)
+    faded = [(FADING**k * spent, FADING**k * fraction) for k, (spent, fraction) in enumerate(reversed(samples))]
+    return sum(spent for spent, _ in faded) / sum(fraction for _, fraction in faded)
 
 
 def duration(seconds: float) -> str:

@@ -111,11 +111,11 @@ def gently(tell: Callable[[str], None]) -> Iterator[None]:
             signal.signal(signal.SIGINT, before)
 
 
-def obey(wait_until_told: Callable[[], Any], why: Callable[[], str], deaf: Callable[[], None]) -> None:
+def obey(wait_for_signal: Callable[[], Any], why: Callable[[], str], deaf: Callable[[], None]) -> None:
     """In a worker: stop when the parent says so; `deaf` tells it of a task that does not heed requests."""
 
     def wait() -> None:
-        wait_until_told()
+        wait_for_signal()
         request(why())
         if _busy and not heeds():
             deaf()

@@ -219,11 +219,11 @@ def _bring(
     helpers: gets the second process, where there is one.  late: files of which that may still be at work.
     """
     names = {path: name for name, path in files.items() if path.stem not in loaded}
-    wanted = sorted(names, key=lambda path: ORDER.index(names[path]))
+    requested = sorted(names, key=lambda path: ORDER.index(names[path]))
     with disk_limits(folder):
-        missing = [path for path in wanted if not compiled(path)]
+        missing = [path for path in requested if not compiled(path)]
         helpers.enter_context(second_process(missing[::-1]))
-        bring(wanted, lambda path: _announce(tell, WORDS[names[path]], began), late)
+        bring(requested, lambda path: _announce(tell, WORDS[names[path]], began), late)
         if missing:
             prune(folder)
 

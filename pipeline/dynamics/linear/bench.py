@@ -131,17 +131,17 @@ def set_drives(bench: Bench, drives: np.ndarray) -> None:
 
 def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Positions after the drives have gone to `target` in strides, the loops closed after each."""
-    origin, share, stride = bench.drives[:, 0], 0.0, 1.0
+    origin, fraction, stride = bench.drives[:, 0], 0.0, 1.0
     if not bench.model.closures:
-        share = 1.0
+        fraction = 1.0
     else:
         way = float(np.max(np.abs(target - origin) / bench.units, initial=0.0))
         stride = min(1.0, STRIDE / way) if way > 0.0 else 1.0
-    while share < 1.0:
-        attempt = min(1.0, share + stride)
+    while fraction < 1.0:
+        attempt = min(1.0, fraction + stride)
         try:
             set_drives(bench, np.stack([origin + attempt * (target - origin), 0.0 * target], axis=1))
-            q, share = closed(bench, q), attempt
+            q, fraction = closed(bench, q), attempt
         except SolverError:
             stride *= 0.5
             if stride < SHORTEST:

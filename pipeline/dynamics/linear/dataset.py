@@ -54,15 +54,15 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
     phase = _phase(translation, rotation, w)
     w, translation, rotation = w * phase, translation * phase[:, None, None], rotation * phase[:, None, None]
     size, parts = np.abs(value), list(energy)
-    share = np.stack([energy[name] for name in parts], axis=1)
-    most = first_largest(share, axis=1)
+    fraction = np.stack([energy[name] for name in parts], axis=1)
+    most = first_largest(fraction, axis=1)
     data: dict[str, Any] = {
         "frequency": ("vibration", np.abs(value.imag) / (2.0 * np.pi)),
         "undamped_frequency": ("vibration", size / (2.0 * np.pi)),
         "decay_rate": ("vibration", 0.0 - value.real),
         "damping_ratio": ("vibration", np.where(size > 0.0, (0.0 - value.real) / np.where(size > 0.0, size, 1.0), 0.0)),
         "dominant": ("vibration", np.array(parts, dtype=str)[most]),
-        "energy_share": (("vibration", "moving_body"), share),
+        "energy_share": (("vibration", "moving_body"), fraction),
         "frame_translation": (("vibration", "part", "frame", "axis"), _split(translation)),
         "frame_rotation": (("vibration", "part", "frame", "axis"), _split(rotation)),
     }

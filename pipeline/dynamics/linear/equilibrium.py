@@ -121,16 +121,16 @@ def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
 def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
     """The pose after the step or a part of it."""
     direction = at.Z @ step
-    share, power = 1.0, -float(step @ at.unbalanced)
+    fraction, power = 1.0, -float(step @ at.unbalanced)
     for _ in range(80):
         try:
-            new = tangent(bench, closed(bench, at.q + share * (at.moves @ direction)))
+            new = tangent(bench, closed(bench, at.q + fraction * (at.moves @ direction)))
         except SolverError:
-            share *= 0.5
+            fraction *= 0.5
             continue
         if -float((new.Z.T @ (at.mass @ direction)) @ new.unbalanced) >= -OVERSHOOT * power:
             return new
-        share *= 0.5
+        fraction *= 0.5
     raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium can be made from this pose")
 
 
@@ -173,12 +173,12 @@ def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
 
     motion: speeds, shape (nv,).
     """
-    energy, shares = motion * (mass @ motion), dict[str, float]()
+    energy, fractions = motion * (mass @ motion), dict[str, float]()
     for i, link in enumerate(model.links[1:], start=1):
         edge, mine = link.branch.edge, model.numbering.coordinates[i]
         name = f"joint {edge.name}" if edge is not None else f"body {link.group.host}"
         if not link.drives:
-            shares[name] = shares.get(name, 0.0) + float(energy[mine].sum())
+            fractions[name] = fractions.get(name, 0.0) + float(energy[mine].sum())
         if link.flexible:
-            shares[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
-    return max(shares, key=lambda name: shares[name])
+            fractions[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
+    return max(fractions, key=lambda name: fractions[name])

@@ -149,7 +149,7 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
     known, contacts, ny, nv = (int(h[place]) for place in (m.N_DRIVES, m.N_CONTACTS, m.NY, m.NV))
     closure_rows, links, nq = int(h[m.N_CLOSURE_ROWS]), int(h[m.N_LINKS]), int(h[m.NQ])
     coordinates, positions = nv + known, nq + known
-    wanted, bearings = room(h), int(h[m.N_BEARINGS])
+    requested, bearings = room(h), int(h[m.N_BEARINGS])
     tables = {
         m.LINK_FRAMES: links,
         m.SITE_FRAMES: int(h[m.N_SITES]),
@@ -203,9 +203,9 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
         m.Y: ny,
         m.Y_NEW: ny,
         m.Y_STAGE: ny,
-        m.SLOPES: wanted.slopes * ny,
-        m.DENSE: wanted.dense * ny,
-        m.MEMORY: wanted.memory,
+        m.SLOPES: requested.slopes * ny,
+        m.DENSE: requested.dense * ny,
+        m.MEMORY: requested.memory,
         m.MAGNITUDE: int(h[m.N_GROUPS]),
         m.CORRECTION: nv,
         m.LATCHED: contacts,

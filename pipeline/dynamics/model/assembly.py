@@ -131,18 +131,18 @@ def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str,
 
 def _refuse_starts(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> None:
     """InputError when the mechanism could be assembled, but for the positions that the scene gives."""
-    wanted = [start for start in starts if start.position is not None]
-    driven = {(start.joint, start.number) for start in wanted}
+    requested = [start for start in starts if start.position is not None]
+    driven = {(start.joint, start.number) for start in requested}
     loose = [
         replace(joint, values={k: v for k, v in joint.values.items() if (joint.name, k) not in driven})
         for joint in joints
     ]
-    others = assemblies(mechanism, loose, placed, starts) if wanted else []
+    others = assemblies(mechanism, loose, placed, starts) if requested else []
     if others:
         there = others[0].coordinates
-        reached = ", ".join(f"{s.name} {there[s.joint, s.number]:.6g} {s.coordinate.unit}" for s in wanted)
+        reached = ", ".join(f"{s.name} {there[s.joint, s.number]:.6g} {s.coordinate.unit}" for s in requested)
         raise InputError(
-            f"{wanted[0].place[:-1]}.position]",
+            f"{requested[0].place[:-1]}.position]",
             f"the joints fit together, but not at the positions given; they do, for example, at {reached}",
             "correct the position, or say with near about where the coordinate starts",
         )

@@ -23,7 +23,7 @@ class Rate:
     """
 
     place: str
-    wanted: float
+    requested: float
     size: float
     speed: int | None = None
     sign: float = 1.0

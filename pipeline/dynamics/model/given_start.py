@@ -115,14 +115,14 @@ def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str,
     t = mechanism.scene.time.start
     laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
     now = path_positions(edge, G.R, G.p + mechanism.origin)
-    wanted = [None if name is None else laws[name].value(t) for name in edge.drives]
+    requested = [None if name is None else laws[name].value(t) for name in edge.drives]
     if edge.vector:
-        turn = rotation_vector_to_matrix(np.array(wanted[3:6], dtype=float))
+        turn = rotation_vector_to_matrix(np.array(requested[3:6], dtype=float))
         apart = float(rotation_between(matrix_to_quaternion(turn), matrix_to_quaternion(G.R)))
         drive, what = str(edge.drives[3]), f"the turn of '{edge.frame_b}'"
         place = f"[drive.{drive.partition('.')[0]}.rotation]"
         yield Miss(drive, place, f"the law of drive '{drive}'", what, apart, 0.0, True, True)
-    for k, (name, value) in enumerate(zip(edge.drives, wanted, strict=True)):
+    for k, (name, value) in enumerate(zip(edge.drives, requested, strict=True)):
         if name is None or value is None or (edge.vector and k >= 3):
             continue
         rule, what = f"the law of drive '{name}'", f"'{edge.frame_b}'"
@@ -160,13 +160,13 @@ def refuse_driven(mechanism: Mechanism, starts: Sequence[Given], given: Mapping[
             continue
         joint, number, coordinate = coordinate_of(mechanism.scene, drive.joint, drive.coordinate, f"[drive.{name}]")
         for start in (s for s in starts if (s.joint, s.number) == (joint, number)):
-            for key, order, wanted in (("position", 0, start.position), ("velocity", 1, start.velocity)):
+            for key, order, requested in (("position", 0, start.position), ("velocity", 1, start.velocity)):
                 law, unit = laws[name].value(t, order), coordinate.unit + "/s" * order
                 size = 1.0 if coordinate.turning else mechanism.length
-                if wanted is not None and abs(law - wanted) > WRITTEN * max(size, abs(law)):
+                if requested is not None and abs(law - requested) > WRITTEN * max(size, abs(law)):
                     raise InputError(
                         f"{start.place[:-1]}.{key}]",
-                        f"is {wanted:.6g} {unit}, and by the law of drive '{name}' {law:.6g} {unit}",
+                        f"is {requested:.6g} {unit}, and by the law of drive '{name}' {law:.6g} {unit}",
                         "leave it out; what is driven starts as its law does",
                     )
 

@@ -78,14 +78,14 @@ class Velocities:
 
 def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velocities:
     """What bodies, joints, modes and loops ask of the speeds in a state."""
-    wanted, others = with_velocities(model), given_rates(model)
+    requested, others = with_velocities(model), given_rates(model)
     y = y.copy()
     y[model.speeds] = 0.0
-    given, centres = _given(wanted).ravel(), [centre_of(model, name) for name in wanted]
+    given, centres = _given(requested).ravel(), [centre_of(model, name) for name in requested]
     told = ~np.isnan(given)
 
     unit, L = model.speed_scales, model.length
-    lengths = np.tile(_units(model), len(wanted))[told]
+    lengths = np.tile(_units(model), len(requested))[told]
     opening_lengths = np.where(model.arrays.table(m.CLOSURE_ROWS)["kind"] == 0, L, 1.0)
 
     def rates(state: np.ndarray) -> np.ndarray:
@@ -101,16 +101,16 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
         moved = y.copy()
         moved[model.nq + k] = unit[k]
         columns.append(rates(moved) - base)
-    asked = np.concatenate([given[told] / lengths, [rate.wanted / rate.size for rate in others]])
+    asked = np.concatenate([given[told] / lengths, [rate.requested / rate.size for rate in others]])
     count = len(asked)
     asked = np.concatenate([asked, np.zeros(len(base) - count)])
     fastest = _slow(model) + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
     matrix = np.array(columns).T.reshape(len(base), model.nv)
-    places = [*(f"[body.{name}.velocity]" for name in wanted), *dict.fromkeys(rate.place for rate in others)]
+    places = [*(f"[body.{name}.velocity]" for name in requested), *dict.fromkeys(rate.place for rate in others)]
     return Velocities(matrix, asked, asked - base, count, tuple(places), fastest)
 
 
-def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float = WRONG) -> np.ndarray:
+def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: float = WRONG) -> np.ndarray:
     """Y with speeds that give bodies, joints and modes their velocities and keep the loops closed; otherwise the least.
 
     Velocities of bodies are those of centres of mass, flexible or rigid.  Flexible bodies start without speeds of
@@ -130,12 +130,12 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float 
     if miss > RIGID * equations.fastest:
         speeds, miss = _least(equations.matrix, equations.target)
     largest = float(np.max(np.abs(equations.asked), initial=0.0))
-    if equations.given and miss > max(WRITTEN * equations.fastest, share * largest):
+    if equations.given and miss > max(WRITTEN * equations.fastest, fraction * largest):
         names = ", ".join(place.removeprefix("[body.").removesuffix(".velocity]") for place in equations.given)
         raise InputError(
             equations.given[0],
             f"joints and drives do not allow the velocities given for {names} (they miss by "
-            f"{miss:.3g} of the mechanism's size, or radians, per second, where up to {100.0 * share:g} % of the "
+            f"{miss:.3g} of the mechanism's size, or radians, per second, where up to {100.0 * fraction:g} % of the "
             "largest one are mended)",
             "give velocities that agree with each other, or fewer of them",
         )
@@ -159,10 +159,10 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
 
     y: state at the start.  frames, sites: of all links and sites there, named fields of LINK_FRAMES and SITE_FRAMES.
     """
-    wanted, changes, unit = with_velocities(model), [], _units(model)
-    given = _given(wanted)
+    requested, changes, unit = with_velocities(model), [], _units(model)
+    given = _given(requested)
     limit = WRITTEN * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
-    for name, row in zip(wanted, given, strict=True):
+    for name, row in zip(requested, given, strict=True):
         apart = np.abs(centre_of(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
         if np.nanmax(apart / unit) > limit:
             turning, moving = np.fmax.reduce(apart.reshape(2, 3), axis=1, initial=0.0)
@@ -171,8 +171,8 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
                 f"{moving:.3g} m/s and {turning:.3g} rad/s"
             )
     for rate in given_rates(model):
-        apart = abs(rate.of(sites, y[model.speeds]) - rate.wanted)
-        if apart > WRITTEN * (_slow(model) * rate.size + abs(rate.wanted)):
+        apart = abs(rate.of(sites, y[model.speeds]) - rate.requested)
+        if apart > WRITTEN * (_slow(model) * rate.size + abs(rate.requested)):
             changes.append(
                 f"the start velocity {rate.place} was mended so that joints and drives allow it: by {apart:.3g}"
             )
@@ -203,9 +203,9 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
     return changes
 
 
-def _given(wanted: dict[str, RigidBody | FlexibleBody]) -> np.ndarray:
+def _given(requested: dict[str, RigidBody | FlexibleBody]) -> np.ndarray:
     """Angular velocity and velocity given for each body, shape (bodies, 6); nan where none is."""
-    given = [_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]
+    given = [_components(b.angular_velocity) + _components(b.velocity) for b in requested.values()]
     return np.array(given).reshape(-1, 6)
 
 

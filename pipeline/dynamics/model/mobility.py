@@ -111,8 +111,8 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
     random = np.random.default_rng(0)
     left, stayed, told = [(here.rank, start)], [(here.rank, start)], 0
     for k in range(TRIES):
-        share = random.normal(size=here.free.shape[1])
-        motion = here.free @ (share / np.linalg.norm(share))
+        fraction = random.normal(size=here.free.shape[1])
+        motion = here.free @ (fraction / np.linalg.norm(fraction))
         motion *= NEARBY[k % 2] / max(1.0, float(np.linalg.norm(motion)))
         closed = close(model.mechanism, joints, _displaced(model, start, motion))
         if closed is None:
@@ -165,9 +165,9 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
     joints, row = set[str](), 0
     for closure in model.closures:
         if isinstance(closure, Coupling):
-            share = stresses[:, row]
+            fraction = stresses[:, row]
             for side, factor in closure.parts:
-                wrench = np.outer(unit_wrench(side, poses, L) * factor * L / row_unit(closure, L), share)
+                wrench = np.outer(unit_wrench(side, poses, L) * factor * L / row_unit(closure, L), fraction)
                 carried[side.a.link] -= wrench
                 carried[side.b.link] += wrench
             row += 1
@@ -178,11 +178,11 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
         wrenches = np.where(
             force[:, None], np.hstack([np.cross(point, along) / L, along]), np.hstack([about, 0 * along])
         )
-        share = stresses[:, row : row + len(wrenches)]
-        wrench = wrenches.T @ share.T
+        fraction = stresses[:, row : row + len(wrenches)]
+        wrench = wrenches.T @ fraction.T
         carried[a.link] -= wrench
         carried[b.link] += wrench
-        if np.max(np.abs(share), initial=0.0) > CARRIES:
+        if np.max(np.abs(fraction), initial=0.0) > CARRIES:
             joints.add(edge.name)
         row += len(wrenches)
     for i in range(len(mechanism.links) - 1, 0, -1):

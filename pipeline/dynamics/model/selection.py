@@ -83,9 +83,9 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
         turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
         angle = np.linalg.norm(turn, axis=1)
         way = np.linalg.norm(shift + np.cross(turn, points[c["site_b"]]), axis=1) + model.length * angle
-        share = mobility[support[c["support0"] + mine["slot"]]]
+        fraction = mobility[support[c["support0"] + mine["slot"]]]
         rows = slice(c["row0"], c["row0"] + c["n_rows"])
-        along, about = (np.sqrt(np.sum(size**2 * share)) for size in (way, angle))
+        along, about = (np.sqrt(np.sum(size**2 * fraction)) for size in (way, angle))
         lengths[rows] = np.where(kinds[rows] == 0, along, about)
     return lengths
 

@@ -44,7 +44,7 @@ class Search:
     """The state of the decisions. used: of the budget, by quantity, as shares of what is wanted."""
 
     pilots: Pilots
-    wanted: dict[str, float]
+    requested: dict[str, float]
     used: dict[str, float] = field(default_factory=dict)
     decisions: dict[str, Decision] = field(default_factory=dict)
 
@@ -56,13 +56,14 @@ class Search:
     def fits(self, most: Mapping[str, float], budget: float = BUDGET) -> bool:
         """Whether influences of at most this much fit into what is left of the budget, for all quantities."""
         return all(
-            self.used.get(name, 0.0) + most.get(name, np.inf) / self.wanted[name] <= budget for name in self.wanted
+            self.used.get(name, 0.0) + most.get(name, np.inf) / self.requested[name] <= budget
+            for name in self.requested
         )
 
     def spend(self, most: Mapping[str, float]) -> None:
         """Take influences out of the budget."""
-        for name in self.wanted:
-            self.used[name] = self.used.get(name, 0.0) + most[name] / self.wanted[name]
+        for name in self.requested:
+            self.used[name] = self.used.get(name, 0.0) + most[name] / self.requested[name]
 
     def decide(
         self,
@@ -92,7 +93,12 @@ class Search:
         difference = {name: influence.difference for name, influence in apart.items()}
         uncertainty = {name: influence.uncertainty for name, influence in apart.items()}
         self.decide(
-            effect, not small, PILOT, why if small else besides + too_much(most, self.wanted), difference, uncertainty
+            effect,
+            not small,
+            PILOT,
+            why if small else besides + too_much(most, self.requested),
+            difference,
+            uncertainty,
         )
 
 
@@ -101,14 +107,14 @@ def with_doubt(search: Search, apart: Mapping[str, Influence], soft: bool, more:
     kinds = {q.name: q.kind for q in search.pilots.chosen}
     doubled = {}
     for name, i in apart.items():
-        share = more + OF_PILOT + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
-        doubled[name] = Influence(i.difference, i.uncertainty + share * i.difference)
+        fraction = more + OF_PILOT + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
+        doubled[name] = Influence(i.difference, i.uncertainty + fraction * i.difference)
     return doubled
 
 
-def too_much(most: Mapping[str, float], wanted: Mapping[str, float]) -> str:
+def too_much(most: Mapping[str, float], requested: Mapping[str, float]) -> str:
     """Why an effect is kept: what it may change most, in words."""
-    name = max(wanted, key=lambda n: most[n] / wanted[n])
+    name = max(requested, key=lambda n: most[n] / requested[n])
     if not np.isfinite(most[name]):
         return f"without it {name} cannot be told, or has other events"
-    return f"without it {name} may be off by {most[name] / wanted[name]:.2g} times what is wanted"
+    return f"without it {name} may be off by {most[name] / requested[name]:.2g} times what is wanted"

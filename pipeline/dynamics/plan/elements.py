@@ -19,7 +19,7 @@ from flexclear.pipeline.core.decisions import Mesh
 #: twice as many elements are compared with; errors fall with this power of their length
 TWICE, ORDER = 2, 4
 #: share of what is wanted that the mesh may err by
-SHARE = 0.1
+FRACTION = 0.1
 #: vibrations whose phase has gone wrong by more than this differ by twice their amplitude [rad]
 TURNED = 2.0
 
@@ -29,7 +29,7 @@ def mesh(
     bundle: xr.Dataset,
     finer: xr.Dataset,
     bending: Mapping[str, float],
-    wanted: Mapping[str, float],
+    requested: Mapping[str, float],
     duration: float,
 ) -> Mesh:
     """The elements of a body.
@@ -40,9 +40,9 @@ def mesh(
     beyond = 1.0 / (1.0 - TWICE ** -float(ORDER))  # what twice as many elements lack still
     frequency, phase = _frequencies(bundle, finer, duration)
     compliance = _compliance(bundle, finer)
-    share = beyond * max(compliance, min(TURNED, phase))
-    error = {name: share * bending.get(name, np.inf) for name in wanted}
-    most = max(error[name] / (SHARE * wanted[name]) for name in wanted)
+    fraction = beyond * max(compliance, min(TURNED, phase))
+    error = {name: fraction * bending.get(name, np.inf) for name in requested}
+    most = max(error[name] / (FRACTION * requested[name]) for name in requested)
     called_for = given * max(most, np.finfo(float).tiny) ** (1.0 / ORDER) if np.isfinite(most) else given
     return Mesh(given, max(1, int(np.ceil(called_for))), beyond * frequency, beyond * compliance, error)
 

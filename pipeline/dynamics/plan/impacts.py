@@ -41,11 +41,11 @@ def bent(search: Search, soft: Sequence[Effect]) -> None:
     pilots = search.pilots
     every = effects(pilots.scene)
     gone = [*search.gone, *(e for e in every if e.within in {g.name for g in search.gone})]
-    share = pilots.part(gone)
-    whole = pilots.must_run(gone, share)
+    fraction = pilots.part(gone)
+    whole = pilots.must_run(gone, fraction)
     rigid = [*soft, *(e for e in every if e.within in {s.name for s in soft})]
-    apart = pilots.between(pilots.point([*gone, *rigid], share=share), whole)
-    apart = with_doubt(search, apart, False, _more(share))
+    apart = pilots.between(pilots.point([*gone, *rigid], fraction=fraction), whole)
+    apart = with_doubt(search, apart, False, _more(fraction))
     most = {name: i.most for name, i in apart.items()}
     small = search.fits(most)
     if small:
@@ -58,17 +58,17 @@ def quickest(search: Search, usual: str) -> Chosen:
     """The cheapest way to integrate what is left of a scene with contacts; by `usual` where no other is shown to do."""
     pilots, gone = search.pilots, search.gone
     scene = pilots.variant(gone)
-    loose, share = pilots.loose(scene), pilots.part(gone)
-    whole = pilots.must_run(gone, share)
-    unknown = Chosen(usual, loose, dict.fromkeys(search.wanted, np.nan))
+    loose, fraction = pilots.loose(scene), pilots.part(gone)
+    whole = pilots.must_run(gone, fraction)
+    unknown = Chosen(usual, loose, dict.fromkeys(search.requested, np.nan))
     if whole.refused:
         return unknown
-    for level in [*_levels(search, share), None]:
+    for level in [*_levels(search, fraction), None]:
         for rtol in sorted({QUICK_RTOL, loose}, reverse=True):
             if pilots.work > MOST_WORK:
                 return unknown
-            apart = pilots.between(_tried(search, level, share, rtol, whole), whole)
-            most = {name: (1.0 + _more(share)) * i.difference for name, i in apart.items()}
+            apart = pilots.between(_tried(search, level, fraction, rtol, whole), whole)
+            most = {name: (1.0 + _more(fraction)) * i.difference for name, i in apart.items()}
             if search.fits(most):
                 search.spend(most)
                 if level is not None:
@@ -82,44 +82,44 @@ def quickest(search: Search, usual: str) -> Chosen:
 def _by_modes(search: Search, most: Mapping[str, float], apart: Mapping[str, Influence]) -> bool:
     """Whether a difference is rather due to the modes than to the tolerance: it is large, or members part anyway."""
     return any(
-        NEAR * BUDGET * wanted < most[name] < np.inf or apart[name].uncertainty > wanted
-        for name, wanted in search.wanted.items()
+        NEAR * BUDGET * requested < most[name] < np.inf or apart[name].uncertainty > requested
+        for name, requested in search.requested.items()
     )
 
 
-def _more(share: float) -> float:
+def _more(fraction: float) -> float:
     """What the rest of the time may add, as a share."""
-    return 0.0 if share == 1.0 else WHOLE
+    return 0.0 if fraction == 1.0 else WHOLE
 
 
-def _levels(search: Search, share: float) -> Iterator[int]:
+def _levels(search: Search, fraction: float) -> Iterator[int]:
     """Levels of fewer modes that may be tried."""
     pilots = search.pilots
     bending = pilots.variant(search.gone).flexible()
     mine = [k for k in range(len(pilots.fewer)) if pilots.modes(k, bending) and pilots.saved(k) >= 1.0 / WORTH]
-    if mine and share < LEAST_SEEN:
+    if mine and fraction < LEAST_SEEN:
         every = effects(pilots.scene)
         soft = [e for e in every if e.kind == FLEXIBILITY or e.within.startswith("body.")]
         rigid = pilots.point(list({e.name: e for e in [*search.gone, *soft]}.values()))
-        if any(i.uncertainty > search.wanted[name] for name, i in pilots.between(rigid, rigid).items()):
+        if any(i.uncertainty > search.requested[name] for name, i in pilots.between(rigid, rigid).items()):
             return  # members of rigid bodies part later, and the beginning does not tell what modes do then
     yield from mine
 
 
-def _tried(search: Search, level: int | None, share: float, rtol: float, whole: Point) -> Point:
+def _tried(search: Search, level: int | None, fraction: float, rtol: float, whole: Point) -> Point:
     """A run of a level of modes at a tolerance, given up where it takes longer or loses energy too fast."""
     pilots = search.pilots
     saved = 1.0 if level is None else pilots.saved(level)
     limits: dict[str, Any] = {
         "evaluations": int(saved * whole.evaluations / MEMBERS) + 1,
-        "ledger_tolerance": OF_LEDGER * CHOSEN * share,
+        "ledger_tolerance": OF_LEDGER * CHOSEN * fraction,
     }
-    return pilots.point(search.gone, level=level, share=share, integrator=QUICK, rtol=rtol, **limits)
+    return pilots.point(search.gone, level=level, fraction=fraction, integrator=QUICK, rtol=rtol, **limits)
 
 
 def _tell(search: Search, level: int, apart: dict[str, Influence]) -> None:
     """Say of bodies with fewer modes why the others go."""
-    beyond = [name for name, i in apart.items() if i.uncertainty > search.wanted[name]]
+    beyond = [name for name, i in apart.items() if i.uncertainty > search.requested[name]]
     loose = next((d.effect.owner for d in search.decisions.values() if d.kept and d.effect.kind == CLEARANCE), "")
     for body, count in search.pilots.modes(level, search.pilots.bundles).items():
         told = search.decisions.get(f"body.{body}.modes")

@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 SOFTER = 0.5
 
 
-def wanted_in(
+def requested_in(
     scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point]
 ) -> dict[str, float]:
     """What is wanted by quantity [SI]; relative to the size that it has in the ideal mechanism, of contacts with rigid

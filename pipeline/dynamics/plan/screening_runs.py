@@ -110,15 +110,15 @@ class Pilots:
         Its beginning is run from one start to know.
         """
         begun = self.must_run(gone, BEGINNING, 0)
-        share = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
-        return LEAST_PART if begun.refused else float(np.clip(share, LEAST_PART, 1.0))
+        fraction = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
+        return LEAST_PART if begun.refused else float(np.clip(fraction, LEAST_PART, 1.0))
 
     def point(
         self,
         gone: Collection[Effect],
         *,
         level: int | None = None,
-        share: float = 1.0,
+        fraction: float = 1.0,
         members: int = MEMBERS,
         **solver: object,
     ) -> Point:
@@ -132,10 +132,10 @@ class Pilots:
         if level is not None:
             mine |= {name: bundle for name, bundle in self.fewer[level].items() if name in mine}
             scene = with_modes(scene, self.modes(level, mine))
-        if share < 1.0:
-            scene = edited(scene, {"time.end": scene.time.start + share * (scene.time.end - scene.time.start)})
+        if fraction < 1.0:
+            scene = edited(scene, {"time.end": scene.time.start + fraction * (scene.time.end - scene.time.start)})
         names = frozenset(effect.name for effect in gone)
-        key = (names, json.dumps([scene.solver.model_dump(mode="json"), level, share, members]))
+        key = (names, json.dumps([scene.solver.model_dump(mode="json"), level, fraction, members]))
         if key not in self.points:
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
             starts = members if scene.contacts() or scene.stop else 0
@@ -158,15 +158,15 @@ class Pilots:
         left_out = sum(b.sizes["mode"] for b in self.bundles.values()) - sum(b.sizes["mode"] for b in bundles.values())
         return max(self.extent.variables - 2 * int(left_out), 1)
 
-    def must_run(self, gone: Collection[Effect], share: float, members: int = MEMBERS) -> Point:
+    def must_run(self, gone: Collection[Effect], fraction: float, members: int = MEMBERS) -> Point:
         """What is watched of a variant that the decisions need, at a tight tolerance where the loose one is refused.
 
         Raises SolverError where it is refused then, too, for another reason than that it takes long.
         """
-        point = self.point(gone, share=share, members=members)
+        point = self.point(gone, fraction=fraction, members=members)
         if point.refused and TAKES_LONG not in point.refused:
             self.refused_loose = True
-            point = self.point(gone, share=share, members=members, rtol=RTOL)
+            point = self.point(gone, fraction=fraction, members=members, rtol=RTOL)
         if point.refused and TAKES_LONG not in point.refused:
             raise SolverError(f"{self.scene.name}: the scene cannot be run as it stands: {point.refused}")
         return point

@@ -26,7 +26,7 @@ from flexclear.pipeline.dynamics.linear.response import Response, response
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.impacts import bent, quickest
-from flexclear.pipeline.dynamics.plan.requested_accuracy import wanted_in
+from flexclear.pipeline.dynamics.plan.requested_accuracy import requested_in
 from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, Pilots
 from flexclear.pipeline.dynamics.plan.tolerance import DEFAULT, no_dearer, smooth
 from flexclear.pipeline.dynamics.run.run import Run, integrate
@@ -72,7 +72,7 @@ def plan(
     inner = [effect for effect in every if effect.within]
     within_bodies = [e for e in inner if e.within.startswith("body.")]
     ideal = pilots.point([*loose, *soft, *inner], rtol=RTOL)
-    search = Search(pilots, wanted_in(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
+    search = Search(pilots, requested_in(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
     rigid = _rigid(search, [*loose, *soft, *inner]) if loose or soft else None
     _clearances(search, loose, [*soft, *inner], rigid)
     _interactions(search, soft, inner)
@@ -108,7 +108,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
     if rigid is not None and any(q.kind in OF_POSE for q in pilots.chosen):
         bounded = dict(bounds(pilots.scene, rigid, pilots.chosen).clearance)
     reach = {effect.name: bounded.get(effect.owner, {}) for effect in free}
-    total = summed(reach.values(), search.wanted)
+    total = summed(reach.values(), search.requested)
     if search.fits(total, BY_BOUND):
         search.spend(total)
         for effect in free:
@@ -121,7 +121,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
         variant = _rigid_without(search, trial, soft)
         apart = with_doubt(search, search.pilots.between(variant, there), bool(soft))
         most = {name: i.most for name, i in apart.items()}
-        for name, bound in summed([reach[e.name] for e in trial], search.wanted).items():
+        for name, bound in summed([reach[e.name] for e in trial], search.requested).items():
             most[name] = min(most[name], bound)
         small = search.fits(most)
         search.judge(effect, small, "its impacts change what is asked for by less", most, apart)
@@ -141,14 +141,14 @@ def _interactions(search: Search, soft: Sequence[Effect], inner: Sequence[Effect
     dropped = [e for e in search.gone if e.kind == CLEARANCE and search.decisions[e.name].evidence == PILOT]
     if not soft or not dropped or all(q.kind in OF_POSE for q in pilots.chosen):
         return
-    share = pilots.part(())
+    fraction = pilots.part(())
     names = {effect.name for effect in dropped}
-    lacking = pilots.point([*dropped, *(e for e in inner if e.within in names)], share=share)
+    lacking = pilots.point([*dropped, *(e for e in inner if e.within in names)], fraction=fraction)
     apart = with_doubt(
-        search, pilots.between(lacking, pilots.point((), share=share)), False, 0.0 if share == 1.0 else WHOLE
+        search, pilots.between(lacking, pilots.point((), fraction=fraction)), False, 0.0 if fraction == 1.0 else WHOLE
     )
     most = {name: i.most for name, i in apart.items()}
-    if all(most[name] <= BUDGET * wanted for name, wanted in search.wanted.items()):
+    if all(most[name] <= BUDGET * requested for name, requested in search.requested.items()):
         return
     search.used = {}
     for effect in dropped:
@@ -161,9 +161,9 @@ def _rigid_without(search: Search, trial: Sequence[Effect], soft: Sequence[Effec
     return search.pilots.point([*trial, *inner])
 
 
-def summed(parts: Collection[Mapping[str, float]], wanted: Mapping[str, float]) -> dict[str, float]:
+def summed(parts: Collection[Mapping[str, float]], requested: Mapping[str, float]) -> dict[str, float]:
     """The sum by quantity, infinite where one of them does not say."""
-    return {name: sum(part.get(name, np.inf) for part in parts) for name in wanted}
+    return {name: sum(part.get(name, np.inf) for part in parts) for name in requested}
 
 
 def _flexibilities(
@@ -237,12 +237,12 @@ def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) ->
     dropped = [effect for effect in search.gone if effect.kind == CLEARANCE]
     if not dropped or all(effect in search.gone for effect in soft):
         return
-    share = min(1.0, MEMBERS * pilots.part(()))
+    fraction = min(1.0, MEMBERS * pilots.part(()))
     names = {effect.name for effect in search.gone}
-    lacking = pilots.point([*search.gone, *(e for e in inner if e.within in names)], share=share)
-    apart = pilots.between(lacking, pilots.must_run((), share, 0))
-    most = {name: (1.0 if share == 1.0 else 1.0 + WHOLE) * i.difference for name, i in apart.items()}
-    if all(most[name] <= wanted for name, wanted in search.wanted.items()):
+    lacking = pilots.point([*search.gone, *(e for e in inner if e.within in names)], fraction=fraction)
+    apart = pilots.between(lacking, pilots.must_run((), fraction, 0))
+    most = {name: (1.0 if fraction == 1.0 else 1.0 + WHOLE) * i.difference for name, i in apart.items()}
+    if all(most[name] <= requested for name, requested in search.requested.items()):
         return
     for effect in dropped:
         search.judge(effect, False, "", most, apart)
@@ -293,8 +293,8 @@ def _chosen(search: Search) -> Chosen:
         most = {name: i.most for name, i in apart.items()}
         if search.fits(most):
             search.spend(most)
-            return smooth(pilots, gone, search.wanted, level)
-    return smooth(pilots, gone, search.wanted, None)
+            return smooth(pilots, gone, search.requested, level)
+    return smooth(pilots, gone, search.requested, None)
 
 
 def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dict[str, Mesh]:
@@ -305,7 +305,7 @@ def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dic
         if decision is not None and decision.kept:
             bending = {n: v + decision.uncertainty.get(n, 0.0) for n, v in decision.estimate.items()}
             duration = scene.time.end - scene.time.start
-            numbers[body] = mesh(given, search.pilots.bundles[body], finer, bending, search.wanted, duration)
+            numbers[body] = mesh(given, search.pilots.bundles[body], finer, bending, search.requested, duration)
     return numbers
 
 
@@ -321,12 +321,12 @@ def _finished(
     modes = {} if chosen.level is None else search.pilots.modes(chosen.level, left)
     for effect in every:
         if ".".join(effect.name.split(".")[:2]) in apart:
-            search.decide(effect, False, BOUND, UNCOUPLED, dict.fromkeys(search.wanted, 0.0))
+            search.decide(effect, False, BOUND, UNCOUPLED, dict.fromkeys(search.requested, 0.0))
     decisions = sorted(search.decisions.values(), key=lambda d: order[d.effect.name])
     pilots = search.pilots
     return Plan(
         tuple(decisions),
-        dict(search.wanted),
+        dict(search.requested),
         chosen.integrator,
         chosen.rtol,
         chosen.error,

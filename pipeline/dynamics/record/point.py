@@ -99,7 +99,7 @@ class Runner:
     def _values(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[Values, Values, int]:
         engine, other = self._engines(scene)
         # exact, since how many points are run side by side depends on the machine and on how long they take
-        engine.straight.wanted = engine.straight.exact = True
+        engine.straight.requested = engine.straight.exact = True
         engine.straight.place = place
         if in_sections(self.kept):
             values, count = _sections(engine, self.kept, alive)
@@ -178,20 +178,20 @@ def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Kept]) -> Value
 def _sections(engine: Engine, kept: Sequence[Kept], alive: Progress) -> tuple[Values, int]:
     """What is kept once in each period, after the transient, and the evaluations that all periods took."""
     scene = engine.model.scene
-    wanted, period = scene.sections or Sections(), section_period(scene)
-    start, parts = consistent_start(engine), stretches(engine, period, wanted.phase)
+    requested, period = scene.sections or Sections(), section_period(scene)
+    start, parts = consistent_start(engine), stretches(engine, period, requested.phase)
     require_periodic(parts, start)
-    looked_at = next(k for k, part in enumerate(parts) if part.start == engine.start + wanted.phase)
+    looked_at = next(k for k, part in enumerate(parts) if part.start == engine.start + requested.phase)
     values, evaluations = dict[str, list[np.ndarray]](), 0
     for done in periods(parts, start, range(0), Cursor()):
         alive(None, f"period {done.number}")
         evaluations += sum(trajectory.counters["evaluations"] for trajectory in done.parts)
-        if done.number >= wanted.transient:
+        if done.number >= requested.transient:
             here = done.parts[looked_at]
             motions = Motions(engine.model, observed(parts[looked_at], replace(here, rows=here.rows[:1])))
             for one in kept:
                 values.setdefault(one.name, []).append(_series(motions, {}, one)[0])
-        if done.number + 1 == wanted.transient + wanted.periods:
+        if done.number + 1 == requested.transient + requested.periods:
             break
     return {name: np.array(rows) for name, rows in values.items()}, evaluations
 
@@ -226,7 +226,7 @@ def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Kep
 
 def _regular(engine: Engine, time: np.ndarray) -> np.ndarray:
     """Rows at the regular output times; a break that takes the place of one is the same but for rounding."""
-    wanted = regular_times(engine.model.scene.time, engine.model.scene.output)
-    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
-    nearer = np.where(np.abs(time[after - 1] - wanted) < np.abs(time[after] - wanted), after - 1, after)
+    requested = regular_times(engine.model.scene.time, engine.model.scene.output)
+    after = np.clip(np.searchsorted(time, requested), 1, len(time) - 1)
+    nearer = np.where(np.abs(time[after - 1] - requested) < np.abs(time[after] - requested), after - 1, after)
     return np.asarray(nearer)

@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names
 from flexclear.pipeline.dynamics.record.ensemble import kept_bodies
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.periods import APART, Cursor, Period, periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.periods import SEPARATION, Cursor, Period, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.pieces import digest, memory, remember
 from flexclear.pipeline.dynamics.run.run import engines, observed
 from flexclear.pipeline.dynamics.run.start import consistent_start
@@ -39,7 +39,7 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
     Raises InputError for laws that do not repeat, SolverError when the run cannot go on.
     """
-    wanted = scene.sections or Sections()
+    requested = scene.sections or Sections()
     for name, load in scene.load.items():
         if isinstance(load, SampledPid):
             raise InputError(
@@ -50,14 +50,14 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     period = section_period(scene)
     # between waypoints only their states are wanted
     engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
-    names = kept_bodies(engine.model, wanted.bodies, "[sections.bodies]")
+    names = kept_bodies(engine.model, requested.bodies, "[sections.bodies]")
     start = consistent_start(engine)
-    engine.straight.wanted = True
-    parts = stretches(engine, period, wanted.phase)
+    engine.straight.requested = True
+    parts = stretches(engine, period, requested.phase)
     require_periodic(parts, start)
-    count = wanted.transient + wanted.periods
-    followed = range(wanted.transient, min(count, wanted.transient + wanted.exponent_periods))
-    tape, begin = _Tape(names, engine.start + wanted.phase), Cursor()
+    count = requested.transient + requested.periods
+    followed = range(requested.transient, min(count, requested.transient + requested.exponent_periods))
+    tape, begin = _Tape(names, engine.start + requested.phase), Cursor()
     kept = _Recorder.of(engine, start)
     if kept is not None and kept.state is not None:
         remember(engine, kept.state.arrays)
@@ -65,39 +65,41 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         begin = Cursor.unpacked(kept.state.arrays)
     for done in periods(parts, start, followed, begin):
         progress((done.number + 1) / count, f"period {done.number + 1} of {count}")
-        if done.number >= wanted.transient:
-            tape.add(parts, done, number=done.number - wanted.transient)
+        if done.number >= requested.transient:
+            tape.add(parts, done, number=done.number - requested.transient)
         if done.number + 1 == count:
             tape.orbit = tape.motion_at_waypoints(parts, done)
             break
         if kept is not None:
             kept.keep({**memory(engine), **done.after.packed()}, tape)
     growth = np.array(tape.growth[: len(followed)])
-    told = {"period": period, "phase": wanted.phase, "transient": wanted.transient, "neighbour_lost": tape.lost}
+    told = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": tape.lost}
     variables = tape.variables(engine.model) | {"growth": (("followed",), growth)}
-    coordinates = {"section": np.arange(wanted.periods), "body": names, "followed": np.arange(len(followed))}
+    coordinates = {"section": np.arange(requested.periods), "body": names, "followed": np.arange(len(followed))}
     coordinates["waypoint"] = np.array([part.start - engine.start for part in parts])
     if engine.model.contacts:
         coordinates |= contact_names(engine.model)
     made = xr.Dataset(variables, coords=coordinates)
     title = f"Sections of the periodic motion of {subject(scene)}"
-    return conform(made, SECTIONS, title=title, **attributes(scene), **told, neighbour_distance=APART * engine.rtol)
+    return conform(
+        made, SECTIONS, title=title, **attributes(scene), **told, neighbour_distance=SEPARATION * engine.rtol
+    )
 
 
 def section_period(scene: Scene) -> float:
     """Period of the sections [s], the run's length where the scene gives none; InputError where it does not fit in."""
-    wanted, span = scene.sections or Sections(), scene.time.end - scene.time.start
-    period = wanted.period or span
+    requested, span = scene.sections or Sections(), scene.time.end - scene.time.start
+    period = requested.period or span
     if period > span * (1.0 + 1e-12):
         raise InputError(
             "[sections.period]",
             f"a period of {period:.6g} s is longer than the run, which tells the laws for {span:.6g} s",
             "let the run last a period at least",
         )
-    if not wanted.phase < period:
+    if not requested.phase < period:
         raise InputError(
             "[sections.phase]",
-            f"{wanted.phase:.6g} s is no time within the period of {period:.6g} s",
+            f"{requested.phase:.6g} s is no time within the period of {period:.6g} s",
             "give a time from 0 to below the period",
         )
     return period

@@ -24,9 +24,9 @@ def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> di
 
     names: of the joints; all when None.
     """
-    wanted = list(motions.model.scene.joint if names is None else names)
-    moment, force = every_joint_wrench(motions, wanted)
-    return {name: (moment[:, k], force[:, k]) for k, name in enumerate(wanted)}
+    requested = list(motions.model.scene.joint if names is None else names)
+    moment, force = every_joint_wrench(motions, requested)
+    return {name: (moment[:, k], force[:, k]) for k, name in enumerate(requested)}
 
 
 def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:

@@ -174,10 +174,10 @@ class _Pose:
         def progress(t: float) -> float:
             return float(np.linalg.norm(self.residual(np.zeros(self.nv), t))) / went
 
-        def reaching(wanted: float) -> float:
+        def reaching(requested: float) -> float:
             span = float(self.engine.breaks[1]) - self.engine.start
             for _ in range(HALVINGS):
-                if progress(self.engine.start + span) * size <= wanted:
+                if progress(self.engine.start + span) * size <= requested:
                     break
                 span *= 0.8
             return span
@@ -199,7 +199,7 @@ class _Pose:
         return [
             Direction(
                 t, self.rest, self._slope(step), self._with(step) - self.rest, lambda at: 0.5 * push * (at - t) ** 2,
-                lambda wanted: float(np.sqrt(2.0 * wanted / (push * size))), False,
+                lambda requested: float(np.sqrt(2.0 * requested / (push * size))), False,
             )
         ]  # fmt: skip
 

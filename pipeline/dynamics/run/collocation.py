@@ -138,7 +138,7 @@ def collocate(
     span: float,
     slope: np.ndarray | None,
     lead: Lead | None = None,
-    share: float = 1.0,
+    fraction: float = 1.0,
 ) -> Collocation | None:
     """The motion over a span from a closed state; None where there is no smooth one, or none that is resolved.
 
@@ -153,7 +153,7 @@ def collocate(
     if used.sum() < FEWEST:
         return None
     evaluated, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
-    blur = SLOWLY if lead is not None and lead.turn == 0.0 else max(1.0, (NEAR / share) ** 2)
+    blur = SLOWLY if lead is not None and lead.turn == 0.0 else max(1.0, (NEAR / fraction) ** 2)
     for _ in range(TURNS if lead is not None and lead.turn > 0.0 else 1):
         size = _sizes(sampler.engine, y, [s.slope for s in evaluated])
         iterated = _iterate(sampler, t, y, span, nodes, evaluated, blur * size)

@@ -43,7 +43,7 @@ class Straight:
     engine have met must not change a bit of this one.
     """
 
-    wanted: bool = False
+    requested: bool = False
     used: bool = False
     exact: bool = False
     place: Place | None = None
@@ -223,7 +223,7 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
 def another(engine: Engine) -> Engine:
     """An engine of the same model with a work space of its own, as it is before anything has been run on it."""
     made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
-    made.straight.wanted, made.straight.exact = engine.straight.wanted, engine.straight.exact
+    made.straight.requested, made.straight.exact = engine.straight.requested, engine.straight.exact
     made.straight.addresses = engine.straight.addresses.copy()
     return made
 

@@ -39,7 +39,7 @@ TOUCHING = 1.5
 #: least and largest power of the tolerance with which evaluations grow, as two runs tell
 LEAST_POWER, LARGEST_POWER = 0.02, 0.4
 #: the vibrations must be so much faster than all else, for nothing else limits the exponential method
-APART = 2.0
+SEPARATION = 2.0
 #: least that the default method must need before the exponential and the stiff one are tried, and before the stiff one
 #: is taken without any run
 CHEAP, WORTH, CRAWLING = 200.0, 3000.0, 300_000.0
@@ -140,7 +140,7 @@ class Suit:
 
     def _vibrates(self) -> bool:
         """Whether the modes' vibrations alone make the default method dear."""
-        return self.rates.all > APART * self.rates.held and self.by_stability > CHEAP
+        return self.rates.all > SEPARATION * self.rates.held and self.by_stability > CHEAP
 
     def best(self, rtol: float) -> str:
         """The integrator to take at a tolerance."""

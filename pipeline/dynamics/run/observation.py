@@ -51,10 +51,10 @@ def frames(engine: Engine, rows: np.ndarray) -> Frames:
     return observation.frames_by_name(blocks, size)
 
 
-def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: float) -> Blocks:
+def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, fraction: float) -> Blocks:
     """The same with given pieces of the laws, (rows, laws), projected to a share of the mechanism's size."""
     whole, blocks = observation.room(len(rows), engine.model.arrays.size)
-    _observe(engine, rows, pieces, share * engine.model.length, whole)
+    _observe(engine, rows, pieces, fraction * engine.model.length, whole)
     return blocks
 
 

@@ -31,7 +31,7 @@ from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, inte
 #: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together
 WAYPOINTS = 16
 #: the neighbour's distance in units of the relative tolerance: what steps differ by is then a thousandth of it
-APART = 1e3
+SEPARATION = 1e3
 #: a neighbour that went this many times as far between two waypoints was beyond what is linear; that is told
 FAR = 1e4
 #: laws repeat when they end a period as they began it, but for this share
@@ -149,7 +149,7 @@ def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) 
     """
     period = parts[-1].end - parts[0].start
     scales = state_scales(parts[0], period)
-    apart = APART * parts[0].rtol
+    apart = SEPARATION * parts[0].rtol
     number, here, beside = begin.number, begin.here, begin.beside
     while True:
         done, growth, lost = list[Trajectory](), 0.0, 0
@@ -255,10 +255,10 @@ def brought_back(
     distance = float(np.linalg.norm(difference / scales))
     if distance == 0.0:
         return _set_beside(part, scales, here, apart), (0.0, 1)
-    share = apart / distance
-    y = _closed(part, here.y + share * difference)
-    latched = here.latched + share * (beside.latched - here.latched)
-    return replace(beside, y=y, latched=latched), (-float(np.log(share)), int(distance > FAR * apart))
+    fraction = apart / distance
+    y = _closed(part, here.y + fraction * difference)
+    latched = here.latched + fraction * (beside.latched - here.latched)
+    return replace(beside, y=y, latched=latched), (-float(np.log(fraction)), int(distance > FAR * apart))
 
 
 def _closed(part: Engine, y: np.ndarray) -> np.ndarray:

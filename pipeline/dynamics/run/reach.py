@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.run.engine import Engine
 #: above which it is not singular
 NEAR, SINGULAR = 0.1, 1e-3
 #: a rest: share of a row in what depends, and speeds as share of the largest before
-SHARE, DYING = 0.1, 0.1
+FRACTION, DYING = 0.1, 0.1
 #: at the end of reach speeds grow beyond bounds: so much faster than the drives' a loop does not move elsewhere
 FASTER = 40.0
 
@@ -82,7 +82,7 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
     J = singular.natural(model, engine.h, engine.rows(m.JACOBIAN))
     where = singular.diagnosis(engine) if J.size else ""
     U, values, _ = np.linalg.svd(J) if J.size else (np.eye(1), np.ones(1), None)
-    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > SHARE)
+    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > FRACTION)
     engine.w[:], engine.n[:] = kept
     if not J.size or values[-1] > SINGULAR * values[0]:
         return ""

@@ -113,9 +113,9 @@ def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
     making = Lock()  # a run and its perturbed run may both go on with another integrator
 
     def made(name: str, tell: Progress) -> Engine:
-        wanted = edited(moved, {"solver.integrator": name}) if name else moved
+        requested = edited(moved, {"solver.integrator": name}) if name else moved
         with making:
-            model = tabulate(build(wanted, bundles), given)
+            model = tabulate(build(requested, bundles), given)
             if choice:  # the poses found no longer tell of it
                 model = replace(model, mechanism=replace(model.mechanism, choice=choice))
             return prepare(model, tell)
@@ -208,7 +208,7 @@ def follow(
             progress(None, f"{stiff}; going on with {heir}")
             reasons.append(str(stiff))
             straight, engine, left = engine.straight, other(heir), stiff.handover
-            engine.straight.wanted, engine.straight.exact = straight.wanted, straight.exact
+            engine.straight.requested, engine.straight.exact = straight.requested, straight.exact
 
 
 def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:

@@ -48,7 +48,7 @@ def _natural_lengths(engine: Engine) -> np.ndarray:
     return selection.natural_lengths(engine.model, columns, points, engine.mass_factor())
 
 
-def improve(engine: Engine, t: float, wanted: float = BETTER) -> bool:
+def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
     """Select rows anew where the present ones have become nearly dependent; whether others are so much better.
 
     The state in Y and its slope stay as they are: the motion does not depend on the selection.
@@ -58,7 +58,7 @@ def improve(engine: Engine, t: float, wanted: float = BETTER) -> bool:
     pivots, before = engine.view(m.PIVOT), engine.kept.copy()
     present = float(pivots[m.LAST_PIVOT])
     ratio = select_rows(engine, y, t) if engine.mobility.redundant else present
-    better = ratio > max(wanted * present, BLIND) and not np.array_equal(before, engine.kept)
+    better = ratio > max(requested * present, BLIND) and not np.array_equal(before, engine.kept)
     if not better:
         engine.keep(before)
         engine.view(m.ROW_SCALE)[: len(row_scale)] = row_scale

@@ -113,10 +113,10 @@ def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple
     Else None, and from how far before the pose it may be tried again: 0 where rounding leaves nothing to try.
     """
     control = sampler.engine.control
-    ahead, reach, share = float(control[m.PASS_TIME]) - t, float(control[m.REACH]), float(control[m.LEFT])
-    nearest = NEAREST / share * ahead
+    ahead, reach, fraction = float(control[m.PASS_TIME]) - t, float(control[m.REACH]), float(control[m.LEFT])
+    nearest = NEAREST / fraction * ahead
     while reach >= max(ahead, nearest):
-        made = collocate(sampler, t, y, _within(sampler, t, ahead + reach), slope, share=share * reach / ahead)
+        made = collocate(sampler, t, y, _within(sampler, t, ahead + reach), slope, fraction=fraction * reach / ahead)
         if made is not None:
             return made, reach
         reach *= 0.5
@@ -175,8 +175,8 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
 def _between(least: Callable[[float], float], t: float, aside: float, bracket: tuple[float, float]) -> float:
     """Where straight lines on both sides meet at zero: in the pose itself nothing can be told."""
     before, after = least(t - aside), least(t + aside)
-    share = before / (before + after) if before + after > 0.0 else 0.5
-    return float(np.clip(t - aside + 2.0 * aside * share, *bracket))
+    fraction = before / (before + after) if before + after > 0.0 else 0.5
+    return float(np.clip(t - aside + 2.0 * aside * fraction, *bracket))
 
 
 def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass:

@@ -93,8 +93,8 @@ def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) 
             place = "[start.branch]" if len(choices) == 1 else f"[start.branch.{number}]"
             scene = engine.model.scene
             joint, k, _ = coordinate_of(scene, choice.joint, choice.coordinate, place)
-            wanted = [choice.sign * change[label(joint, scene.joint[joint].type, k)] for change in changes]
-            near = [max(wanted) - value <= ALIKE * max(map(abs, wanted)) for value in wanted]
+            requested = [choice.sign * change[label(joint, scene.joint[joint].type, k)] for change in changes]
+            near = [max(requested) - value <= ALIKE * max(map(abs, requested)) for value in requested]
             ways = [way for way, best in zip(ways, near, strict=True) if best]
             changes = [change for change, best in zip(changes, near, strict=True) if best]
         if len(ways) > 1:

@@ -45,7 +45,7 @@ def settle(engine: Engine, progress: Progress) -> None:
 
     That is told by the engine and its count of evaluations, so an integration that was interrupted goes on as it would.
     """
-    engine.straight.used = engine.straight.wanted or bool(engine.n[m.EVALUATIONS] >= MANY)
+    engine.straight.used = engine.straight.requested or bool(engine.n[m.EVALUATIONS] >= MANY)
     if engine.straight.used:
         _make(engine, progress)
     engine.connect()
@@ -53,7 +53,7 @@ def settle(engine: Engine, progress: Progress) -> None:
 
 def specialise(engine: Engine, progress: Progress = silent) -> None:
     """Let all of the engine's integrations use straight code, from now on."""
-    engine.straight.wanted = True
+    engine.straight.requested = True
     settle(engine, progress)
 
 
@@ -63,7 +63,7 @@ def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> I
 
     Either way they, as `another` makes them of it, use straight code with the same bits.
     """
-    engine.straight.wanted = engine.straight.exact = True
+    engine.straight.requested = engine.straight.exact = True
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
     if members >= FEW * threads and side_by_side(engine) and _code(engine, engine.kept.tobytes(), progress, lanes):
         with crews(lanes, threads) as made:

@@ -35,8 +35,8 @@ def consistent_start(engine: Engine) -> np.ndarray:
     if not engine.mobility.singular_start:
         y = _closed(engine, y)
     # a singular pose has no rates to project on
-    share = 0.0 if engine.mobility.singular_start else initial.WRONG
-    y = initial.given_velocities(model, start_motions(engine), y, share)
+    fraction = 0.0 if engine.mobility.singular_start else initial.WRONG
+    y = initial.given_velocities(model, start_motions(engine), y, fraction)
     if not engine.mobility.singular_start:
         y = project(engine, y)
     if model.loads or model.arrays.size(m.N_INTERNAL):

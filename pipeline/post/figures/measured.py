@@ -13,7 +13,7 @@ from flexclear.pipeline.post.models import BALL_FRAME, IDEAL, JOINT, PLATFORM, M
 
 #: two answers differ by more than this share, and those of two ensembles also by this many standard deviations of the
 #: members
-SLIGHT, APART = 0.1, 2.0
+SLIGHT, SEPARATION = 0.1, 2.0
 #: artifacts by reference, such as ``sps4/csj:run``
 Data = Mapping[str, xr.Dataset]
 
@@ -87,7 +87,7 @@ def force(run: xr.Dataset) -> np.ndarray:
 def differ(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether the means of two ensembles' members do, by `SLIGHT` and by `APART`."""
     gap, spread = abs(a.mean() - b.mean()), max(a.std(ddof=1), b.std(ddof=1))
-    return bool(gap > SLIGHT * abs(b.mean()) and gap > APART * spread)
+    return bool(gap > SLIGHT * abs(b.mean()) and gap > SEPARATION * spread)
 
 
 def mode_set(model: Model) -> str:

@@ -125,10 +125,10 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
 def _unstable(step: float) -> str:
     """Why a predictor-corrector at the paper's step is no way to integrate a rod that rings undamped."""
     highest, steps = max(TABLE4_NORMAL_MODE), TABLE6["time_span"] / step
-    share = growth(2.0 * np.pi * highest * step) - 1.0
+    more = growth(2.0 * np.pi * highest * step) - 1.0
     return (
         f"At {step:g} s the predictor-corrector makes an undamped vibration of {1e-3 * highest:.3g} kHz, the sixth of "
-        f"Table 4, larger by {100.0 * share:.2g} % in each step: by a factor of 1e{steps * np.log10(1.0 + share):.0f} "
+        f"Table 4, larger by {100.0 * more:.2g} % in each step: by a factor of 1e{steps * np.log10(1.0 + more):.0f} "
         "over the stroke. So it is the method that ends runs of a flexible rod at this step, whatever the reason given."
     )
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.paths import TREE
 from flexclear.pipeline.post.figures import measured
-from flexclear.pipeline.post.figures.measured import APART, SLIGHT, Data, apart, mode_set
+from flexclear.pipeline.post.figures.measured import SEPARATION, SLIGHT, Data, apart, mode_set
 from flexclear.pipeline.post.figures.table10 import ratios
 from flexclear.pipeline.post.models import (
     CSJ,
@@ -85,8 +85,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
         f"Of ensembles the mean over the members, which differ where they do by more than {100 * SLIGHT:g} % and "
-        f"{APART:g} standard deviations. Costs agree within a factor of {NEAR:g}. In brackets: numbers of the layout "
-        "that was assumed before one was identified from Table 8; the verdict is on the others. The prismatic joint is "
+        f"{SEPARATION:g} standard deviations. Costs agree within a factor of {NEAR:g}. In brackets: numbers of the "
+        "layout assumed before one was identified from Table 8; the verdict is on the others. The prismatic joint is "
         "at the rod's lower end here; [reference-conditions.md](reference-conditions.md) judges mode sets at other "
         "places, over layouts of the mechanism, and against the full rod, [chaos.md](chaos.md) the motion under a "
         "repeated stroke, [geometry.md](geometry.md) what Table 8 tells of the joint coordinates. Tables 4 "
@@ -103,22 +103,26 @@ def _verdict(*tests: bool) -> str:
 
 
 def _same_motion(data: Data) -> Outcome:
-    own, shares = measured.sizes(data), []
+    own, fractions = measured.sizes(data), []
     for model in FAR:
         moved = measured.moved(data, model)
-        shares.append(
+        fractions.append(
             max(moved.angle / own.angle, moved.displacement / own.displacement, moved.velocity / own.velocity)
         )
     return _verdict(
-        *(s < SMALL for s in shares)
-    ), f"angle, displacement and velocity change by {100 * max(shares):.1g} % of their largest values at most"
+        *(s < SMALL for s in fractions)
+    ), f"angle, displacement and velocity change by {100 * max(fractions):.1g} % of their largest values at most"
 
 
 def _same_acceleration(data: Data) -> Outcome:
     largest = measured.acceleration(data, IDEAL)
-    shares = {model: apart(data, model, measured.vertical).max() / largest for model in FAR}
-    told = ", ".join(f"{100 * share:.2g} % ({mode_set(model)})" for model, share in shares.items() if share > ROUNDING)
-    return _verdict(*(share < SMALL for share in shares.values())), f"it changes by {told or 'nothing'} of the largest"
+    fractions = {model: apart(data, model, measured.vertical).max() / largest for model in FAR}
+    told = ", ".join(
+        f"{100 * fraction:.2g} % ({mode_set(model)})" for model, fraction in fractions.items() if fraction > ROUNDING
+    )
+    return _verdict(
+        *(fraction < SMALL for fraction in fractions.values())
+    ), f"it changes by {told or 'nothing'} of the largest"
 
 
 def _same_path(*models: Model) -> Callable[[Data], Outcome]:
@@ -155,10 +159,10 @@ def _slight_vibration(data: Data) -> Outcome:
 
 def _consistent(data: Data) -> Outcome:
     free, fixed, full = (measured.effects(data, model) for model in (FAR_FREE, FAR_FIXED, FAR_CB))
-    shares = {name: abs(free[name] - fixed[name]) / size for name, size in full.items() if size > 0.0}
+    fractions = {name: abs(free[name] - fixed[name]) / size for name, size in full.items() if size > 0.0}
     missed = max(free["velocity"], fixed["velocity"]) < SLIGHT * full["velocity"]
-    told = ", ".join(f"{100 * share:.2g} % ({name})" for name, share in shares.items())
-    return _verdict(*(share < SLIGHT for share in shares.values())), (
+    told = ", ".join(f"{100 * fraction:.2g} % ({name})" for name, fraction in fractions.items())
+    return _verdict(*(fraction < SLIGHT for fraction in fractions.values())), (
         f"they differ by {told} of the effect that a basis with all static compliance finds"
         f"{'; of that on the velocity both miss nearly all' if missed else ''}"
     )
@@ -184,15 +188,15 @@ def _in_both_layouts(outcome: Callable[[Data, Model, Model], Outcome]) -> Callab
 
 def _no_influence(data: Data, csj: Model, ideal: Model) -> Outcome:
     own, moved = measured.sizes(data, ideal), measured.moved(data, csj, ideal)
-    shares = moved.angle / own.angle, moved.displacement / own.displacement
+    fractions = moved.angle / own.angle, moved.displacement / own.displacement
     return _verdict(
-        *(s < SMALL for s in shares)
-    ), f"angle {100 * shares[0]:.1f} %, displacement {100 * shares[1]:.1f} %"
+        *(s < SMALL for s in fractions)
+    ), f"angle {100 * fractions[0]:.1f} %, displacement {100 * fractions[1]:.1f} %"
 
 
 def _velocity_free(data: Data, csj: Model, ideal: Model) -> Outcome:
-    share = measured.moved(data, csj, ideal).velocity / measured.sizes(data, ideal).velocity
-    return _verdict(share < SMALL), f"{100 * share:.1f} % of the largest velocity"
+    fraction = measured.moved(data, csj, ideal).velocity / measured.sizes(data, ideal).velocity
+    return _verdict(fraction < SMALL), f"{100 * fraction:.1f} % of the largest velocity"
 
 
 def _conspicuous(data: Data, csj: Model, ideal: Model) -> Outcome:
@@ -217,11 +221,11 @@ def _lowered(data: Data) -> Outcome:
 
 def _motion_kept(data: Data) -> Outcome:
     """Angle and displacement are those of the ideal model, and none depends on the mode set."""
-    own, shares = measured.sizes(data), []
+    own, fractions = measured.sizes(data), []
     moved = {model: measured.moved(data, model) for model in FAR_CSJ}
     for m in moved.values():
-        shares.append([m.angle / own.angle, m.displacement / own.displacement, m.velocity / own.velocity])
-    largest = np.max(shares, axis=0)
+        fractions.append([m.angle / own.angle, m.displacement / own.displacement, m.velocity / own.velocity])
+    largest = np.max(fractions, axis=0)
     free, fixed = moved[FAR_CSJ_FREE], moved[FAR_CSJ_FIXED]
     sets = [abs(getattr(free, n) / getattr(fixed, n) - 1.0) for n in ("angle", "displacement", "velocity")]
     return _verdict(*(s < SMALL for s in largest), *(s < SLIGHT for s in sets)), (
@@ -282,10 +286,10 @@ def _fixed_right(data: Data) -> Outcome:
 
 def _clearance_dominates(data: Data) -> Outcome:
     rod, clearance = measured.moved(data, FAR_CB), measured.moved(data, CSJ)
-    shares = [getattr(rod, n) / getattr(clearance, n) for n in ("angle", "displacement", "velocity")]
-    return _verdict(*(s < SLIGHT for s in shares)), (
-        f"the rod's part of the clearance's: angle {100 * shares[0]:.2g} %, displacement {100 * shares[1]:.2g} %, "
-        f"velocity {100 * shares[2]:.2g} %"
+    parts = [getattr(rod, n) / getattr(clearance, n) for n in ("angle", "displacement", "velocity")]
+    return _verdict(*(s < SLIGHT for s in parts)), (
+        f"the rod's part of the clearance's: angle {100 * parts[0]:.2g} %, displacement {100 * parts[1]:.2g} %, "
+        f"velocity {100 * parts[2]:.2g} %"
     )
 
 
@@ -324,9 +328,9 @@ def _becomes_chaotic(data: Data) -> Outcome:
         return _one_stroke(data)
     with SECTIONS.open(newline="", encoding="utf-8") as file:
         rows = {row["scene"]: row for row in csv.DictReader(file)}
-    wanted = {CSJ: "quasi-periodic", FAR_CSJ_FREE: "chaotic", FAR_CSJ_FIXED: "chaotic", FAR_CSJ_CB: "chaotic"}
-    told = [f"{mode_set(model) or model.label} {_motion(rows[model.scene])}" for model in wanted]
-    return _verdict(*(rows[model.scene]["verdict"] == motion for model, motion in wanted.items())), (
+    requested = {CSJ: "quasi-periodic", FAR_CSJ_FREE: "chaotic", FAR_CSJ_FIXED: "chaotic", FAR_CSJ_CB: "chaotic"}
+    told = [f"{mode_set(model) or model.label} {_motion(rows[model.scene])}" for model in requested]
+    return _verdict(*(rows[model.scene]["verdict"] == motion for model, motion in requested.items())), (
         f"over {rows[CSJ.scene]['periods']} repeated strokes: {'; '.join(told)} (chaos.md)"
     )
 

@@ -16,7 +16,7 @@ from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
 from flexclear.pipeline.post.series import parameters
 
 #: a difference is told from none where it is so many times larger than both runs' own errors
-TOLD_APART = 2.0
+DISTINGUISHED = 2.0
 #: below this share of the largest value an effect is called slight
 SLIGHT = 0.01
 #: below this share, both runs' own errors included, there is none, as of a body that a drive leads
@@ -57,18 +57,18 @@ def _effects(compared: xr.Dataset) -> list[str]:
         errors = [float(compared["error"][i, j]) for i in (0, last)]
         error = sum(errors) if np.isfinite(errors).all() else np.nan
         size = float(compared["largest"][0, j])
-        share = difference / size if size > 0.0 else np.nan
+        fraction = difference / size if size > 0.0 else np.nan
         value = measured(difference, error, unit)
-        known = np.isfinite(share) and share < 100.0
-        part = f", which is {rounded(100.0 * share, 2)} % of its largest value in the ideal run" if known else ""
+        known = np.isfinite(fraction) and fraction < 100.0
+        part = f", which is {rounded(100.0 * fraction, 2)} % of its largest value in the ideal run" if known else ""
         if np.isfinite(error) and difference + error < NOTHING * size:
             told = f"does not change: the runs agree to <b class='n'>{measured(difference + error, np.nan, unit)}</b>"
-        elif np.isfinite(error) and difference < TOLD_APART * error:
+        elif np.isfinite(error) and difference < DISTINGUISHED * error:
             told = (
                 f"the runs are not exact enough to tell an effect: their difference ({value}) is less "
-                f"than {TOLD_APART:g} times their errors together"
+                f"than {DISTINGUISHED:g} times their errors together"
             )
-        elif np.isfinite(share) and share < SLIGHT:
+        elif np.isfinite(fraction) and fraction < SLIGHT:
             told = f"changes slightly, by up to <b class='n'>{value}</b>{part}"
         else:
             told = f"changes by up to <b class='n'>{value}</b>{part}"
@@ -108,9 +108,11 @@ def _trust(run: xr.Dataset) -> list[str]:
         if n in run
     ]
     largest, missed = max(map(float, energies), default=0.0), float(np.abs(run["energy_error"].values).max())
-    share = missed / largest if largest > 0.0 else 0.0
-    word = "<span class='good'>closes</span>" if share < LEDGER else "<span class='bad'>does not close</span>"
-    return [f"The energy balance {word}: <span class='n'>{share:.1e}</span> of the largest energy is unaccounted for."]
+    fraction = missed / largest if largest > 0.0 else 0.0
+    word = "<span class='good'>closes</span>" if fraction < LEDGER else "<span class='bad'>does not close</span>"
+    return [
+        f"The energy balance {word}: <span class='n'>{fraction:.1e}</span> of the largest energy is unaccounted for."
+    ]
 
 
 def effects(scene: Mapping[str, Any]) -> dict[str, str]:

@@ -113,9 +113,9 @@ def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
     return time
 
 
-def _at(own: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _at(own: np.ndarray, requested: np.ndarray) -> np.ndarray:
     """Indices into a run's times of the common ones."""
-    first: np.ndarray = quantities.common_times(own, wanted)[0]
+    first: np.ndarray = quantities.common_times(own, requested)[0]
     return first
 
 

@@ -44,11 +44,11 @@ def _html(text: str) -> str:
     return made
 
 
-def _pictures(text: str, folder: Path, wanted: Sequence[str] | None) -> str:
+def _pictures(text: str, folder: Path, requested: Sequence[str] | None) -> str:
     def shown(match: re.Match[str]) -> str:
         name, alt = match[1], match[2]
         path = folder / name
-        if not path.is_file() or (wanted is not None and not name.endswith(tuple(wanted))):
+        if not path.is_file() or (requested is not None and not name.endswith(tuple(requested))):
             return ""
         data = base64.b64encode(path.read_bytes()).decode()
         return f"<figure class='plot'><img src='data:image/png;base64,{data}' alt='{alt}'></figure>"

@@ -21,7 +21,7 @@ FIRM, ADDED, PALE = 0.95, 0.4, 0.28
 #: cover the paper's own curves
 STRETCHES = 120
 #: differences whose sizes are further apart than this are drawn on a logarithmic scale around zero
-APART = 20.0
+SEPARATION = 20.0
 #: differences below this share of the largest are rounding
 ROUNDING = 1e-6
 
@@ -135,7 +135,7 @@ def _scale(axes: Axes, sizes: Sequence[float]) -> None:
     """A scale on which all differences are seen, of whatever size."""
     largest = max(sizes, default=0.0)
     smallest = min((size for size in sizes if size > ROUNDING * largest), default=largest)
-    if largest <= APART * smallest:
+    if largest <= SEPARATION * smallest:
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
         return
     linear = 10.0 ** np.floor(np.log10(smallest))

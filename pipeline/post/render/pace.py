@@ -40,9 +40,9 @@ def pace(run: xr.Dataset, seconds: float | None = None, slower: float | None = N
         weight = np.maximum(weight, 1.0 + (factor - 1.0) * np.minimum(2.0 * near, 1.0))
     passed = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * np.diff(way))])
     total = max(round(seconds * rate * min(1.4, passed[-1])), 2)
-    share = np.interp(np.linspace(0.0, passed[-1], total), passed, way)
+    fraction = np.interp(np.linspace(0.0, passed[-1], total), passed, way)
     length = total / rate
-    return Pace(start + span * share, length / passed[-1] * np.interp(share, way, weight) / span)
+    return Pace(start + span * fraction, length / passed[-1] * np.interp(fraction, way, weight) / span)
 
 
 def strongest(run: xr.Dataset) -> np.ndarray:

@@ -32,7 +32,7 @@ from flexclear.pipeline.post.render.view import View, eye
 #: frames of a motion, and width over height of a picture that is neither wide nor narrow
 FRAMES, ASPECT = 240, 1.2
 #: drawn size of the largest displacement of a mode, as a share of the body's length
-SHARE = 0.12
+FRACTION = 0.12
 
 
 def motion(drawn: Mechanism, frames: int = FRAMES) -> dict[str, Any]:
@@ -106,7 +106,7 @@ def modes(bundle: xr.Dataset) -> dict[str, Any]:
 
 def scales(bundle: xr.Dataset) -> np.ndarray:
     """The factor by which each mode of a body is drawn [kg^0.5 m], shape (mode,)."""
-    return np.array([scale_to(bundle, unit, SHARE) for unit in np.eye(bundle.sizes["mode"])])
+    return np.array([scale_to(bundle, unit, FRACTION) for unit in np.eye(bundle.sizes["mode"])])
 
 
 def vibrations(drawn: Mechanism, told: Vibrations) -> dict[str, Any]:

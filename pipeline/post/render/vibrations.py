@@ -14,7 +14,7 @@ from flexclear.pipeline.post.render.fields import hertz, linear_fields
 from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose
 
 #: drawn size of the largest displacement of a vibration, as a share of the mechanism's size
-SHARE = 0.12
+FRACTION = 0.12
 #: largest drawn rotation of any frame [rad]: points of a body that turns further would leave it, they move linearly
 TURN = 0.5
 #: displacement of the centre of mass and rotation in each vibration, (vibration, part, 3), by index of the body
@@ -89,7 +89,7 @@ def _scale(linear: xr.Dataset, size: float, largest: np.ndarray) -> np.ndarray:
     """The factor of each vibration, so that neither displacements nor rotations are drawn too large."""
     turned = np.linalg.norm(linear["frame_rotation"].values, axis=-1).reshape(len(largest), -1).max(axis=1, initial=0.0)
     factor: np.ndarray = np.minimum(
-        SHARE * size / np.where(largest > 0.0, largest, 1.0), TURN / np.where(turned > 0.0, turned, 1e-300)
+        FRACTION * size / np.where(largest > 0.0, largest, 1.0), TURN / np.where(turned > 0.0, turned, 1e-300)
     )
     return factor
 

@@ -133,8 +133,8 @@ def _stiffness(mesh: xr.Dataset) -> dict[str, np.ndarray]:
         "bend_both": E * per_point(mesh, "product_moment"),
     }
     if mesh.attrs["theory"] == "timoshenko":
-        share = at_points(mesh, "shear_coefficient")
-        matrices |= {"shear_v": G * area * share[..., 1], "shear_w": G * area * share[..., 2]}
+        fraction = at_points(mesh, "shear_coefficient")
+        matrices |= {"shear_v": G * area * fraction[..., 1], "shear_w": G * area * fraction[..., 2]}
     return matrices
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.compliance import DIRECTIONS, reduced, shares
+from flexclear.pipeline.core.artifacts.compliance import DIRECTIONS, fractions, reduced
 from flexclear.pipeline.structure.fe.model import Interface
 from flexclear.pipeline.structure.modes.condition import in_own_axes
 from flexclear.pipeline.structure.modes.statics import Flexibility
@@ -62,9 +62,9 @@ def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vector
 def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:
     """Smallest share of the compliance between the interfaces (of a single one: of the free body), and where."""
     whole = full(flexibility, interfaces)
-    fractions = shares(of_basis(flexibility, interfaces, vectors), whole)
+    each = fractions(of_basis(flexibility, interfaces, vectors), whole)
     if len(interfaces) > 1:
-        fractions[np.arange(len(fractions)), np.arange(len(fractions))] = 1.0
-    i, j, d = np.unravel_index(int(np.argmin(fractions)), fractions.shape)
+        each[np.arange(len(each)), np.arange(len(each))] = 1.0
+    i, j, d = np.unravel_index(int(np.argmin(each)), each.shape)
     held = "with nothing held" if i == j else f"with '{interfaces[j].name}' held"
-    return float(fractions[i, j, d]), f"{DIRECTIONS[d]} of '{interfaces[i].name}' {held}"
+    return float(each[i, j, d]), f"{DIRECTIONS[d]} of '{interfaces[i].name}' {held}"

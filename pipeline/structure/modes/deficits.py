@@ -32,7 +32,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.artifacts.compliance import shares
+from flexclear.pipeline.core.artifacts.compliance import fractions
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model
 from flexclear.pipeline.structure.modes import compliance, eigen, normal
@@ -52,7 +52,7 @@ def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -
     names = [frame.name for frame in model.interfaces]
     progress(None, "compliance of the full model")
     whole = compliance.full(flexibility, model.interfaces)
-    share = shares(compliance.of_basis(flexibility, model.interfaces, vectors), whole)
+    fraction = fractions(compliance.of_basis(flexibility, model.interfaces, vectors), whole)
     first, resolved = _frequencies(flexibility, vectors, progress)
     progress(None, "error bounds")
     at = first * np.array(BOUND_AT)
@@ -61,7 +61,7 @@ def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -
         "direction": (("direction",), list(DIRECTIONS)),
         "bound_frequency": (("bound_frequency",), at),
         "compliance_full": (("frame", "frame_held", "direction"), whole),
-        "compliance_share": (("frame", "frame_held", "direction"), share),
+        "compliance_share": (("frame", "frame_held", "direction"), fraction),
         "error_bound": (("frame", "direction", "bound_frequency"), bounds(flexibility, vectors, at, first)),
         "effective_mass": (("direction", "mode"), _effective_mass(model, vectors)),
     }

@@ -34,8 +34,8 @@ def _rank(model: Model) -> np.ndarray:
 def family(model: Model, vectors: np.ndarray) -> list[str]:
     """For each vector the family with the largest share of its kinetic energy."""
     families = model.families
-    share = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
-    totals = np.stack([share[families.member == k].sum(axis=0) for k in range(len(families.names))])
+    fraction = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
+    totals = np.stack([fraction[families.member == k].sum(axis=0) for k in range(len(families.names))])
     # a solid's torsion has equal shares along y and z
     return [families.names[k] for k in first_largest(totals, axis=0)]
 

@@ -18,7 +18,7 @@ MARGIN = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class ModeRequest:
     """What decides the number of coordinates; nothing at all means every one that the mesh has.
 
     count: elastic coordinates, static ones included.  up_to: highest normal frequency kept [Hz].
@@ -65,20 +65,20 @@ def request(count: int | None, available: int, static: int = 0) -> Request:
     return Request(count - static, available, static)
 
 
-def whole(values: np.ndarray, wanted: Request) -> int:
+def whole(values: np.ndarray, requested: Request) -> int:
     """`wanted.normal`, or InputError when it would keep a part of a cluster of equal frequencies.
 
     values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are kept unless there are no more.
     """
-    n = wanted.normal
+    n = requested.normal
     for start, stop in clusters(values):
         if start < n < stop:
-            counts = [c + wanted.static for c in (start, stop) if c + wanted.static > 0]
+            counts = [c + requested.static for c in (start, stop) if c + requested.static > 0]
             hertz = float(frequency(values[start : start + 1])[0])
             nearest = f"count is {counts[0]}" if len(counts) == 1 else f"counts are {counts[0]} and {counts[1]}"
             raise InputError(
                 WHERE,
-                f"{n + wanted.static} modes cut a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz",
+                f"{n + requested.static} modes cut a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz",
                 f"the nearest whole {nearest}",
             )
     return n

@@ -109,7 +109,7 @@ def _add_lower(matrix: np.ndarray, runs: Runs, theirs: np.ndarray) -> None:
             matrix[row, column] += theirs[rows, columns]
 
 
-def cholesky(matrix: sp.csr_array, place: np.ndarray, tell: Tell = lambda share: None) -> Factor:
+def cholesky(matrix: sp.csr_array, place: np.ndarray, tell: Tell = lambda fraction: None) -> Factor:
     """Factor of a symmetric positive definite matrix, shape (n, n).
 
     place: where each row belongs [m], shape (n, 3); it decides the order of elimination only.
@@ -135,7 +135,7 @@ def _under(diagonal: np.ndarray, front: Front) -> np.ndarray:
     return under
 
 
-def negative_pivots(matrix: sp.csr_array, place: np.ndarray, last: int = 0, tell: Tell = lambda share: None) -> int:
+def negative_pivots(matrix: sp.csr_array, place: np.ndarray, last: int = 0, tell: Tell = lambda fraction: None) -> int:
     """Number of negative eigenvalues of a symmetric matrix, by Sylvester's law of inertia.
 
     last: this many last rows are eliminated last, since they have no diagonal entry of their own.

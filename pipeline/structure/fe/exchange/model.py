@@ -145,11 +145,11 @@ def _interfaces(mesh: xr.Dataset, component: np.ndarray) -> tuple[Interface, ...
     return tuple(interfaces)
 
 
-def _unknown(node: np.ndarray, component: np.ndarray, number: int, wanted: int, frame: str) -> int:
-    indices = np.flatnonzero((node == number) & (component == wanted))
+def _unknown(node: np.ndarray, component: np.ndarray, number: int, requested: int, frame: str) -> int:
+    indices = np.flatnonzero((node == number) & (component == requested))
     if len(indices) != 1:
         raise InputError(
-            f"mesh recipe [frames.{frame}]", f"node {number} has {len(indices)} unknowns {COMPONENTS[wanted]}"
+            f"mesh recipe [frames.{frame}]", f"node {number} has {len(indices)} unknowns {COMPONENTS[requested]}"
         )
     return int(indices[0])
 
