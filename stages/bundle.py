@@ -91,17 +91,19 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
         environment = {**os.environ, "FLEXCLEAR_RESULTS": str(folder / "results")}
         done, digest = _run(folder / FILES / facts["scene"], facts["settings"], environment)
         said = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST:]
-    told = [f"here it ended with {done.returncode}, there with {facts['exit_code']}"]
+    differences = [f"here it ended with {done.returncode}, there with {facts['exit_code']}"]
     if digest and facts.get("run"):
-        told += [
+        differences += [
             f"the run is {'the same to the last bit' if digest == facts['run'] else 'not the same to the last bit'}"
         ]
     now = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
     then = {**facts["libraries"], "python": facts["python"]}
-    told += [f"{k} is {now[k]} here, {v} there" for k, v in sorted(then.items()) if now.get(k, v) != v]
+    differences += [f"{k} is {now[k]} here, {v} there" for k, v in sorted(then.items()) if now.get(k, v) != v]
     ending = [text.strip().splitlines()[-REPORTED:] for text in (log, said)]
-    told += [f"{where}: {line}" for where, lines in zip(("there", "here"), ending, strict=True) for line in lines]
-    return done.returncode == facts["exit_code"], "\n".join(told)
+    differences += [
+        f"{where}: {line}" for where, lines in zip(("there", "here"), ending, strict=True) for line in lines
+    ]
+    return done.returncode == facts["exit_code"], "\n".join(differences)
 
 
 def _opened(scene: Path, settings: Sequence[str]) -> list[Path]:

@@ -82,11 +82,11 @@ def _check(options: argparse.Namespace) -> None:
         print(shown(fault))
     if len(faults) > SHOWN:
         print(f"... and {len(faults) - SHOWN} more")
-    told = (
+    text = (
         f"{len(inventory.artifacts)} artifacts, {len(faults)} faults, {len(inventory.orphans)} files without a record"
     )
     unused = f", {len(others)} of another build, which nothing uses" if others else ""
-    print(f"{told}; {len(kernels)} compiled kernels{unused}")
+    print(f"{text}; {len(kernels)} compiled kernels{unused}")
     if faults:
         raise ResourceError(
             "damaged files are never used: what needs them makes them again; `cache prune` removes them"

@@ -55,8 +55,8 @@ def command(options: argparse.Namespace) -> int:
         print(json.dumps([_record(mistake) for mistake in errors.values()], indent=2))
     else:
         for mistake in errors.values():
-            told = lines.located(mistake) if isinstance(mistake, InputError) else mistake
-            print(f"flexclear: {told}", file=sys.stderr)
+            text = lines.located(mistake) if isinstance(mistake, InputError) else mistake
+            print(f"flexclear: {text}", file=sys.stderr)
         if len(errors) > 1:
             print(f"flexclear: {len(errors)} mistakes", file=sys.stderr)
     return min((mistake.exit_code for mistake in errors.values()), default=0)
@@ -116,9 +116,9 @@ def _of_recipe(path: Path) -> tuple[list[FlexclearError], Seen]:
         return errors, Seen()
     table = s1_mesh.params(path)["recipe"]
     frames = ", ".join(table.get("frames", {})) or "none"
-    told = f"a mesh recipe, {table['shape']['type']}, frames: {frames}"
+    text = f"a mesh recipe, {table['shape']['type']}, frames: {frames}"
     beam = s1_mesh.kind_of(path) == "beam"
-    return [], Seen(f"{told}, mass {float(_undeformed(path).mass):.6g} kg" if beam else told)
+    return [], Seen(f"{text}, mass {float(_undeformed(path).mass):.6g} kg" if beam else text)
 
 
 LOOKS = {SCENE: _of_scene, SWEEP: _of_sweep, RECIPE: _of_recipe}

@@ -45,8 +45,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     done = cost.run
     chosen = [parse(name, scene.owners()) for name in params["quantities"]]
     kept = quantities.keep(done, chosen)
-    told = {"units": "s", "long_name": "processor time of the integration of a warm run"}
-    kept["cpu_repeat"] = (("repeat",), list(cost.integration), told)
+    attributes = {"units": "s", "long_name": "processor time of the integration of a warm run"}
+    kept["cpu_repeat"] = (("repeat",), list(cost.integration), attributes)
     costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}
     costs["recording_seconds"] = float(np.median(cost.recording))
     costs["compile_seconds"] = inputs["kernels"].attrs["compile_seconds"]

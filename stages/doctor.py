@@ -192,7 +192,7 @@ def _self_test() -> tuple[str, bool]:
     if done.returncode or not lines:
         said = done.stderr.strip().splitlines()
         # of a traceback only the last line is for users
-        told = said[-1:] if any(line.startswith("Traceback") for line in said) else said[-4:]
-        return f"a free fall cannot be computed: {' '.join(line.strip() for line in told)}", False
+        last_lines = said[-1:] if any(line.startswith("Traceback") for line in said) else said[-4:]
+        return f"a free fall cannot be computed: {' '.join(line.strip() for line in last_lines)}", False
     fine = abs(float(lines[-1]) - expected) < CLOSE
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine

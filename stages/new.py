@@ -20,8 +20,8 @@ KINDS = {
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    told = "; ".join(f"{name}: {text}" for name, text in KINDS.items())
-    parser.add_argument("kind", choices=list(KINDS), metavar="KIND", help=told)
+    message = "; ".join(f"{name}: {text}" for name, text in KINDS.items())
+    parser.add_argument("kind", choices=list(KINDS), metavar="KIND", help=message)
     parser.add_argument(
         "folder", nargs="?", type=Path, default=Path(), metavar="FOLDER", help="where; default: the current folder"
     )

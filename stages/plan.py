@@ -148,14 +148,14 @@ def bring(scene: Scene, place: Workplace) -> Planned:
 
 def of(scene: Scene, plan: xr.Dataset) -> Scene:
     """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities told."""
-    told = s8_plan.from_dataset(plan)
-    bare = variants.without(scene, variants.named(scene, told["gone"], f"{scene.name} [plan]"))
-    fewer = lessened(variants.with_modes(bare, told["modes"]), told["apart"])
+    decided = s8_plan.from_dataset(plan)
+    bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
+    fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["apart"])
     owners = fewer.owners()
     there = {name for names in owners.values() for name in names}
     watch = [q.name for q in scene.watched() if q.owner in there and (q.kind in _kinds(owners, q.owner))]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
-    solver: dict[str, Any] = {key: told[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in told}
+    solver: dict[str, Any] = {key: decided[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in decided}
     if "evaluations" in scene.solver.model_fields_set:
         solver["evaluations"] = scene.solver.evaluations  # a limit that the scene sets itself
     result = edited(

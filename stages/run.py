@@ -281,8 +281,8 @@ def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
 
 def _edits(settings: Sequence[str]) -> str:
     """What was changed, as part of a folder's name: of what is long the beginning, and a digest of the whole."""
-    told = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # which Windows leaves out
-    return told if len(told.encode()) <= LONGEST_EDITS else f"{told[:40]},{sha256(told.encode())[:16]}"
+    suffix = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # which Windows leaves out
+    return suffix if len(suffix.encode()) <= LONGEST_EDITS else f"{suffix[:40]},{sha256(suffix.encode())[:16]}"
 
 
 def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
@@ -302,8 +302,8 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
         except InputError as error:
             wrong.append(error)
     if wrong:
-        told = [lines.located(error) for error in wrong]
-        raise told[0] if len(told) == 1 else InputErrors(told)
+        messages = [lines.located(error) for error in wrong]
+        raise messages[0] if len(messages) == 1 else InputErrors(messages)
     owner.refuse_namesakes([graph.scene for graph in by_scene.values()])
     return list(by_scene.values())
 

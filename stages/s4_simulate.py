@@ -61,8 +61,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         progress(None, text)
     with stopping.until(scene.limits.time, scene.limits.time_words):
         simulated = dynamics.simulated(scene, reduced, progress)
-    told = "\n".join(filter(None, [str(simulated.attrs.get("warnings", "")), *lacks]))
-    return {"nc": simulated.assign_attrs(warnings=told) if told else simulated}
+    warnings = "\n".join(filter(None, [str(simulated.attrs.get("warnings", "")), *lacks]))
+    return {"nc": simulated.assign_attrs(warnings=warnings) if warnings else simulated}
 
 
 def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[str]:
@@ -104,7 +104,7 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None =
 
     table, name = params["scene"], str(params.get("name", "scene"))
     body = s3_rigid.filled(table["body"], inputs or {})
-    told = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
-    scene = Scene.model_validate({**table, **told})
+    mine = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
+    scene = Scene.model_validate({**table, **mine})
     scene._name = name
     return scene

@@ -59,16 +59,16 @@ def _looks(scene: Scene) -> dict[str, Any]:
     """Shapes and colours of bodies, where the scene gives some; files by their names, since their content counts."""
     looks = {}
     for name, body in scene.body.items():
-        told = body.model_dump(mode="json", include=set(UNSEEN), exclude_none=True)
-        for k, shape in enumerate(told.get("geometry", ())):
+        look = body.model_dump(mode="json", include=set(UNSEEN), exclude_none=True)
+        for k, shape in enumerate(look.get("geometry", ())):
             if shape["type"] == "file" and not is_file(Path(shape["file"])):
                 raise InputError(
                     f"{scene.path or scene.name} [body.{name}.geometry.{k}]",
                     f"there is no file {shape['file']}",
                     "paths are relative to the scene",
                 )
-        if told:
-            looks[name] = told
+        if look:
+            looks[name] = look
     return looks
 
 

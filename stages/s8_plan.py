@@ -151,5 +151,5 @@ def _meshed(simulate: Mapping[str, Any], name: str) -> bool:
 
 def from_dataset(planned: xr.Dataset) -> dict[str, Any]:
     """What of a plan makes its scene: names of effects that go, modes, integrator and tolerance."""
-    told: dict[str, Any] = json.loads(planned.attrs["planned"])
-    return told
+    choice: dict[str, Any] = json.loads(planned.attrs["planned"])
+    return choice

@@ -128,9 +128,9 @@ class _Desk:
         since = now() - self.begun
         if now() - self.stored > max(OFTEN, FRACTION * since):
             self.store()
-        told = f", {self.refused} refused" if self.refused else ""
+        text = f", {self.refused} refused" if self.refused else ""
         rate = self.fresh / since if since > 0.0 else 0.0
-        tell(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{told}, {rate:.3g}/s")
+        tell(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{text}, {rate:.3g}/s")
 
     def store(self) -> None:
         """Put what waits into the cache, family by family."""

@@ -96,8 +96,8 @@ class Engine:
                     running.clear()
                     lost += 1
                     if lost > LOSSES:
-                        told = f"worker processes were killed {lost} times in a row; is the memory full?"
-                        raise ResourceError(told) from None
+                        text = f"worker processes were killed {lost} times in a row; is the memory full?"
+                        raise ResourceError(text) from None
                     waiting += [list(reversed(batch)) for batch in again]
                     self.renew()
                     break
@@ -203,8 +203,8 @@ def _cluster(address: str) -> Iterator[Engine]:
     try:
         yield _on_cluster(client, place)
     except KilledWorker as error:
-        told = f"{place}: workers died again and again over a task ({error}); is their memory full?"
-        raise ResourceError(told) from None
+        text = f"{place}: workers died again and again over a task ({error}); is their memory full?"
+        raise ResourceError(text) from None
     except (CancelledError, FutureCancelledError):
         raise ResourceError(f"{place}: the scheduler has gone; what was finished is kept") from None
     except ImportError as error:  # of a worker that has joined since

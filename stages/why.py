@@ -30,10 +30,10 @@ def command(options: argparse.Namespace) -> None:
 
 def text(reasons: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
     """For each scene its stages, and why each would run again."""
-    told = []
+    lines = []
     for scene, stages in reasons.items():
-        told.append(scene)
+        lines.append(scene)
         for label, why in stages.items():
             first, *others = map(shown, why or ["fresh"])
-            told += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in others)]
-    return "\n".join(told)
+            lines += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in others)]
+    return "\n".join(lines)

@@ -114,8 +114,8 @@ def _apart(a: Point, b: Point, name: str, members: int, *, turning: bool) -> Inf
     else:
         distance = np.linalg.norm(one - two, axis=1)
     error = chance(members) * _pooled(error)
-    told = np.sqrt(np.maximum(0.0, distance**2 - error**2))
-    return Influence(float(told.max(initial=0.0)), float(error.max(initial=0.0)))
+    distances = np.sqrt(np.maximum(0.0, distance**2 - error**2))
+    return Influence(float(distances.max(initial=0.0)), float(error.max(initial=0.0)))
 
 
 def _pooled(error: np.ndarray) -> np.ndarray:

@@ -52,13 +52,13 @@ class InputErrors(InputError):  # noqa: N818 - several of them
 
     def __init__(self, errors: list[InputError]) -> None:
         self.errors = errors
-        told: list[str] = []
+        lines: list[str] = []
         for error in errors:
-            if told and sum(len(text.encode()) + 1 for text in (*told, str(error))) > TOGETHER:
-                told.append(f"... and {len(errors) - len(told)} more")
+            if lines and sum(len(text.encode()) + 1 for text in (*lines, str(error))) > TOGETHER:
+                lines.append(f"... and {len(errors) - len(lines)} more")
                 break
-            told.append(str(error))
-        FlexclearError.__init__(self, "\n".join(told))
+            lines.append(str(error))
+        FlexclearError.__init__(self, "\n".join(lines))
 
 
 class SolverError(FlexclearError):

@@ -81,9 +81,9 @@ def module_name(name: str) -> str:
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
     """'did you mean ...?' for the name that is meant, or the nearest one, or a list of those there are."""
-    for words, meant, told in ELSEWHERE:
+    for words, meant, advice in ELSEWHERE:
         if name in words and meant in known:
-            return f"did you mean '{meant}'?" + (f" {told}" if told else "")
+            return f"did you mean '{meant}'?" + (f" {advice}" if advice else "")
     import difflib  # here, since a right name needs none
 
     # the comparison takes the product of both lengths

@@ -42,16 +42,16 @@ def html_page(content: Content, drawn: Sequence[tuple[str, str]], assumptions: S
     )
     results = [table for name, table in content.tables.items() if name not in (*GIVEN, VERDICTS)]
     given = [content.tables[name] for name in GIVEN if name in content.tables]
-    told = content.documents
+    documents = content.documents
     parts = [
         Part("verdicts", "The verdict on every statement", _verdicts(content.tables.get(VERDICTS))),
         Part("film", "The mechanism moving", _film(content)),
         Part("figures", "Figures", figures),
         Part("tables", "Tables", "".join(as_html(table) for table in results)),
-        Part("accuracy", "Accuracy against time", told.get("accuracy", "")),
-        Part("stability", "Stability: hard cases, and what became of each", told.get("stability", "")),
-        Part("chaos", "Periodic or chaotic", told.get("chaos", "")),
-        Part("conditions", "Reference conditions of the modes", told.get("conditions", "")),
+        Part("accuracy", "Accuracy against time", documents.get("accuracy", "")),
+        Part("stability", "Stability: hard cases, and what became of each", documents.get("stability", "")),
+        Part("chaos", "Periodic or chaotic", documents.get("chaos", "")),
+        Part("conditions", "Reference conditions of the modes", documents.get("conditions", "")),
         Part("parameters", "Parameters, as the paper prints them and as they are here", "".join(map(as_html, given))),
         Part("variants", "Variants", prose(("scene", "what it is"), content.variants)),
         Part(
@@ -115,8 +115,8 @@ def _film(content: Content) -> str:
 
 
 def _versions(content: Content) -> str:
-    keys = list(dict.fromkeys(key for told in content.facts.values() for key in told))
-    rows = [(f"`{scene}`", *(told.get(key, "") for key in keys)) for scene, told in content.facts.items()]
+    keys = list(dict.fromkeys(key for facts in content.facts.values() for key in facts))
+    rows = [(f"`{scene}`", *(facts.get(key, "") for key in keys)) for scene, facts in content.facts.items()]
     return prose(("scene", *keys), rows)
 
 

@@ -111,16 +111,18 @@ def table(planned: xr.Dataset) -> Table:
         rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
     requested = [written(float(value), 0.0, unit) for value, unit in zip(planned["wanted"].values, units, strict=True)]
     rows.append(("wanted", "", *requested, "", ""))
-    told = json.loads(planned.attrs["planned"])
+    decided = json.loads(planned.attrs["planned"])
     notes = [words(planned)]
-    notes += [f"{name} keeps {count} of its modes, which do the same as all." for name, count in told["modes"].items()]
+    notes += [
+        f"{name} keeps {count} of its modes, which do the same as all." for name, count in decided["modes"].items()
+    ]
     notes += [_of_mesh(planned.sel(body=body), units) for body in planned["body"].values]
-    if told["apart"]:
-        notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(told['apart'])}.")
+    if decided["apart"]:
+        notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(decided['apart'])}.")
     if planned.attrs["dearer"]:
         notes.append(f"{planned.attrs['dearer']}.")
     notes.append(
-        f"The planned run is integrated by {told['integrator']} at a relative tolerance of {told['rtol']:.0e}. "
+        f"The planned run is integrated by {decided['integrator']} at a relative tolerance of {decided['rtol']:.0e}. "
         f"The plan rests on {planned.attrs['runs']} short runs, {planned.attrs['evaluations']:,} evaluations."
     )
     return Table(
@@ -146,10 +148,10 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
     )
     if not errors:
         return f"{head}; what that does to what is asked for cannot be told."
-    told = f"{head}, and so change {listed(errors)}"
+    text = f"{head}, and so change {listed(errors)}"
     if called > given:
-        return f"{told}: the accuracy wanted calls for {called}."
-    return f"{told}: enough; {called} would do. Elements cost no time in a run, so the recipe stays as it is."
+        return f"{text}: the accuracy wanted calls for {called}."
+    return f"{text}: enough; {called} would do. Elements cost no time in a run, so the recipe stays as it is."
 
 
 def words(planned: xr.Dataset) -> str:

@@ -58,7 +58,7 @@ def collect(
         film=(films[0].name, films[0].read_bytes()) if films else None,
         still=still.read_bytes() if still.is_file() else None,
         views="".join(figures_of(path.read_text(encoding="utf-8")) for path in pages),
-        facts={scene: {key: str(told[key]) for key in FACTS if key in told} for scene, told in attributes.items()},
+        facts={scene: {key: str(facts[key]) for key in FACTS if key in facts} for scene, facts in attributes.items()},
         documents={} if source is None else _documents(source / "docs"),
         variants=() if source is None else _variants(source / "scenes" / "sps4" / "variants"),
     )
@@ -89,8 +89,8 @@ def run_attributes(paths: Mapping[str, Path]) -> dict[str, dict[str, object]]:
 def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[str, tuple[str, tuple[str, ...]]]:
     """Each assumption once, with the scenes that make it; places in alphabetical order."""
     scenes: dict[tuple[str, str], list[str]] = {}
-    for scene, told in attributes.items():
-        for place, text in json.loads(str(told.get("assumptions", "{}"))).items():
+    for scene, facts in attributes.items():
+        for place, text in json.loads(str(facts.get("assumptions", "{}"))).items():
             scenes.setdefault((place, text), []).append(scene)
     result: dict[str, tuple[str, tuple[str, ...]]] = {}
     for (place, text), names in sorted(scenes.items()):

@@ -46,13 +46,13 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
             ax.set_visible(False)
         refused = int((sweep["status"] == 1).sum())
         missing = int((sweep["status"] == 2).sum())
-        told = [f"{sweep['status'].size} points of {sweep.attrs['scene']}"]
-        told += [f"{refused} refused"] if refused else []
-        told += [f"{missing} not run"] if missing else []
-        told += _still(sweep, panels)
+        sentences = [f"{sweep['status'].size} points of {sweep.attrs['scene']}"]
+        sentences += [f"{refused} refused"] if refused else []
+        sentences += [f"{missing} not run"] if missing else []
+        sentences += _still(sweep, panels)
         if draw is _curve:
-            told += [text for end, text in BANDS.items() if any(f"{name}{end}" in sweep for name in panels)][:1]
-        heading(figure, sweep.attrs.get("title", sweep.attrs["sweep"]), ", ".join(told))
+            sentences += [text for end, text in BANDS.items() if any(f"{name}{end}" in sweep for name in panels)][:1]
+        heading(figure, sweep.attrs.get("title", sweep.attrs["sweep"]), ", ".join(sentences))
         return files(NAME, figure)
 
 
@@ -69,8 +69,8 @@ def _panels(sweep: xr.Dataset, *, sections: bool) -> dict[str, xr.Dataset]:
     dims, panels = sweep["status"].dims, dict[str, xr.Dataset]()
     for name in map(str, sweep.data_vars):
         inner = tuple(dim for dim in sweep[name].dims if dim not in dims)
-        told = "units" in sweep[name].attrs and not name.endswith((".error", ".deviation"))
-        if not told or ("section" in inner and not sections):
+        has_units = "units" in sweep[name].attrs and not name.endswith((".error", ".deviation"))
+        if not has_units or ("section" in inner and not sections):
             continue
         if inner in ((), ("section",)):
             panels[name] = sweep
@@ -83,8 +83,8 @@ def _panels(sweep: xr.Dataset, *, sections: bool) -> dict[str, xr.Dataset]:
 def _moving(vector: xr.DataArray) -> list[str]:
     """Components that are not zero at all points, but for rounding; all of them where nothing moves."""
     sizes = abs(vector).max([dim for dim in vector.dims if dim != "axis"])
-    told = [str(axis) for axis in vector["axis"].values[(sizes > ZERO * sizes.max()).values]]
-    return told or list(map(str, vector["axis"].values))
+    axes = [str(axis) for axis in vector["axis"].values[(sizes > ZERO * sizes.max()).values]]
+    return axes or list(map(str, vector["axis"].values))
 
 
 def _still(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:

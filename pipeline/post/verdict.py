@@ -91,19 +91,19 @@ def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) ->
 def _rule(
     rate: chaos.Interval, least: float, after: int, distance: float, K: float, discrete: float
 ) -> tuple[Kind, tuple[str, ...]]:
-    told = f"largest exponent {rate.mean:.3g} 1/s, 95 % between {rate.low:.3g} and {rate.high:.3g}"
+    text = f"largest exponent {rate.mean:.3g} 1/s, 95 % between {rate.low:.3g} and {rate.high:.3g}"
     grows, still = rate.low > least, rate.low <= least
     if after and still:
         times = "one period" if after == 1 else f"{after} periods"
-        return "periodic", (f"the states come back after {times}, to {distance:.2g} of the motion", told)
+        return "periodic", (f"the states come back after {times}, to {distance:.2g} of the motion", text)
     tested = f"0-1 test K = {K:.2f}"
     if grows and K > CHAOTIC:
-        return "chaotic", (f"{told}, above the {least:.2g} that freedoms without consequence give", tested)
+        return "chaotic", (f"{text}, above the {least:.2g} that freedoms without consequence give", tested)
     lined = f"{100 * discrete:.0f} % of the variance in {chaos.LINES} lines of the spectrum"
     if still and K < REGULAR and discrete > DISCRETE and not after:
-        return "quasi-periodic", (told, tested, lined)
+        return "quasi-periodic", (text, tested, lined)
     back = f"states come back to {distance:.2g} of the motion at best"
-    return "undecided", (told, tested, lined, back)
+    return "undecided", (text, tested, lined, back)
 
 
 def derive(sections: xr.Dataset) -> xr.Dataset:
@@ -137,9 +137,9 @@ def derive(sections: xr.Dataset) -> xr.Dataset:
             np.nan_to_num(np.stack([chaos.autocorrelation(phase) for phase in impacts], axis=1)),
         )
         coordinates |= {"contact": sections.contact.values}
-    told = {"verdict": verdict.kind, "reasons": "; ".join(verdict.reasons)}
+    attributes = {"verdict": verdict.kind, "reasons": "; ".join(verdict.reasons)}
     title = f"Verdict on the {str(sections.attrs.get('title', 'sections')).lower()}"
-    return conform(xr.Dataset(data, coords=coordinates), VERDICT, title=title, **told)
+    return conform(xr.Dataset(data, coords=coordinates), VERDICT, title=title, **attributes)
 
 
 def features(sections: xr.Dataset) -> tuple[np.ndarray, float]:

@@ -66,9 +66,9 @@ class LabelledArrays:
         """Bytes of all values."""
         return sum(array.values.nbytes for array in self.variables.values())
 
-    def assign_attrs(self, **told: Any) -> LabelledArrays:
+    def assign_attrs(self, **text: Any) -> LabelledArrays:
         """The same with more attributes."""
-        return replace(self, attrs={**self.attrs, **told})
+        return replace(self, attrs={**self.attrs, **text})
 
     def assign_coords(self, coordinates: Mapping[str, LabelledArray]) -> LabelledArrays:
         """The same with these coordinates last, in place of others of their names."""

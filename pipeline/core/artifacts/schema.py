@@ -353,8 +353,8 @@ def conformed(data: LabelledArrays, schema: Schema, *, title: str, **attributes:
         if array.values.dtype.kind == "f" and not name.startswith(_MAY_BE_OPEN) and not np.isfinite(array.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         units, mixed = _units(data, name, variable)
-        told = ({"units": units} if units else {}) | {"long_name": variable.long_name}
-        variables[name] = replace(array, attrs=told)
+        described = ({"units": units} if units else {}) | {"long_name": variable.long_name}
+        variables[name] = replace(array, attrs=described)
         if mixed is not None:
             units_of[f"{name}_units"] = mixed
     made = {"Conventions": CONVENTIONS, "title": title, "source": f"{DISTRIBUTION} {version()}"}

@@ -41,15 +41,15 @@ def receive(file: IO[bytes], most: float) -> Any:
     """
     head = _exactly(file, _length(file, min(LARGEST_HEAD, most)))
     try:
-        told = json.loads(bytes(head))
-        types = _arrays(told)
+        header = json.loads(bytes(head))
+        types = _arrays(header)
     except RecursionError:
         raise ValueError("a message is nested too deeply") from None
     sizes = [dtype.itemsize * prod(shape) for dtype, shape in types]
     if sum(sizes) > most:
         raise ValueError(f"{sum(sizes)} bytes are more than the {most:.0f} that are allowed")
     arrays = iter([_exactly(file, size).view(dtype).reshape(shape) for size, (dtype, shape) in zip(sizes, types)])  # noqa: B905
-    return _value(told, arrays)
+    return _value(header, arrays)
 
 
 def _length(file: IO[bytes], most: float) -> int:
@@ -90,11 +90,11 @@ def _told(value: Any, arrays: list[np.ndarray]) -> Any:
     raise TypeError(f"it holds {f'an array of {value.dtype}' if isinstance(value, np.ndarray) else type(value)}")
 
 
-def _arrays(told: Any) -> list[tuple[np.dtype, tuple[int, ...]]]:
+def _arrays(node: Any) -> list[tuple[np.dtype, tuple[int, ...]]]:
     """Types and shapes of the arrays that a head names, in its order."""
-    if not isinstance(told, dict):
+    if not isinstance(node, dict):
         return []
-    ((kind, content),) = told.items()
+    ((kind, content),) = node.items()
     if kind == "array":
         name, shape = content
         if not _TYPE.fullmatch(name) or any(type(n) is not int or n < 0 for n in shape):
@@ -104,10 +104,10 @@ def _arrays(told: Any) -> list[tuple[np.dtype, tuple[int, ...]]]:
     return [array for part in parts for array in _arrays(part)]
 
 
-def _value(told: Any, arrays: Any) -> Any:
-    if not isinstance(told, dict):
-        return told
-    ((kind, content),) = told.items()
+def _value(node: Any, arrays: Any) -> Any:
+    if not isinstance(node, dict):
+        return node
+    ((kind, content),) = node.items()
     if kind == "array":
         return next(arrays)
     if kind == "texts":

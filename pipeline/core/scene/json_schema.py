@@ -55,8 +55,8 @@ def _accuracy(flat: dict[str, Any]) -> dict[str, Any]:
     """A file writes quantities as they are, nested or quoted, not below a key of their own."""
     value = {"type": ["number", "string", "object"], "description": '"1 um", "0.1 %", or { relative = 1e-6 }'}
     settings = {name: flat["properties"][name] for name in ("source", "allow_missed")}
-    told = flat.get("description", "")
-    return {"type": "object", "description": told, "properties": settings, "additionalProperties": value}
+    description = flat.get("description", "")
+    return {"type": "object", "description": description, "properties": settings, "additionalProperties": value}
 
 
 def _partial(node: Any) -> Any:

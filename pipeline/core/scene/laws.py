@@ -301,8 +301,8 @@ def _count(law: Any) -> int:
 
 def _check_count(law: Any) -> None:
     if _count(law) > MOST_PIECES:
-        told = f"{min(_count(law), 10**300):.6g}"
-        raise ValueError(f"it is made of {told} pieces, at each of which integration stops: at most {MOST_PIECES}")
+        text = f"{min(_count(law), 10**300):.6g}"
+        raise ValueError(f"it is made of {text} pieces, at each of which integration stops: at most {MOST_PIECES}")
 
 
 def law_types(node: object) -> Iterator[str]:

@@ -68,8 +68,8 @@ def check_rows(rows: float, interval: float, limits: Limits) -> None:
 def check_members(members: int, limits: Limits, place: str = "[ensemble.members]") -> None:
     """ResourceError when an ensemble is to have more members than it may."""
     if members > limits.members:
-        told = f"{min(members, 10**300):.6g}"  # a whole number may be beyond any float
-        raise ResourceError(f"{place}: {told} are more than the {limits.members} that limits.members allows")
+        text = f"{min(members, 10**300):.6g}"  # a whole number may be beyond any float
+        raise ResourceError(f"{place}: {text} are more than the {limits.members} that limits.members allows")
 
 
 def check_parts(table: dict[str, Any], path: Path, families: tuple[str, ...]) -> None:
@@ -94,5 +94,5 @@ def check_cells(shape: Any, elements: Any, limits: Limits, recipe: Path) -> None
         given = cells if isinstance(cells, list) else list(cells.values()) if isinstance(cells, dict) else given
     count = prod(max(n, 1) for n in given if isinstance(n, int)) if given else 0
     if count > limits.cells:
-        told = f"{min(count, 10**300):.3g}"  # a whole number may be beyond any float
-        raise ResourceError(f"{recipe}: {told} cells are more than the {limits.cells} that limits.cells allows")
+        text = f"{min(count, 10**300):.3g}"  # a whole number may be beyond any float
+        raise ResourceError(f"{recipe}: {text} cells are more than the {limits.cells} that limits.cells allows")

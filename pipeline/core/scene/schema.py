@@ -322,11 +322,11 @@ class Scene(Part):
     def _prescribed(self) -> set[str]:
         """Rigid bodies whose motion drives tell: from the ground on by fixed joints and driven ones of one freedom."""
         driven = {getattr(drive, "joint", None) for drive in self.drive.values()}
-        told = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
+        prescribed = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
         known = {name for name, body in self.body.items() if isinstance(body, Ground)}
         known_bodies = set(known)
-        for _ in told:
-            for joint in told:
+        for _ in prescribed:
+            for joint in prescribed:
                 pair = {frame.partition(".")[0] for frame in joint.between}
                 if pair & known_bodies:
                     known_bodies |= {name for name in pair if not isinstance(self.body.get(name), FlexibleBody)}

@@ -158,9 +158,9 @@ class Sweep(Part):
                 raise ValueError(f"vary.{name}: a range needs its count where there is no [sample]")
         lengths = {name: self.length(name) for name in self.vary}
         if self.combine == "list" and len(set(lengths.values())) > 1:
-            told = ", ".join(f"{name} {n}" for name, n in lengths.items())
+            text = ", ".join(f"{name} {n}" for name, n in lengths.items())
             raise ValueError(
-                f"combine: parameters that go together must have as many values as each other; here {told}"
+                f"combine: parameters that go together must have as many values as each other; here {text}"
             )
         points = 1
         for n in lengths.values() if self.combine == "grid" else list(lengths.values())[:1]:

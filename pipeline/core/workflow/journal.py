@@ -158,9 +158,9 @@ class Journal:
     def _publish(self, name: str, arrays: Mapping[str, Any], notes: Mapping[str, Any]) -> str:
         import numpy as np
 
-        told = np.frombuffer(json.dumps(notes).encode(), np.uint8)
+        encoded = np.frombuffer(json.dumps(notes).encode(), np.uint8)
         buffer = io.BytesIO()
-        np.savez(buffer, allow_pickle=False, notes=told, **arrays)
+        np.savez(buffer, allow_pickle=False, notes=encoded, **arrays)
         content = buffer.getvalue()
         digest = sealed(content)
         publish(self._path(name), digest.encode() + b"\n" + content)

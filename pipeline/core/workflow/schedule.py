@@ -240,8 +240,8 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
             if stopping.requested():  # one that had just been started is not deaf to Ctrl-C yet
                 plan.waiting.append(task)
                 continue
-            told = f"{task.scene} {task.label}: a worker process was killed; is the memory full?"
-            raise ResourceError(told) from None
+            text = f"{task.scene} {task.label}: a worker process was killed; is the memory full?"
+            raise ResourceError(text) from None
         _note(plan, task, result)
         monitor.finish(name, failed=isinstance(result, Failure))
     plan.give_up_below_failures()
@@ -286,22 +286,22 @@ def attempt(
     try:
         return execute(task, inputs, store, sources, progress)
     except StoppedError as stopped:
-        code, told = stopped.exit_code, _left(task, stopped, store)
+        code, text = stopped.exit_code, _left(task, stopped, store)
     except FlexclearError as error:
-        code, told = error.exit_code, str(error)
+        code, text = error.exit_code, str(error)
     except MemoryError:
-        code, told = ResourceError.exit_code, "the memory is full"
+        code, text = ResourceError.exit_code, "the memory is full"
     except Exception:
-        code, told = 1, f"unexpected error, please report it\n{traceback.format_exc()}"
-    return Failure(task, code, f"{task.scene} {task.label}: {told}")
+        code, text = 1, f"unexpected error, please report it\n{traceback.format_exc()}"
+    return Failure(task, code, f"{task.scene} {task.label}: {text}")
 
 
 def _left(task: Task, stopped: StoppedError, store: Store) -> str:
     """What is told of a task that was stopped: what there is of it, and that it can go on."""
-    told = f"{stopped}; run it again, and it goes on from there"
+    text = f"{stopped}; run it again, and it goes on from there"
     time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
     if time is not None:  # else it is of a part of the work, such as a member of an ensemble, and no dataset
         path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
         if path is not None:
-            told += f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)"
-    return told
+            text += f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)"
+    return text

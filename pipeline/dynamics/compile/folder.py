@@ -56,8 +56,8 @@ def processor() -> str:
     """A name for what code is compiled for: processor, its features and what the compiler is told of them."""
     import llvmlite.binding as llvm
 
-    told = [os.environ.get(f"NUMBA_{name}", "") for name in ("CPU_NAME", "CPU_FEATURES", "OPT")]
-    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *told)
+    settings = [os.environ.get(f"NUMBA_{name}", "") for name in ("CPU_NAME", "CPU_FEATURES", "OPT")]
+    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *settings)
     return hashlib.sha256(repr(facts).encode()).hexdigest()[:12]
 
 

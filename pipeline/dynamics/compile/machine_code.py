@@ -42,12 +42,12 @@ def image(function: Any) -> bytes:
     foreign = [used.name for used in library._final_module.functions if used.is_declaration]
     foreign += [used.name for used in library._final_module.global_variables if used.is_declaration]
     binary = bytes(library._get_compiled_object())
-    told = {
+    facts = {
         "name": function.native_name,
         "foreign": sorted(name for name in foreign if not name.startswith("llvm.")),
         "sha256": hashlib.sha256(binary).hexdigest(),
     }
-    return json.dumps(told, sort_keys=True).encode() + b"\n" + binary
+    return json.dumps(facts, sort_keys=True).encode() + b"\n" + binary
 
 
 def load(kept: bytes) -> Code:
@@ -55,17 +55,17 @@ def load(kept: bytes) -> Code:
     import llvmlite.binding as llvm
 
     line, _, binary = kept.partition(b"\n")
-    told = json.loads(line)
-    if told["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM does not outlive what is no object file
+    facts = json.loads(line)
+    if facts["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM does not outlive what is no object file
         raise ValueError("names and code are not of one function")
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target().create_target_machine(jit=True))
-    for name in told["foreign"]:
+    for name in facts["foreign"]:
         _provide(llvm, name)
     engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
     engine.finalize_object()
-    address = engine.get_function_address(told["name"])
+    address = engine.get_function_address(facts["name"])
     if not address:
-        raise ValueError(f"no function {told['name']}")
+        raise ValueError(f"no function {facts['name']}")
     return Code(address, engine)
 
 

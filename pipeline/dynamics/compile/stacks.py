@@ -88,10 +88,10 @@ def shadowed(status: Path) -> bool:
     status: what the system tells of a process.
     """
     try:
-        told = status.read_text(encoding="utf-8", errors="replace")
+        status_text = status.read_text(encoding="utf-8", errors="replace")
     except OSError:
         return False
-    return any(line.startswith("x86_Thread_features:") and "shstk" in line.split() for line in told.splitlines())
+    return any(line.startswith("x86_Thread_features:") and "shstk" in line.split() for line in status_text.splitlines())
 
 
 @cache

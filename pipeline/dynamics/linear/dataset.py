@@ -77,8 +77,8 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
         moving_body=parts,
         frame=list(bench.model.mechanism.frames),
     )
-    told = still.attrs | {"title": f"Vibrations of {subject(bench.scene)}"}
-    return conform(made, LINEAR, **told, motions_without_stiffness=small.free)
+    facts = still.attrs | {"title": f"Vibrations of {subject(bench.scene)}"}
+    return conform(made, LINEAR, **facts, motions_without_stiffness=small.free)
 
 
 def _motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:

@@ -212,10 +212,10 @@ def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Seq
             shown = moved @ assembled.modes
             size = np.linalg.norm(shown, axis=0)
             if q.kind in PLACES:
-                told = np.linalg.norm(still @ shown.T, axis=1) + amplitude @ size
+                sizes = np.linalg.norm(still @ shown.T, axis=1) + amplitude @ size
             else:
-                told = np.linalg.norm(rate @ shown.T, axis=1) + amplitude @ (size * omega)
-            influence[q.name] = float(told.max())
+                sizes = np.linalg.norm(rate @ shown.T, axis=1) + amplitude @ (size * omega)
+            influence[q.name] = float(sizes.max())
         elif q.kind in FORCES and q.owner in assembled.lever.joints:
             size = np.linalg.norm(_reaction(assembled, q.owner), axis=0)
             influence[q.name] = float((amplitude @ (size * omega**2)).max())

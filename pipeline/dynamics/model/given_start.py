@@ -189,6 +189,6 @@ def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
             )
     if not corrections:
         return []
-    told = [text for _, text in sorted(corrections, reverse=True)]
-    more = [f"and {len(told) - MOST} more bodies"] if len(told) > MOST else []
-    return [f"the start was mended so that joints and drives fit: {'; '.join([*told[:MOST], *more])}"]
+    texts = [text for _, text in sorted(corrections, reverse=True)]
+    more = [f"and {len(texts) - MOST} more bodies"] if len(texts) > MOST else []
+    return [f"the start was mended so that joints and drives fit: {'; '.join([*texts[:MOST], *more])}"]

@@ -82,10 +82,10 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
     y = y.copy()
     y[model.speeds] = 0.0
     given, centres = _given(requested).ravel(), [centre_of(model, name) for name in requested]
-    told = ~np.isnan(given)
+    known = ~np.isnan(given)
 
     unit, L = model.speed_scales, model.length
-    lengths = np.tile(_units(model), len(requested))[told]
+    lengths = np.tile(_units(model), len(requested))[known]
     opening_lengths = np.where(model.arrays.table(m.CLOSURE_ROWS)["kind"] == 0, L, 1.0)
 
     def rates(state: np.ndarray) -> np.ndarray:
@@ -93,7 +93,7 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
         q, u = state[: model.nq], state[model.speeds]
         moving = np.array([centre.motion(frames, q, u) for centre in centres])
         coordinates = [rate.of(sites, u) / rate.size for rate in others]
-        return np.concatenate([moving.ravel()[told] / lengths, coordinates, opening / opening_lengths])
+        return np.concatenate([moving.ravel()[known] / lengths, coordinates, opening / opening_lengths])
 
     base = rates(y)
     columns = []
@@ -101,7 +101,7 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
         moved = y.copy()
         moved[model.nq + k] = unit[k]
         columns.append(rates(moved) - base)
-    asked = np.concatenate([given[told] / lengths, [rate.requested / rate.size for rate in others]])
+    asked = np.concatenate([given[known] / lengths, [rate.requested / rate.size for rate in others]])
     count = len(asked)
     asked = np.concatenate([asked, np.zeros(len(base) - count)])
     fastest = _slow(model) + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))

@@ -109,7 +109,7 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
         return None
     joints, start = constraints(model.mechanism), [link.start for link in model.links]
     random = np.random.default_rng(0)
-    left, stayed, told = [(here.rank, start)], [(here.rank, start)], 0
+    left, stayed, evidence = [(here.rank, start)], [(here.rank, start)], 0
     for k in range(TRIES):
         fraction = random.normal(size=here.free.shape[1])
         motion = here.free @ (fraction / np.linalg.norm(fraction))
@@ -120,10 +120,10 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
         there = [link.start for link in settled(model.mechanism, closed).links]
         away = _distance(start, there, model.length) > LEFT * NEARBY[k % 2]
         (left if away else stayed).append((rates(model, there).rank, there))
-        told += away
-        if told == ENOUGH:
+        evidence += away
+        if evidence == ENOUGH:
             break
-    rank, poses = max(left if told else stayed, key=lambda pose: pose[0])
+    rank, poses = max(left if evidence else stayed, key=lambda pose: pose[0])
     return poses if rank > here.rank else None
 
 

@@ -83,8 +83,8 @@ def chosen(
     if len(candidates) < 2 or not _isolated(mechanism, list(joints), first.poses):
         return ""
     hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
-    told = [_distance(mechanism, joints, one.coordinates, hints) for one in candidates]
-    if hints and told[1] - told[0] > SAME:
+    distances = [_distance(mechanism, joints, one.coordinates, hints) for one in candidates]
+    if hints and distances[1] - distances[0] > SAME:
         return ""
     units = {(j.name, k): c for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
     apart = {key: abs(first.coordinates[key] - candidates[1].coordinates[key]) for key in first.coordinates}

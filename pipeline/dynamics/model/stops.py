@@ -80,8 +80,8 @@ def _both(scene: Scene, name: str, stop: Stop, length: float) -> dict[str, End]:
         if not value > 0.0:
             raise InputError(f"[stop.{name}.{key}]", f"must be positive, not {value:.6g}")
     between, sides = scene.joint[joint].between, {"lower": -1.0, "upper": 1.0}
-    told = speeds.get("initial_approach_speed")
+    approach = speeds.get("initial_approach_speed")
     return {
-        end: End(name, between, coordinate, limit, sides[end], far, stop.normal, speeds["floor"], told)
+        end: End(name, between, coordinate, limit, sides[end], far, stop.normal, speeds["floor"], approach)
         for end, limit in limits.items()
     }

@@ -122,8 +122,8 @@ def _tell(search: Search, level: int, apart: dict[str, Influence]) -> None:
     beyond = [name for name, i in apart.items() if i.uncertainty > search.requested[name]]
     loose = next((d.effect.owner for d in search.decisions.values() if d.kept and d.effect.kind == CLEARANCE), "")
     for body, count in search.pilots.modes(level, search.pilots.bundles).items():
-        told = search.decisions.get(f"body.{body}.modes")
-        if told is None or not told.kept:
+        decision = search.decisions.get(f"body.{body}.modes")
+        if decision is None or not decision.kept:
             continue
         why = f"{count} of its modes do the same as all"
         if beyond:
@@ -131,4 +131,4 @@ def _tell(search: Search, level: int, apart: dict[str, Influence]) -> None:
                 f"{' and '.join(beyond)} parts by more than is wanted when {loose or 'a contact'} starts a hair "
                 f"elsewhere, and with {count} of its modes it differs by no more than that"
             )
-        search.decisions[told.effect.name] = replace(told, reason=f"{told.reason}; {why}")
+        search.decisions[decision.effect.name] = replace(decision, reason=f"{decision.reason}; {why}")

@@ -84,8 +84,8 @@ def recorded(run: Run) -> LabelledArrays:
     for part in parts:
         variables |= part[0]
         coordinates |= part[1]
-    title, told = f"Motion of {subject(run.scene)}", attributes(run.scene) | _report(run)
-    return conformed(labelled(variables, coordinates), RUN, title=title, **told)
+    title, facts = f"Motion of {subject(run.scene)}", attributes(run.scene) | _report(run)
+    return conformed(labelled(variables, coordinates), RUN, title=title, **facts)
 
 
 def subject(scene: Scene) -> str:
@@ -184,7 +184,7 @@ def _friction_warnings(run: Run) -> list[str]:
 def _report(run: Run) -> dict[str, float | int | str]:
     """How the run was made, for the attributes; and in words what is to be doubted."""
     counters, redundant = run.trajectory.counters, run.engine.mobility.redundant
-    told: dict[str, float | int | str] = {
+    facts: dict[str, float | int | str] = {
         **counters,
         "stiff_share": counters.get("stiff_steps", 0) / max(1, counters.get("steps", 0)),
         "largest_rate": run.trajectory.steepest,
@@ -193,20 +193,20 @@ def _report(run: Run) -> dict[str, float | int | str]:
         "closure_residual_of_given_start": run.model.mechanism.start_residual,
     }
     if run.perturbed is not None:
-        told["separation_perturbation"] = PERTURBATION
-    told |= {"redundant_closure_rows": redundant, "method": run.model.scene.solver.integrator}
+        facts["separation_perturbation"] = PERTURBATION
+    facts |= {"redundant_closure_rows": redundant, "method": run.model.scene.solver.integrator}
     if run.mended:
-        told["start_mended"] = "\n".join(run.mended)
+        facts["start_mended"] = "\n".join(run.mended)
     if run.switched:
-        told["switched"] = run.switched
+        facts["switched"] = run.switched
     if redundant:
-        told["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
-    told["warnings"] = "\n".join(warnings(run))
+        facts["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
+    facts["warnings"] = "\n".join(warnings(run))
     if run.model.contacts:
         from flexclear.pipeline.dynamics.contact import validity
 
-        told["contacts"] = validity.laws(run.model.contacts, run.model.laws)
-    return told
+        facts["contacts"] = validity.laws(run.model.contacts, run.model.laws)
+    return facts
 
 
 def _motion(motions: Motions) -> Part:

@@ -77,9 +77,9 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
             runs = side_by_side(member, requested.members, done, crews.lanes)
     members, reasons = [one for one, _ in runs], [switched for _, switched in runs if switched]
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(requested.members))
-    told = {"switched": f"{len(reasons)} of {requested.members} members, the first {reasons[0]}"} if reasons else {}
-    told |= attributes(scene) | {"title": f"{requested.members} motions of {subject(scene)}"}
-    return conform(made, ENSEMBLE, **told, seed=requested.seed, perturbation=requested.perturbation)
+    facts = {"switched": f"{len(reasons)} of {requested.members} members, the first {reasons[0]}"} if reasons else {}
+    facts |= attributes(scene) | {"title": f"{requested.members} motions of {subject(scene)}"}
+    return conform(made, ENSEMBLE, **facts, seed=requested.seed, perturbation=requested.perturbation)
 
 
 def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np.ndarray]:

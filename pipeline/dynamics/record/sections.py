@@ -73,7 +73,7 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         if kept is not None:
             kept.keep({**memory(engine), **done.after.packed()}, tape)
     growth = np.array(tape.growth[: len(followed)])
-    told = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": tape.lost}
+    facts = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": tape.lost}
     variables = tape.variables(engine.model) | {"growth": (("followed",), growth)}
     coordinates = {"section": np.arange(requested.periods), "body": names, "followed": np.arange(len(followed))}
     coordinates["waypoint"] = np.array([part.start - engine.start for part in parts])
@@ -82,7 +82,7 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     made = xr.Dataset(variables, coords=coordinates)
     title = f"Sections of the periodic motion of {subject(scene)}"
     return conform(
-        made, SECTIONS, title=title, **attributes(scene), **told, neighbour_distance=SEPARATION * engine.rtol
+        made, SECTIONS, title=title, **attributes(scene), **facts, neighbour_distance=SEPARATION * engine.rtol
     )
 
 

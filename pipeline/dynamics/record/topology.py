@@ -31,18 +31,18 @@ def topology(run: Run) -> tuple[Variables, dict[str, object]]:
     redundant = np.array([name in engine.mobility.redundant_joints for name in run.scene.joint], dtype=np.int8)
     variables: Variables = {"reaction_redundant": (("joint",), redundant)}
     rows, nv = len(trajectory.rows), engine.model.nv
-    told = _singular_values(engine, trajectory, seen, singular.scaled)
-    rank = np.full(rows, told.shape[1], dtype=np.int32)
-    if told.shape[1]:
-        least = np.maximum(told[:, -1], told[:, 0] / INFINITE)
-        condition = variables["condition"] = (("time",), np.minimum(told[:, 0] / least, INFINITE))
+    indicators = _singular_values(engine, trajectory, seen, singular.scaled)
+    rank = np.full(rows, indicators.shape[1], dtype=np.int32)
+    if indicators.shape[1]:
+        least = np.maximum(indicators[:, -1], indicators[:, 0] / INFINITE)
+        condition = variables["condition"] = (("time",), np.minimum(indicators[:, 0] / least, INFINITE))
         near = condition[1] > WELL
         if near.any():
             values = _singular_values(engine, trajectory, seen, singular.natural)[near]
             rank[near] = np.sum(values > ZERO * values[:, :1], axis=1)
     variables["rank"] = (("time",), rank)
     variables["mobility"] = (("time",), (nv - rank).astype(np.int32))
-    if not told.shape[1]:
+    if not indicators.shape[1]:
         return variables, {}
     passes = trajectory.passes
     variables |= {

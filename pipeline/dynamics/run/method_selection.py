@@ -106,8 +106,8 @@ class Suit:
         power = (0.5 if self.touching or name == DEFAULT else 1.0) / (ORDERS[name] + 1.0)
         if len(seen) > 1 and name != DEFAULT:  # of the default method two runs may only tell where it is stable
             other = min((one for one in seen if one != at), key=lambda known: abs(np.log(known / at)))
-            told = float(np.log(seen[other] / seen[at]) / np.log(at / other))
-            power = float(np.clip(told, LEAST_POWER, LARGEST_POWER))
+            slope = float(np.log(seen[other] / seen[at]) / np.log(at / other))
+            power = float(np.clip(slope, LEAST_POWER, LARGEST_POWER))
         expected: float = seen[at] * (at / rtol) ** power
         # where stability limited the run, a looser tolerance saves nothing
         return max(expected, min(self.least, seen[at])) if name == DEFAULT else expected

@@ -183,8 +183,8 @@ def piece(engine: Engine, y: np.ndarray, outputs: np.ndarray, left: Handover | N
 
 def digest(engine: Engine, *arrays: np.ndarray) -> str:
     """Of all that decides what an engine makes of some arrays, the processor included."""
-    told = f"{processor()} {INTERPRETED} {engine.start!r} {engine.end!r} {_told(engine.model.scene)}"
-    hashed = hashlib.sha256(told.encode())
+    described = f"{processor()} {INTERPRETED} {engine.start!r} {engine.end!r} {_told(engine.model.scene)}"
+    hashed = hashlib.sha256(described.encode())
     h = engine.h.copy()
     h[list(m.ADDRESSES)] = 0
     for array in (h, engine.model.arrays.f, engine.w, engine.n, engine.kept, *arrays):

@@ -30,9 +30,9 @@ def beyond_reach(engine: Engine) -> str:
     model, kept = engine.model, (engine.w.copy(), engine.n.copy())
     if not model.drives or not model.closures or not model.mechanism.all_rigid:
         return ""
-    told = _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
+    text = _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
     engine.w[:], engine.n[:] = kept
-    return told
+    return text
 
 
 def require_shallow(engine: Engine) -> None:
@@ -56,9 +56,9 @@ def require_shallow(engine: Engine) -> None:
     )
     engine.w[:], engine.n[:] = kept
     for k, (contact, depth) in enumerate(zip(model.contacts, -gaps, strict=True)):
-        if told := pressed_through(contact.words, contact.joint, float(depth)):
+        if text := pressed_through(contact.words, contact.joint, float(depth)):
             remedy = "choose a stiffer contact, a slower impact or smaller loads"
-            raise SolverError(f"at t = {t:.6g} s: {told}: {f'{away}; else {remedy}' if pulled else remedy}")
+            raise SolverError(f"at t = {t:.6g} s: {text}: {f'{away}; else {remedy}' if pulled else remedy}")
         if not (pulled and model.mechanism.all_rigid and depth > SHALLOW * contact.joint.radius > 0.0):
             continue
         time, least = forced_depth(engine, k)

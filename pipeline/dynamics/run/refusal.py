@@ -25,9 +25,9 @@ def text(engine: Engine, rows: np.ndarray) -> str:
     if n[m.STATUS] in LOOPS and jammed(engine):
         return f"at t = {control[m.TIME]:.6g} s: {explanation(engine)}"
     if n[m.STATUS] in LOOPS:
-        told = beyond_reach(engine) or end_in_pose(engine, rows)
-        if told:
-            return told
+        message = beyond_reach(engine) or end_in_pose(engine, rows)
+        if message:
+            return message
     where = singular.diagnosis(engine)
     culprit = contacts[n[m.CULPRIT]].words if contacts else ""
     fixed = f"{control[m.FIXED]:.2g} s"
@@ -75,16 +75,16 @@ def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
     name, done = engine.model.scene.solver.integrator, control[m.TIME] - engine.start
     other = engine.method.traits.hands_over_to
     steps, rejected, events = (int(n[k]) for k in (m.STEPS, m.REJECTED, m.N_EVENTS))
-    told = [f"{steps} steps and {rejected} rejected ones, {events} events, at last by {name}"]
+    parts = [f"{steps} steps and {rejected} rejected ones, {events} events, at last by {name}"]
     if n[m.STIFF_STEPS] > STIFF_SHARE * max(1, steps):
         choice = f"choose an implicit integrator ({other}), or " if other else ""
-        return f"{told[0]}; {stiffness(n, control)}; {choice}a larger v_static"
+        return f"{parts[0]}; {stiffness(n, control)}; {choice}a larger v_static"
     if control[m.STEEPEST] > 0.0:
-        told.append(f"rates up to {control[m.STEEPEST]:.2g} 1/s")
+        parts.append(f"rates up to {control[m.STEEPEST]:.2g} 1/s")
     if done > 0.0:
         whole = n[m.EVALUATIONS] * control[m.SPAN] / done
-        told.append(f"at this pace the whole run takes {whole:.1g} evaluations")
-    return "; ".join([*told, _remedy(steps, rejected, events, other)])
+        parts.append(f"at this pace the whole run takes {whole:.1g} evaluations")
+    return "; ".join([*parts, _remedy(steps, rejected, events, other)])
 
 
 def _remedy(steps: int, rejected: int, events: int, other: str) -> str:

@@ -171,10 +171,10 @@ def integrate(
     pair = Pair(engine)
 
     def neighbour(alive: Progress) -> PerturbedRun:
-        return pair.perturbed_run(start, lambda mine, y, *told: steps(mine, y, alive, others, *told), alive)
+        return pair.perturbed_run(start, lambda mine, y, *text: steps(mine, y, alive, others, *text), alive)
 
     with meanwhile(neighbour) as perturbed:
-        done = checked(lambda: pair.run(lambda *told: steps(engine, start, progress, ours, *told)))
+        done = checked(lambda: pair.run(lambda *text: steps(engine, start, progress, ours, *text)))
         try:
             return replace(done, perturbed=perturbed())
         except StoppedError as stopped:

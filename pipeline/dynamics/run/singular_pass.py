@@ -67,9 +67,9 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
     engine.n[m.EVALUATIONS] += sampler.evaluations
     control[m.REACH] = control[m.MOST_REACH] = reach
     if made is None:
-        told = beyond_reach(engine) if control[m.LEFT] < OBVIOUS else ""
-        if told:
-            raise SolverError(told)
+        text = beyond_reach(engine) if control[m.LEFT] < OBVIOUS else ""
+        if text:
+            raise SolverError(text)
         return None, ()
     engine.view(m.Y)[:] = made.states(np.array([t]))[0]
     engine.view(m.COLLOCATION)[:] = made.series.ravel()

@@ -118,10 +118,10 @@ def _refuse_open(engine: Engine, changes: list[dict[str, float]], choices: tuple
     spread = {name: float(np.ptp([change[name] for change in changes])) for name in changes[0]}
     size = {name: max(abs(change[name]) for change in changes) for name in changes[0]}
     best = max(spread, key=lambda name: spread[name] / size[name] if size[name] > 0.0 else 0.0)
-    told = ", ".join(f"{change[best] / size[best]:+.2g}" for change in changes)
+    text = ", ".join(f"{change[best] / size[best]:+.2g}" for change in changes)
     joint, _, coordinate = best.partition(".")
     written = f'joint = "{joint}", ' + (f'coordinate = "{coordinate}", ' if coordinate else "") + "sign = 1"
-    ways = f"{len(changes)} ways, on which joint {best} begins to move like {told}"
+    ways = f"{len(changes)} ways, on which joint {best} begins to move like {text}"
     if choices:
         raise InputError(
             "[start.branch]", f"leaves {ways}", f"choose by {{ {written} }} or sign = -1, as one more of a list"

@@ -33,8 +33,8 @@ def beside(study: xr.Dataset, split: Mapping[str, Mapping[str, float]]) -> xr.Da
     """A study's dataset with ``error_by_cause(quantity, cause)``, NaN where a scene has no such cause."""
     names = [str(name) for name in study["quantity"].values]
     values = np.array([[split[name].get(cause, np.nan) for cause in CAUSES] for name in names])
-    told = {"units": "1", "long_name": "error of the scene as it stands, as a share of the quantity's size"}
-    return study.assign_coords(cause=list(CAUSES)).assign(error_by_cause=(("quantity", "cause"), values, told))
+    attributes = {"units": "1", "long_name": "error of the scene as it stands, as a share of the quantity's size"}
+    return study.assign_coords(cause=list(CAUSES)).assign(error_by_cause=(("quantity", "cause"), values, attributes))
 
 
 def table(split: Mapping[str, Mapping[str, float]], title: str) -> Table:

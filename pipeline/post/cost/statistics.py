@@ -64,8 +64,8 @@ def make(name: str, ensembles: dict[str, xr.Dataset], title: str) -> dict[str, b
             _panel(ax, contact, statistic, ensembles)
         handles, labels = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8.4)
-        told = "statistical error of ensemble means (half of the 95 % bootstrap interval), by the number of members; "
-        heading(figure, title, told + "not pointwise")
+        text = "statistical error of ensemble means (half of the 95 % bootstrap interval), by the number of members; "
+        heading(figure, title, text + "not pointwise")
         return files(name, figure)
 
 

@@ -72,11 +72,11 @@ def curves(study: xr.Dataset) -> list[Curve]:
         if f"error_by_{group}" not in study:
             continue
         method = GROUPS[group][0]
-        told = resolved(study, group)
+        shown = resolved(study, group)
         for m in study[method].values:
             seconds = study[f"cpu_seconds_by_{group}"].sel({method: m}).values
             error = study[f"error_by_{group}"].sel({method: m}).values
-            lines.append(Curve(str(m), seconds, error, told.sel({method: m}).values))
+            lines.append(Curve(str(m), seconds, error, shown.sel({method: m}).values))
     return lines
 
 
@@ -132,9 +132,9 @@ def _panel(
     ax.set(xscale="log", yscale="log", title=name)
     plain(ax.xaxis)
     if np.isinf(bound):
-        told = "cannot be told: reference and\nconfirmation have other impacts"
+        text = "cannot be told: reference and\nconfirmation have other impacts"
         ax.set(yscale="linear", yticks=[])  # there is nothing to scale
-        ax.text(0.5, 0.5, told, transform=ax.transAxes, ha="center", va="center", fontsize=7.5, color=INK)
+        ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", fontsize=7.5, color=INK)
     elif bound > 0.0:
         ax.axhspan(0.3 * bound, bound, color=GRID, zorder=0)
         ax.set_ylim(bottom=0.3 * bound)
@@ -171,5 +171,5 @@ def _legend(figure: object, own: list[Curve], others: Sequence[Curve], marks: tu
 def _subtitle(study: xr.Dataset) -> str:
     horizon = study.attrs["horizon"]
     span = "over the whole run" if horizon == "none" else f"up to the horizon, t = {horizon:.4g} s"
-    told = f"shaded: less than {MARGIN:g} times what the reference and its confirmation differ by"
-    return f"errors {span}, relative to each quantity's size; {told}"
+    text = f"shaded: less than {MARGIN:g} times what the reference and its confirmation differ by"
+    return f"errors {span}, relative to each quantity's size; {text}"

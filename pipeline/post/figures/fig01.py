@@ -47,9 +47,9 @@ def plate(run: xr.Dataset) -> np.ndarray:
 
     Table 1's moments are those of a square plate 200 x 200 x 1 mm about its centre: m a^2/6 about the normal.
     """
-    told = parameters(run)["body"]["platform"]
-    inertia = np.array(told["inertia"])
-    half = 0.5 * np.sqrt(6.0 * inertia.max() / told["mass"])
+    platform = parameters(run)["body"]["platform"]
+    inertia = np.array(platform["inertia"])
+    half = 0.5 * np.sqrt(6.0 * inertia.max() / platform["mass"])
     around = half * np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0], [1, 1, 0]])
     return around + run.position.sel(body="platform").values[0]
 

@@ -32,7 +32,7 @@ BLUE, GREEN, ORANGE = "#0072B2", "#009E73", "#E69F00"
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig10.png and fig10.svg, with the counts of the paper's full model."""
-    told = data[f"{FAR_CSJ_CB.scene}:run"].attrs
+    attributes = data[f"{FAR_CSJ_CB.scene}:run"].attrs
     with style.style():
         figure, axes = style.grid(1, 3, (12.0, 6.2))
         for panel, boxes, color, title in zip(
@@ -49,8 +49,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
             figure,
             "Figure 10: contacts end steps where they begin and end; "
             "the paper looks at them at the ends of steps of 10 µs",
-            f"beside the boxes: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {told['steps']} steps, "
-            f"{told['evaluations']} evaluations, {told['projections']} projections",
+            f"beside the boxes: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {attributes['steps']} steps, "
+            f"{attributes['evaluations']} evaluations, {attributes['projections']} projections",
         )
         return style.files("fig10", figure)
 
@@ -65,8 +65,8 @@ def _column(axes: Axes, boxes: tuple[tuple[str, str], ...], color: str) -> None:
             bbox={"boxstyle": "round,pad=0.55", "fc": "white", "ec": color, "lw": 1.5},
         )  # fmt: skip
         if step:
-            told = f"step {step}" if step.isdigit() else f"steps {step}"
-            axes.text(0.0, y, told, ha="left", va="center", fontsize=7.2, color=color, fontweight="bold")
+            message = f"step {step}" if step.isdigit() else f"steps {step}"
+            axes.text(0.0, y, message, ha="left", va="center", fontsize=7.2, color=color, fontweight="bold")
         if k + 1 < len(boxes):
             axes.annotate(
                 "", (0.47, y - height + 0.062), (0.47, y - 0.062),

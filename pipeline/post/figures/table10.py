@@ -94,20 +94,20 @@ def ratios(timing: xr.Dataset, way: str) -> dict[str, float]:
 
 
 def _notes(timing: xr.Dataset) -> tuple[str, ...]:
-    told = timing.attrs
+    facts = timing.attrs
     notes = [
         "Times are processor time of the integration alone; recording (evaluating the rows of the output, and the "
         "dataset) costs the same whatever the way, stands in a column of its own and is in no ratio. Medians of warm "
         "repeats in one process, beside other work of the machine, ± half their range; a ratio's "
         "± is half of what the ranges of both times leave it.",
         f"Equal error: each model runs at the tolerance that gives the platform's velocity a relative error of "
-        f"{told['equal_error']:g} at most over the first {100 * told['share']:.0f} % of the stroke, where all models "
+        f"{facts['equal_error']:g} at most over the first {100 * facts['share']:.0f} % of the stroke, where all models "
         "can be predicted point by point (the smooth ideal stroke has far less at any tolerance); one whose energy "
         "ledger does not close at it, at the next decade at which it does. "
-        f"Paper's step: a predictor-corrector at Table 6's step of {told['step']:g} s, contacts noticed at the ends of "
-        f"steps, whatever the error. Paper's tolerance: {told['damped']}, a damped implicit method of variable "
+        f"Paper's step: a predictor-corrector at Table 6's step of {facts['step']:g} s, contacts noticed at "
+        f"the ends of steps, whatever the error. Paper's tolerance: {facts['damped']}, a damped implicit method of variable "
         "step, at "
-        f"Table 6's integration tolerance of {1e3 * told['tolerance']:g} mm as a share of the drives' stroke "
+        f"Table 6's integration tolerance of {1e3 * facts['tolerance']:g} mm as a share of the drives' stroke "
         f"(rtol {float(timing.tolerance_rtol.median()):.1e}), whatever becomes of the energy (up to "
         f"{float(timing.tolerance_energy_error.max()):.1g} J).",
         *(_verdict(timing, way) for way in WAYS),
@@ -117,8 +117,8 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
         "steps, the fastest mode of a flexible rod limits the step of an explicit method even where nothing happens, "
         "and every impact is located and resolved.",
     ]
-    if told["refused"]:
-        notes += [f"What could not be integrated: {told['refused']}.", _unstable(float(told["step"]))]
+    if facts["refused"]:
+        notes += [f"What could not be integrated: {facts['refused']}.", _unstable(float(facts["step"]))]
     return tuple(notes)
 
 
@@ -162,11 +162,11 @@ def _verdict(timing: xr.Dataset, way: str) -> str:
 def _which(timing: xr.Dataset) -> str:
     """Which of the paper's ratios come out of counting the steps of a damped method at its tolerance."""
     steps = {s: _steps(timing, s) for s in TABLE10 if s in timing.scene.values and s != REFERENCE}
-    told = ", ".join(f"{scene} {_number(ratio)} (paper {TABLE10[scene]:g})" for scene, ratio in steps.items())
+    text = ", ".join(f"{scene} {_number(ratio)} (paper {TABLE10[scene]:g})" for scene, ratio in steps.items())
     near = [s for s, ratio in steps.items() if 1.0 / NEAR < ratio / TABLE10[s] < NEAR]
     other = ", ".join(f"{scene} {_number(_steps(timing, scene, 'size'))}" for scene in steps)
     return (
-        f"Steps at the paper's tolerance over the ideal model's: {told}. Within a factor of {NEAR:g} of the paper's "
+        f"Steps at the paper's tolerance over the ideal model's: {text}. Within a factor of {NEAR:g} of the paper's "
         f"ratio: {', '.join(near) or 'none'}. Read as a share of the mechanism's size (rtol "
         f"{float(timing.size_rtol.median()):.1e}) the same tolerance gives {other}: where the method begins to follow "
         "the rod's vibrations, these ratios are a matter of the reading."

@@ -117,12 +117,12 @@ def _same_motion(data: Data) -> Outcome:
 def _same_acceleration(data: Data) -> Outcome:
     largest = measured.acceleration(data, IDEAL)
     fractions = {model: apart(data, model, measured.vertical).max() / largest for model in FAR}
-    told = ", ".join(
+    text = ", ".join(
         f"{100 * fraction:.2g} % ({mode_set(model)})" for model, fraction in fractions.items() if fraction > ROUNDING
     )
     return _verdict(
         *(fraction < SMALL for fraction in fractions.values())
-    ), f"it changes by {told or 'nothing'} of the largest"
+    ), f"it changes by {text or 'nothing'} of the largest"
 
 
 def _same_path(*models: Model) -> Callable[[Data], Outcome]:
@@ -153,17 +153,17 @@ def _length(far: float) -> str:
 def _slight_vibration(data: Data) -> Outcome:
     ideal = measured.reaction(data, IDEAL)
     reactions = {m: measured.reaction(data, m) for m in FAR}
-    told = ", ".join(f"{mode_set(m)} {force:.0f} N" for m, force in reactions.items())
-    return _verdict(*(force / ideal - 1.0 < SLIGHT for force in reactions.values())), f"ideal {ideal:.0f} N; {told}"
+    text = ", ".join(f"{mode_set(m)} {force:.0f} N" for m, force in reactions.items())
+    return _verdict(*(force / ideal - 1.0 < SLIGHT for force in reactions.values())), f"ideal {ideal:.0f} N; {text}"
 
 
 def _consistent(data: Data) -> Outcome:
     free, fixed, full = (measured.effects(data, model) for model in (FAR_FREE, FAR_FIXED, FAR_CB))
     fractions = {name: abs(free[name] - fixed[name]) / size for name, size in full.items() if size > 0.0}
     missed = max(free["velocity"], fixed["velocity"]) < SLIGHT * full["velocity"]
-    told = ", ".join(f"{100 * fraction:.2g} % ({name})" for name, fraction in fractions.items())
+    text = ", ".join(f"{100 * fraction:.2g} % ({name})" for name, fraction in fractions.items())
     return _verdict(*(fraction < SLIGHT for fraction in fractions.values())), (
-        f"they differ by {told} of the effect that a basis with all static compliance finds"
+        f"they differ by {text} of the effect that a basis with all static compliance finds"
         f"{'; of that on the velocity both miss nearly all' if missed else ''}"
     )
 
@@ -211,12 +211,12 @@ def _lowered(data: Data) -> Outcome:
     models = (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)
     force = [measured.reaction(data, m) for m in models]
     acceleration = [measured.acceleration(data, m) for m in models]
-    told = "; ".join(
+    text = "; ".join(
         f"{mode_set(m)} {f:.0f} N, {a:.0f} m/s²" for m, f, a in zip(models, force, acceleration, strict=True)
     )
     rigid = measured.reaction(data, CSJ), measured.acceleration(data, CSJ)
     tests = [f < rigid[0] and a < rigid[1] for f, a in zip(force, acceleration, strict=True)]
-    return _verdict(*tests), f"CSJ {rigid[0]:.0f} N, {rigid[1]:.0f} m/s²; {told}"
+    return _verdict(*tests), f"CSJ {rigid[0]:.0f} N, {rigid[1]:.0f} m/s²; {text}"
 
 
 def _motion_kept(data: Data) -> Outcome:
@@ -239,12 +239,12 @@ def _paths_differ(data: Data) -> Outcome:
     free, fixed = (data[f"{model.scene}:ensemble"].sel(contact=JOINT) for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED))
     names = {"impact_count": ("impacts", 1.0), "contact_time_share": ("% of the time in contact", 100.0)}
     tests = [measured.differ(free[name].values, fixed[name].values) for name in names]
-    told = [
+    texts = [
         f"{factor * free[n].mean():.0f} ± {factor * free[n].std(ddof=1):.0f} and "
         f"{factor * fixed[n].mean():.0f} ± {factor * fixed[n].std(ddof=1):.0f} {words}"
         for n, (words, factor) in names.items()
     ]
-    return _verdict(*tests), f"free-free and fixed-fixed: {'; '.join(told)}"
+    return _verdict(*tests), f"free-free and fixed-fixed: {'; '.join(texts)}"
 
 
 def _dashpot(data: Data) -> Outcome:
@@ -256,10 +256,10 @@ def _dashpot(data: Data) -> Outcome:
         members = data[f"{model.scene}:ensemble"].acceleration.sel(body=PLATFORM, axis="z").values
         rows[model] = float(np.sqrt(np.mean((members - ideal) ** 2, axis=1)).mean())
     count = {m: float(data[f"{m.scene}:ensemble"].impact_count.sel(contact=JOINT).mean()) for m in FAR_CSJ}
-    told = "; ".join(f"{mode_set(m)} {rows[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in FAR_CSJ)
+    text = "; ".join(f"{mode_set(m)} {rows[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in FAR_CSJ)
     return _verdict(*(size < rigid for size in rows.values())), (
         f"vibration CSJ {rigid:.0f} m/s² and {int(data[f'{CSJ.scene}:post'].impact_count.sel(contact=JOINT))} impacts; "
-        f"{told}; without structural damping the rod takes no energy out of the mechanism"
+        f"{text}; without structural damping the rod takes no energy out of the mechanism"
     )
 
 
@@ -294,13 +294,13 @@ def _clearance_dominates(data: Data) -> Outcome:
 
 
 def _enlarged(data: Data) -> Outcome:
-    rigid, tests, told = measured.moved(data, CSJ), [], []
+    rigid, tests, texts = measured.moved(data, CSJ), [], []
     for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB):
         moved = measured.moved(data, model)
         rise = [getattr(moved, n) / getattr(rigid, n) - 1.0 for n in ("angle", "displacement", "velocity")]
         tests.append(min(rise) > 0.0)
-        told.append(f"{mode_set(model)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise))
-    return _verdict(*tests), f"angle, displacement, velocity: {'; '.join(told)}"
+        texts.append(f"{mode_set(model)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise))
+    return _verdict(*tests), f"angle, displacement, velocity: {'; '.join(texts)}"
 
 
 def _costs(*models: Model) -> Callable[[Data], Outcome]:
@@ -329,9 +329,9 @@ def _becomes_chaotic(data: Data) -> Outcome:
     with SECTIONS.open(newline="", encoding="utf-8") as file:
         rows = {row["scene"]: row for row in csv.DictReader(file)}
     requested = {CSJ: "quasi-periodic", FAR_CSJ_FREE: "chaotic", FAR_CSJ_FIXED: "chaotic", FAR_CSJ_CB: "chaotic"}
-    told = [f"{mode_set(model) or model.label} {_motion(rows[model.scene])}" for model in requested]
+    texts = [f"{mode_set(model) or model.label} {_motion(rows[model.scene])}" for model in requested]
     return _verdict(*(rows[model.scene]["verdict"] == motion for model, motion in requested.items())), (
-        f"over {rows[CSJ.scene]['periods']} repeated strokes: {'; '.join(told)} (chaos.md)"
+        f"over {rows[CSJ.scene]['periods']} repeated strokes: {'; '.join(texts)} (chaos.md)"
     )
 
 

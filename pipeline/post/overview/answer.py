@@ -62,17 +62,17 @@ def _effects(compared: xr.Dataset) -> list[str]:
         known = np.isfinite(fraction) and fraction < 100.0
         part = f", which is {rounded(100.0 * fraction, 2)} % of its largest value in the ideal run" if known else ""
         if np.isfinite(error) and difference + error < NOTHING * size:
-            told = f"does not change: the runs agree to <b class='n'>{measured(difference + error, np.nan, unit)}</b>"
+            text = f"does not change: the runs agree to <b class='n'>{measured(difference + error, np.nan, unit)}</b>"
         elif np.isfinite(error) and difference < DISTINGUISHED * error:
-            told = (
+            text = (
                 f"the runs are not exact enough to tell an effect: their difference ({value}) is less "
                 f"than {DISTINGUISHED:g} times their errors together"
             )
         elif np.isfinite(fraction) and fraction < SLIGHT:
-            told = f"changes slightly, by up to <b class='n'>{value}</b>{part}"
+            text = f"changes slightly, by up to <b class='n'>{value}</b>{part}"
         else:
-            told = f"changes by up to <b class='n'>{value}</b>{part}"
-        sentences.append(f"<b>{html.escape(name)}</b>: {told}.")
+            text = f"changes by up to <b class='n'>{value}</b>{part}"
+        sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
     return sentences
 
 

@@ -141,8 +141,8 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         _over_time(row[2], run, run["contact_normal_force"].values[:, k])
         row[2].set_title(f"{names[k]}: {pushes} ({unit})", pad=16)
         # a line of its own: beside the title it would be cut off
-        told = f"{count}, peak {measured(peak, np.nan, unit)}, {fraction:.0%} of the time in contact"
-        row[2].text(0.0, 1.015, told, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
+        text = f"{count}, peak {measured(peak, np.nan, unit)}, {fraction:.0%} of the time in contact"
+        row[2].text(0.0, 1.015, text, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
     style.heading(figure, f"Joints with clearance{_rest(len(names), CONTACTS)}")
     return style.files("contacts", figure)
 

@@ -28,8 +28,8 @@ def colors(runs: Mapping[str, xr.Dataset]) -> list[str]:
     """A colour for each run: that of its model, where it is the first with that; else one that none has."""
     chosen: list[str] = []
     for run in runs.values():
-        told = parameters(run)
-        flexible = [body["modes"]["reference"] for body in told.get("body", {}).values() if body["type"] == "flexible"]
+        parts = parameters(run)
+        flexible = [body["modes"]["reference"] for body in parts.get("body", {}).values() if body["type"] == "flexible"]
         own = MODES.get(flexible[0], COLORS[4]) if flexible else CLEARANCE if "contact" in run.sizes else IDEAL
         free = [color for color in COLORS if color not in chosen] or list(COLORS)
         chosen.append(own if own not in chosen else free[0])

@@ -70,11 +70,11 @@ def media(name: str, content: bytes, caption: str, alt: str = "") -> str:
     """A picture or film, inside of the page; alt: what it shows, where the caption does not say it all."""
     kind = TYPES[name.rpartition(".")[2]]
     data = f"data:{kind};base64,{base64.b64encode(content).decode()}"
-    told = html.escape(alt or caption, quote=True)
+    alt_text = html.escape(alt or caption, quote=True)
     shown = (
-        f"<video src='{data}' controls loop muted playsinline aria-label='{told}'></video>"
+        f"<video src='{data}' controls loop muted playsinline aria-label='{alt_text}'></video>"
         if kind.startswith("video")
-        else f"<img src='{data}' alt='{told}'>"
+        else f"<img src='{data}' alt='{alt_text}'>"
     )
     look = "" if kind.startswith("video") else " class='plot'"
     return f"<figure{look}><figcaption>{html.escape(caption)}</figcaption>{shown}</figure>\n"

@@ -112,8 +112,8 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, fraction
     panel.set_aspect("equal")
     panel.set_axis_off()
     frequency = float(bundle["frequency"].values[mode])
-    told = f"{frequency:.5g} Hz" if frequency > 0.0 else "static"
-    panel.set_title(f"mode {mode + 1}: {told}, × {factor:.2g} √kg m", fontsize=8.8)
+    text = f"{frequency:.5g} Hz" if frequency > 0.0 else "static"
+    panel.set_title(f"mode {mode + 1}: {text}, × {factor:.2g} √kg m", fontsize=8.8)
 
 
 def scale_to_size(bundle: xr.Dataset, q: np.ndarray, factor: float, rest: np.ndarray) -> float:

@@ -144,8 +144,8 @@ def _scale(axes: Axes, sizes: Sequence[float]) -> None:
     axes.set_ylim(-top, top)
     axes.set_yticks([-top, 0.0, top])
     axes.minorticks_off()
-    told = f"linear within ±{linear:g}, logarithmic beyond"
-    axes.text(0.995, 0.03, told, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
+    text = f"linear within ±{linear:g}, logarithmic beyond"
+    axes.text(0.995, 0.03, text, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
 
 
 def deviation(quantity: Quantity, motion: Motion, reference: Motion) -> tuple[np.ndarray, np.ndarray]:

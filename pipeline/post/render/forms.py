@@ -74,13 +74,13 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     return surfaces.merged([surfaces.moved(surfaces.sphere(1.2 * width), middle), *bars])
 
 
-def shapes(told: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
+def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
     """The shapes that a scene gives of a body, in the body frame [m]; files are relative to `folder`.
 
     Raises InputError for files that cannot be read.
     """
     drawn = []
-    for shape in told:
+    for shape in declared:
         kind = shape["type"]
         if kind == "box":
             part = surfaces.box(shape["size"])

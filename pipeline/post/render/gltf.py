@@ -85,7 +85,7 @@ class _File:
         self.told["nodes"].append(
             {"name": title, "children": list(range(len(self.told["nodes"]))), "rotation": [-(0.5**0.5), 0, 0, 0.5**0.5]}
         )
-        told = {
+        message = {
             "asset": {"version": "2.0", "generator": "flexclear"},
             "scene": 0,
             "scenes": [{"name": title, "nodes": [len(self.told["nodes"]) - 1]}],
@@ -93,7 +93,7 @@ class _File:
             "animations": self.animations,
             **self.told,
         }
-        text = json.dumps(told, separators=(",", ":")).encode()
+        text = json.dumps(message, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
         binary = bytes(self.binary) + b"\0" * (-len(self.binary) % 4)
         chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary

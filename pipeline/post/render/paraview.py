@@ -110,7 +110,7 @@ def arrow(place: np.ndarray, way: np.ndarray, thick: float) -> Surface:
 
 def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     """Forces on bodies with the places where they act: kind, (time, n, 3) [m], (time, n, 3) [N], world axes."""
-    told, frames = (
+    given, frames = (
         parameters(run),
         {str(name): k for k, name in enumerate(run["frame"].values)} if "frame" in run.coords else {},
     )
@@ -119,7 +119,7 @@ def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
             continue
         places, kept = [], []
         for k, name in enumerate(str(n) for n in run[dim].values):
-            part = told.get(family, {}).get(name, {})
+            part = given.get(family, {}).get(name, {})
             frame = part["between"][1] if "between" in part else part.get("frame")
             if frame in frames:
                 places.append(run["frame_position"].values[:, frames[frame]])

@@ -232,8 +232,8 @@ def _vibrating(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
 
 
 def _vibration_page(shown: Shown) -> dict[str, bytes]:
-    drawn, told = _vibrating(shown)
-    view = viewer(player.vibrations(drawn, told), f"{len(told.labels)} natural vibrations", play=True)
+    drawn, vibrating = _vibrating(shown)
+    view = viewer(player.vibrations(drawn, vibrating), f"{len(vibrating.labels)} natural vibrations", play=True)
     return {"vibrations.html": viewer_page(shown.name("natural vibrations"), [view])}
 
 

@@ -109,13 +109,13 @@ def scales(bundle: xr.Dataset) -> np.ndarray:
     return np.array([scale_to(bundle, unit, FRACTION) for unit in np.eye(bundle.sizes["mode"])])
 
 
-def vibrations(drawn: Mechanism, told: Vibrations) -> dict[str, Any]:
+def vibrations(drawn: Mechanism, linear: Vibrations) -> dict[str, Any]:
     """The natural vibrations of a mechanism about a pose, for the viewer.
 
     Of each complex shape real and imaginary part are shown in turn, so that running waves run.
     """
     meshes = []
-    for piece in told.pieces:
+    for piece in linear.pieces:
         mesh = _still(piece.surface, piece.color, piece.opacity) | {"track": -1, "plain": piece.plain}
         if piece.moved.any():
             mesh["fields"] = [_scaled(f) for f in piece.moved.reshape(-1, *piece.moved.shape[2:])]
@@ -123,10 +123,10 @@ def vibrations(drawn: Mechanism, told: Vibrations) -> dict[str, Any]:
         meshes.append(mesh)
     shapes = [
         {
-            "label": label, "fields": [2 * k, 2 * k + 1], "scale": float(told.scale[k]),
-            "largest": float(told.largest[k]) or 1.0,
+            "label": label, "fields": [2 * k, 2 * k + 1], "scale": float(linear.scale[k]),
+            "largest": float(linear.largest[k]) or 1.0,
         }
-        for k, label in enumerate(told.labels)
+        for k, label in enumerate(linear.labels)
     ]  # fmt: skip
     return {"meshes": meshes, "shapes": shapes, "unit": 1.0, **_camera(drawn.view, drawn.cloud, drawn.looks.zoom)}
 
@@ -160,12 +160,12 @@ def _bent(run: xr.Dataset, body: Flexible, steps: np.ndarray) -> dict[str, Any]:
     some = np.unique(np.linspace(0, len(q) - 1, 60).astype(int))
     largest = max(float(np.linalg.norm(np.tensordot(q[k], fields, axes=1), axis=1).max()) for k in some)
     rest_centre = bundle["first_moment"].values / float(bundle["mass"])
-    told = _skin(bundle, rest - rest_centre) | {
+    content = _skin(bundle, rest - rest_centre) | {
         "fields": [_scaled(values) for values in fields],
         "weights": _floats(q[steps]),
         "largest": largest,
     }
-    return told | ({"color": body.color, "plain": True} if body.color else {})
+    return content | ({"color": body.color, "plain": True} if body.color else {})
 
 
 def _track(run: xr.Dataset, owner: int | None, frame: int | None, steps: np.ndarray) -> np.ndarray:

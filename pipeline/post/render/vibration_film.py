@@ -23,11 +23,11 @@ SECONDS, PERIODS = 1.5, 2
 SHOWN = 12
 
 
-def frames(drawn: Mechanism, told: Vibrations, rate: int, progress: Progress = silent) -> Iterator[np.ndarray]:
+def frames(drawn: Mechanism, modes: Vibrations, rate: int, progress: Progress = silent) -> Iterator[np.ndarray]:
     """The slowest vibrations in turn, at most SHOWN, pictures of shape (540, 960, 3), so many a second."""
     count = round(SECONDS * rate / PERIODS)
-    scene = _Scene(drawn, told, SIZE)
-    shown = min(len(told.labels), SHOWN)
+    scene = _Scene(drawn, modes, SIZE)
+    shown = min(len(modes.labels), SHOWN)
     for k in range(shown):
         period = [scene.picture(k, 2.0 * np.pi * n / count) for n in range(count)]
         for _ in range(PERIODS):
@@ -36,10 +36,10 @@ def frames(drawn: Mechanism, told: Vibrations, rate: int, progress: Progress = s
     scene.close()
 
 
-def sheet(drawn: Mechanism, told: Vibrations) -> np.ndarray:
+def sheet(drawn: Mechanism, modes: Vibrations) -> np.ndarray:
     """The vibrations at their largest, in rows of three, slowest first: at most SHOWN of them."""
-    scene = _Scene(drawn, told, TILE)
-    tiles = [scene.picture(k, 0.0) for k in range(min(len(told.labels), SHOWN))]
+    scene = _Scene(drawn, modes, TILE)
+    tiles = [scene.picture(k, 0.0) for k in range(min(len(modes.labels), SHOWN))]
     scene.close()
     columns = min(COLUMNS, len(tiles))
     blank = np.full_like(tiles[0], 255)
@@ -49,12 +49,12 @@ def sheet(drawn: Mechanism, told: Vibrations) -> np.ndarray:
     )
 
 
-def _cloud(told: Vibrations) -> np.ndarray:
+def _cloud(modes: Vibrations) -> np.ndarray:
     """Points that stand for all that is drawn, at both ends of each vibration that is shown."""
     clouds = []
-    for piece in told.pieces:
-        for k in range(min(len(told.labels), SHOWN)):
-            way = told.scale[k] * piece.moved[k, 0, ::5]
+    for piece in modes.pieces:
+        for k in range(min(len(modes.labels), SHOWN)):
+            way = modes.scale[k] * piece.moved[k, 0, ::5]
             clouds += [piece.surface.points[::5] + way, piece.surface.points[::5] - way]
     return np.concatenate(clouds)
 
@@ -62,12 +62,12 @@ def _cloud(told: Vibrations) -> np.ndarray:
 class _Scene:
     """The mechanism on the stage, its skins, and the words below it."""
 
-    def __init__(self, drawn: Mechanism, told: Vibrations, size: tuple[int, int]) -> None:
-        self.told = told
+    def __init__(self, drawn: Mechanism, modes: Vibrations, size: tuple[int, int]) -> None:
+        self.told = modes
         self.stage = plotter(size)
         self.caption = Caption((size[0], 26), SOFT)
-        self.skins = [self._skin(k) for k in range(len(told.pieces))]
-        look(self.stage, replace(drawn, cloud=_cloud(told)))
+        self.skins = [self._skin(k) for k in range(len(modes.pieces))]
+        look(self.stage, replace(drawn, cloud=_cloud(modes)))
 
     def _skin(self, k: int) -> pv.PolyData:
         piece = self.told.pieces[k]

@@ -28,7 +28,7 @@ class View:
 
 def view(
     run: xr.Dataset,
-    told: Mapping[str, Any],
+    given: Mapping[str, Any],
     asked: Sequence[float] | None = None,
     upwards: Sequence[float] | None = None,
 ) -> View:
@@ -37,7 +37,7 @@ def view(
     told: the scene's parameters, for gravity, whose opposite is up in the pictures of planar mechanisms.
     asked, upwards: direction to the eye, and what is up, as the user wants them.
     """
-    up = _up(told) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
+    up = _up(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
     if asked is not None:
         direction = np.array(asked, dtype=float)
         return View(direction / np.linalg.norm(direction) * np.linalg.norm(SPATIAL), _across(up, direction), False)
@@ -95,9 +95,9 @@ def plane(run: xr.Dataset) -> np.ndarray | None:
     return normal if float(np.abs(moving @ normal).max()) <= PLANAR * max(speed, 1e-300) or speed == 0.0 else None
 
 
-def _up(told: Mapping[str, Any]) -> np.ndarray:
+def _up(given: Mapping[str, Any]) -> np.ndarray:
     """Against gravity, where there is some; else z."""
-    fields = [load["acceleration"] for load in told.get("load", {}).values() if load.get("type") == "gravity"]
+    fields = [load["acceleration"] for load in given.get("load", {}).values() if load.get("type") == "gravity"]
     total = np.sum(np.array(fields, dtype=float), axis=0) if fields else np.zeros(3)
     size = float(np.linalg.norm(total))
     return -total / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
