@@ -52,7 +52,9 @@ def command(options: argparse.Namespace) -> None:
     scenes = [graph.scene for graph in run.graphs(options.scenes, options.set)]
     comparison = bring(scenes, place, options.ideal)
     print(*(comparison.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")
-    run.told(comparison.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"})
+    run.print_files(
+        comparison.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"}
+    )
 
 
 @dataclass(frozen=True)

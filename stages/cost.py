@@ -117,7 +117,7 @@ def bring(
     return place.store.load(outcome.records[id(task)]), place.store.root / task.folder
 
 
-def told(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:
+def figures_and_tables(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:
     """What a page says of a scene, and the files of its pictures, by path relative to the page.
 
     study, folder: as `bring` returned them.  pictures: folder for them beside the page.
@@ -142,7 +142,7 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, optio
     with disk_limits(page.parent):
         (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
         for name, (study, folder) in studies.items():
-            said, pictures = told(name, study, folder, page.stem)
+            said, pictures = figures_and_tables(name, study, folder, page.stem)
             sections.append(said)
             for path, file in pictures.items():
                 publish(page.parent / path, file.read_bytes())

@@ -38,7 +38,7 @@ def command(options: argparse.Namespace) -> None:
         done, record = bring(graph.scene, place, options.members)
         folder = place.store.root / done.folder
         print(place.store.path(done.stage, record.key, "effects.md").read_text(encoding="utf-8"))
-        run.told(folder, {"index.html": "the page", "effects.nc": "all influences", "effects.png": "the chart"})
+        run.print_files(folder, {"index.html": "the page", "effects.nc": "all influences", "effects.png": "the chart"})
 
 
 def bring(scene: Scene, place: Workplace, members: int = s4_watched.MEMBERS) -> tuple[Task, Record]:

@@ -117,7 +117,7 @@ def _page(
             "Effects present and absent",
             listed(effects(parameters(run)), ("effect", "in the scene")) if run is not None else "",
         ),
-        Part("cost", "Computing cost", listed(_told(attributes, COST), ("figure", "value"))),
+        Part("cost", "Computing cost", listed(_rows(attributes, COST), ("figure", "value"))),
         Part("stability", "Stability and constraints", listed(_stability(run), ("figure", "value"))),
         Part("provenance", "Provenance", listed(_provenance(graph, place, records), ("item", "value"))),
         Part("downloads", "Downloads", downloads(_files(graph, compared))),
@@ -127,7 +127,7 @@ def _page(
     return page(scene.title, lead, parts, answer(dataset, run, doubts))
 
 
-def _told(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:
+def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:
     """Attributes by what they are called; whole numbers in groups of three, shares in per cent."""
     rows = {}
     for name, label in names.items():
@@ -146,7 +146,7 @@ def _told(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, 
 def _stability(run: xr.Dataset | None) -> dict[str, str]:
     if run is None:
         return {}
-    rows = _told(run.attrs, STABILITY)
+    rows = _rows(run.attrs, STABILITY)
     if "horizon" in run:
         rows["predictability"] = sentence(float(run["horizon"]), float(run["time"].values[-1]))
     for name, label, unit in (
@@ -162,7 +162,7 @@ def _provenance(graph: Graph, place: Workplace, records: Mapping[int, Record]) -
     rows = {"command": f"`flexclear report {graph.scene.path.name if graph.scene.path else graph.scene.name}`"}
     record = records.get(id(graph.simulate))
     if record is not None:
-        rows |= _told(place.store.load(record).attrs, PROVENANCE)
+        rows |= _rows(place.store.load(record).attrs, PROVENANCE)
         rows["digest of the run"] = record.digest
     rows["sources of methods and data"] = f"`flexclear cite {graph.scene.name}`"
     return rows

@@ -55,7 +55,7 @@ def command(options: argparse.Namespace) -> None:
         raise run.MissedAccuracyError("\n".join(missed))
 
 
-def told(requested: list[Graph], place: Workplace) -> list[Planned]:
+def planned_scenes(requested: list[Graph], place: Workplace) -> list[Planned]:
     """The plans of scenes, brought up to date and printed."""
     plans = [bring(graph.scene, place) for graph in requested]
     print(*(plan.text() for plan in plans), sep="\n")
@@ -108,7 +108,7 @@ class Planned:
     def tell(self) -> None:
         """One line on what was written where."""
         files = {"index.html": "the page", self.target.name: "the planned scene", "plan.nc": "all influences"}
-        run.told(self.folder, files)
+        run.print_files(self.folder, files)
 
 
 def _example(scene: Scene) -> str:

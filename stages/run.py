@@ -61,7 +61,7 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--verify", "tells the true error of a plan, and no plan is asked for", "add --planned")
     requested = graphs(options.scenes, options.set)
     place = workplace(options)
-    plans = import_module("flexclear.stages.plan").told(requested, place) if options.planned else []
+    plans = import_module("flexclear.stages.plan").planned_scenes(requested, place) if options.planned else []
     requested = [Graph(plan.planned) for plan in plans] or requested
     for graph in requested:
         check_run(graph.scene, place.store.root)
@@ -75,7 +75,7 @@ def command(options: argparse.Namespace) -> None:
     if options.out is not None:
         copy_run(requested[0], place, options.out)
     for graph in requested if options.to in ("simulate", "ensemble", "post") else ():
-        told(place.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
+        print_files(place.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
     missed = [text for plan in plans if options.verify for text in plan.missed()]
     conclude(requested, place, outcome, missed)
 
@@ -86,7 +86,7 @@ def scene_arguments(parser: argparse.ArgumentParser) -> None:
     common_arguments(parser)
 
 
-def told(folder: Path, files: Mapping[str, str]) -> None:
+def print_files(folder: Path, files: Mapping[str, str]) -> None:
     """One line on what was written where, of those files that are there."""
     there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
     if there:

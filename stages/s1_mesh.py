@@ -52,7 +52,7 @@ def sources(recipe: Path, place: str = "") -> dict[str, str]:
     if wrong is not None:
         problem = "expected text, or a table of texts by key"
         raise InputError(f"{recipe} [{wrong}]", problem, 'write source = "Table 2"')
-    return provenance.told(table, place)
+    return provenance.sources(table, place)
 
 
 def check_size(recipe: Path, limits: Limits, edits: Mapping[str, Any] | None = None) -> None:

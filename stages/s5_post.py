@@ -22,12 +22,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, LabelledArrays], progres
     """The post dataset (schema POST), with what the scene says of where its values come from."""
     from flexclear.pipeline.post import derived
 
-    return {"nc": derived(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["told"])}
+    return {"nc": derived(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["attributes"])}
 
 
 def params(scene: Scene) -> dict[str, Any]:
     """Attributes that no run depends on: `sources` and `assumptions`, place in the scene -> text, as JSON."""
-    return {"told": origins(scene)}
+    return {"attributes": origins(scene)}
 
 
 def origins(scene: Scene) -> dict[str, str]:

@@ -73,13 +73,13 @@ def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
     """Variables of one way, in the order of the scenes."""
     import numpy as np
 
-    def told(name: str) -> list[float]:
+    def of_scenes(name: str) -> list[float]:
         return [float(cost.run.attrs[name]) if cost else float("nan") for cost in costs]
 
     error = [float(np.abs(cost.run["energy_error"]).max()) if cost else float("nan") for cost in costs]
     variables: dict[str, Any] = {
-        f"{way}_evaluations": (("scene",), told("evaluations"), {"units": "1"}),
-        f"{way}_steps": (("scene",), told("steps"), {"units": "1"}),
+        f"{way}_evaluations": (("scene",), of_scenes("evaluations"), {"units": "1"}),
+        f"{way}_steps": (("scene",), of_scenes("steps"), {"units": "1"}),
         f"{way}_energy_error": (("scene",), error, {"units": "J"}),
     }
     for part, dim in (("integration", "repeat"), ("recording", "recorded")):

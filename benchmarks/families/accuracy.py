@@ -30,7 +30,7 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     peers = exudyn.points([r for s in log.latest(log.FOLDER / "exudyn.jsonl") for r in s.records])
     for case in cases:
         study, folder = cost.bring(load_scene(find_scene(case.name)), place, peers.get(case.name, ()))
-        said, pictures = cost.told(case.name, study, folder, "accuracy")
+        said, pictures = cost.figures_and_tables(case.name, study, folder, "accuracy")
         records: list[Record] = [{"advice": said.advice}]
         for title, path in said.pictures.items():
             file = pictures[path]

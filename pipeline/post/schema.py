@@ -89,5 +89,5 @@ POST: Schema = {
     "ensemble_horizon": _V((), "s", "where the members of the ensemble part", optional=True),
     "spread": _V(("ensemble_time",), "m s-1", "largest distance of a member's velocity from the mean", optional=True),
 }
-for _name, _told in _OF_MEMBERS.items():
-    POST |= _of_members(_name, *_told)
+for _name, _declared in _OF_MEMBERS.items():
+    POST |= _of_members(_name, *_declared)

@@ -108,7 +108,7 @@ def test_what_the_child_opens_counts(tmp_path: Path) -> None:
     with file_dependencies.watched(tmp_path):
         (tmp_path / "a.obj").read_bytes()
         with pytest.raises(ResourceError, match="changed while it was read"):
-            file_dependencies.told({"a.obj": "another digest"}, tmp_path)
+            file_dependencies.add({"a.obj": "another digest"}, tmp_path)
 
 
 COMMAND = """

@@ -122,7 +122,7 @@ def read(function: Callable[..., Any], path: Path, *arguments: Any, limits: Limi
             raise ResourceError(str(answer["words"]))
         words = {"memory": _too_large(limits)}
         raise UnreadableError(words.get(answer["failure"], str(answer.get("words"))))
-    file_dependencies.told(answer["read"], path.parent)
+    file_dependencies.add(answer["read"], path.parent)
     return answer["value"]
 
 

@@ -27,7 +27,7 @@ def send(file: IO[bytes], value: Any) -> None:
     Raises TypeError for others.
     """
     arrays: list[np.ndarray] = []
-    head = json.dumps(_told(value, arrays)).encode()
+    head = json.dumps(_encoded(value, arrays)).encode()
     file.write(_LENGTH.pack(len(head)) + head)
     for array in arrays:
         file.write(array.reshape(-1).view(np.uint8).data)
@@ -71,16 +71,16 @@ def _exactly(file: IO[bytes], count: int) -> np.ndarray:
     return buffer
 
 
-def _told(value: Any, arrays: list[np.ndarray]) -> Any:
+def _encoded(value: Any, arrays: list[np.ndarray]) -> Any:
     """A value as JSON; its arrays of numbers are put into the list."""
     if isinstance(value, np.generic):
         value = value.item()
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, dict):
-        return {"table": {str(name): _told(part, arrays) for name, part in value.items()}}
+        return {"table": {str(name): _encoded(part, arrays) for name, part in value.items()}}
     if isinstance(value, (list, tuple)):
-        return {"list": [_told(part, arrays) for part in value]}
+        return {"list": [_encoded(part, arrays) for part in value]}
     if isinstance(value, np.ndarray) and value.dtype.kind in KINDS:
         native = np.ascontiguousarray(value, dtype=value.dtype.newbyteorder("="))
         arrays.append(native)

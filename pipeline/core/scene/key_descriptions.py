@@ -18,11 +18,11 @@ def meanings(part: type, keys: Collection[str]) -> dict[str, str]:
     """
     descriptions: dict[str, str] = {}
     for owner in reversed(part.__mro__):
-        descriptions |= _told(" ".join(inspect.cleandoc(owner.__dict__.get("__doc__") or "").split()), keys)
+        descriptions |= _descriptions(" ".join(inspect.cleandoc(owner.__dict__.get("__doc__") or "").split()), keys)
     return descriptions
 
 
-def _told(text: str, keys: Collection[str]) -> dict[str, str]:
+def _descriptions(text: str, keys: Collection[str]) -> dict[str, str]:
     if not keys:
         return {}
     one = "(?:" + "|".join(re.escape(key) for key in sorted(keys, key=len, reverse=True)) + ")"

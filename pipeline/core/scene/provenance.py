@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 
-def told(table: Mapping[str, Any], place: str = "") -> dict[str, str]:
+def sources(table: Mapping[str, Any], place: str = "") -> dict[str, str]:
     """Place -> text of every `source` at and below a table; of the table itself by its place, or by that of its key."""
     sources: dict[str, str] = {}
     for where, source in _sources(table, place):

@@ -424,7 +424,7 @@ class Scene(Part):
 
     def sources(self) -> dict[str, str]:
         """Where each value comes from: ``part.key`` (or ``part``) -> text."""
-        given = provenance.told(self.model_dump())
+        given = provenance.sources(self.model_dump())
         return {place or "scene": text for place, text in given.items()}
 
     def assumptions(self) -> dict[str, str]:

@@ -21,19 +21,19 @@ TICK = 0.1
 #: threads beside other tasks, which will end and leave their cores: so many, where there are as many cores
 BESIDE = 4
 
-_told: bool | None = None
+_others_idle: bool | None = None
 
 
 def tell(others_idle: bool) -> None:
     """In a worker, with each task: whether nothing else can run while it does."""
-    global _told
-    _told = others_idle
+    global _others_idle
+    _others_idle = others_idle
 
 
 def free() -> bool:
     """Whether a processor is free, for all that this program knows; in workers of another program none is."""
     known = sys.modules.get("multiprocessing.process")  # its workers have imported it; others need not, for 4 ms
-    idle = (known is None or known.parent_process() is None) if _told is None else _told
+    idle = (known is None or known.parent_process() is None) if _others_idle is None else _others_idle
     return idle and cores() > 1
 
 

@@ -79,7 +79,7 @@ def note(path: Path) -> None:
         _current.see(path, writing=False)
 
 
-def told(read: Mapping[str, str], base: Path) -> None:
+def add(read: Mapping[str, str], base: Path) -> None:
     """Files that another process has read for this one, as its `watched` found them.
 
     Raises ResourceError where such a file was another one when this process read it itself.

@@ -56,12 +56,12 @@ class Miss:
         """What is given, and what the law says."""
         unit = "rad" if self.turning else "m"
         return (
-            f"{self.what} starts at {_told(self.now)} {unit} in the poses given, and at {_told(self.value)} {unit} by "
+            f"{self.what} starts at {_written(self.now)} {unit} in the poses given, and at {_written(self.value)} {unit} by "
             f"{self.rule}: {self.size:.3g} {unit} apart"
         )
 
 
-def _told(value: float) -> str:
+def _written(value: float) -> str:
     """A coordinate [m or rad] in words; rounding of poses is nought."""
     return f"{0.0 if abs(value) < 1e-12 else value:.6g}"
 

@@ -64,14 +64,14 @@ class Velocities:
     """Linear equations matrix @ speeds = target of the speeds at the start, all in natural units; (rows, nv), (rows,).
 
     asked: velocities that the target stands for, before those of the drives are taken off, (rows,).
-    given: places of the velocities that the first `told` rows ask for; the other rows keep the loops closed.
+    given: places of the velocities that the first `n_given` rows set; the other rows keep the loops closed.
     fastest: size of all these velocities, those of a slow motion at least.
     """
 
     matrix: np.ndarray
     asked: np.ndarray
     target: np.ndarray
-    told: int
+    n_given: int
     given: tuple[str, ...]
     fastest: float
 

@@ -98,7 +98,7 @@ class _Pose:
         self.rest[engine.model.speeds] = 0.0
         engine.keep(np.ones(len(engine.kept), dtype=bool))
         self.asked = initial.velocity_equations(engine.model, start_motions(engine), self.rest)
-        self.J = self.asked.matrix[self.asked.told :]
+        self.J = self.asked.matrix[self.asked.n_given :]
         U, values, _ = np.linalg.svd(self.J)
         rank = int(np.sum(values > ZERO * values[0])) if len(values) else 0
         self.left = U[:, rank:]

@@ -84,7 +84,7 @@ class Suit:
     names: tuple[str, ...]
     seen: dict[str, dict[float, float]] = field(default_factory=dict)
     missed: dict[str, float] = field(default_factory=dict)
-    told: dict[str, float] = field(default_factory=dict)
+    expected: dict[str, float] = field(default_factory=dict)
     left: tuple[float, float] = (0.0, 0.0)
     touching: bool = False
 
@@ -189,8 +189,8 @@ class Suit:
 
     def judges(self, rtol: float) -> Judges:
         """Who looks whether a run goes as foreseen, and its twin, of which nothing is remembered afterwards."""
-        self.told.clear()
-        return Judges(self._panel(rtol), replace(self, told={}, left=(0.0, 0.0))._panel(rtol))
+        self.expected.clear()
+        return Judges(self._panel(rtol), replace(self, expected={}, left=(0.0, 0.0))._panel(rtol))
 
     def _panel(self, rtol: float) -> Panel:
         panel = {}
@@ -210,12 +210,12 @@ class Suit:
             if engine.model.scene.solver.integrator == DEFAULT and not limited(looks):
                 return ""
             # what has been handed on from in this run already was seen to take more than was foreseen
-            enough = max(most, DEARER[heir] * self.told.get(heir, 0.0)) / DEARER[name]
+            enough = max(most, DEARER[heir] * self.expected.get(heir, 0.0)) / DEARER[name]
             whole = pace(looks, CLEARLY * enough) * self.span
             used = max(looks[-1].evaluations - looks[0].evaluations, 1)
             if whole < (TRIED if tried else CLEARLY) * (1.0 + EARLY * enough / used) * enough:
                 return ""
-            self.told[name] = whole
+            self.expected[name] = whole
             self.left = looks[-1].evaluations, (looks[-1].time - engine.start) / self.span
             if name == DEFAULT:
                 return refusal.stiffness(engine.n, engine.control)
@@ -228,11 +228,11 @@ class Suit:
 
     def learn(self, rtol: float, name: str, run: xr.Dataset) -> None:
         """Remember what a run that began with an integrator took."""
-        if DEFAULT in self.told:  # where stability sets the pace, it tells what the whole run would have taken
-            self.seen.setdefault(DEFAULT, {})[rtol] = self.told[DEFAULT]
-        if run.attrs["method"] != name and not (name == DEFAULT and name in self.told):
+        if DEFAULT in self.expected:  # where stability sets the pace, it tells what the whole run would have taken
+            self.seen.setdefault(DEFAULT, {})[rtol] = self.expected[DEFAULT]
+        if run.attrs["method"] != name and not (name == DEFAULT and name in self.expected):
             self.missed[name] = max(rtol, self.missed.get(name, 0.0))
-        used, done = self.left if self.told else (0.0, 0.0)
+        used, done = self.left if self.expected else (0.0, 0.0)
         if done < ENOUGH:
             rest = (float(run.attrs["evaluations"]) - used) / (1.0 - done)
             self.seen.setdefault(run.attrs["method"], {})[rtol] = max(rest, 1.0)

@@ -183,7 +183,7 @@ def piece(engine: Engine, y: np.ndarray, outputs: np.ndarray, left: Handover | N
 
 def digest(engine: Engine, *arrays: np.ndarray) -> str:
     """Of all that decides what an engine makes of some arrays, the processor included."""
-    described = f"{processor()} {INTERPRETED} {engine.start!r} {engine.end!r} {_told(engine.model.scene)}"
+    described = f"{processor()} {INTERPRETED} {engine.start!r} {engine.end!r} {_described(engine.model.scene)}"
     hashed = hashlib.sha256(described.encode())
     h = engine.h.copy()
     h[list(m.ADDRESSES)] = 0
@@ -195,7 +195,7 @@ def digest(engine: Engine, *arrays: np.ndarray) -> str:
 _last: list[tuple[Scene, str]] = []
 
 
-def _told(scene: Scene) -> str:
+def _described(scene: Scene) -> str:
     """All that a scene says; remembered of the last one, since studies ask for thousands of pieces of it."""
     known, text = _last[0] if _last else (None, "")
     if known is not scene:

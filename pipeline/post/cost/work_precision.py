@@ -31,7 +31,7 @@ class Curve:
     name: str
     seconds: np.ndarray
     error: np.ndarray
-    told: np.ndarray
+    resolved: np.ndarray
     note: str = ""
 
 
@@ -115,10 +115,10 @@ def _panel(
     own, others = curves_of
     for curve in (*own, *others):
         color, mark = look(curve, others)
-        pick = np.isfinite(curve.error[:, k]) & curve.told[:, k]
+        pick = np.isfinite(curve.error[:, k]) & curve.resolved[:, k]
         ax.plot(curve.seconds[pick], curve.error[pick, k], mark, color=color, linewidth=1.0, markersize=4.5, ls="-")
     seconds = np.concatenate([c.seconds for c in own])
-    error = np.concatenate([np.where(c.told[:, k], c.error[:, k], np.nan) for c in own])
+    error = np.concatenate([np.where(c.resolved[:, k], c.error[:, k], np.nan) for c in own])
     front = pareto(seconds, error)
     ax.plot(seconds[front], error[front], color=INK, linewidth=3.0, alpha=0.18, zorder=0)
     for m in marks:

@@ -128,7 +128,7 @@ def _same_acceleration(data: Data) -> Outcome:
 def _same_path(*models: Model) -> Callable[[Data], Outcome]:
     """Whether the ball's centre stays beside the ideal model's; as a share of how far that moves."""
 
-    def told(data: Data) -> Outcome:
+    def outcome(data: Data) -> Outcome:
         ideal = measured.centre(data[f"{IDEAL.scene}:run"])
         stroke = float(np.linalg.norm(ideal - ideal[0], axis=1).max())
         off = {model: float(np.linalg.norm(apart(data, model, measured.centre), axis=1).max()) for model in models}
@@ -137,7 +137,7 @@ def _same_path(*models: Model) -> Callable[[Data], Outcome]:
             f"off by {words} at most, of a path that goes {1e3 * stroke:.0f} mm far"
         )
 
-    return told
+    return outcome
 
 
 def _other_path(data: Data) -> Outcome:
@@ -179,11 +179,11 @@ def _free_suitable(data: Data) -> Outcome:
 def _in_both_layouts(outcome: Callable[[Data, Model, Model], Outcome]) -> Callable[[Data], Outcome]:
     """The outcome in the scenes' layout, with the first one's numbers behind it."""
 
-    def told(data: Data) -> Outcome:
+    def in_both(data: Data) -> Outcome:
         (verdict, numbers), (_, first) = outcome(data, CSJ, IDEAL), outcome(data, FIRST_CSJ, FIRST_IDEAL)
         return verdict, f"{numbers} ({first})"
 
-    return told
+    return in_both
 
 
 def _no_influence(data: Data, csj: Model, ideal: Model) -> Outcome:
@@ -306,7 +306,7 @@ def _enlarged(data: Data) -> Outcome:
 def _costs(*models: Model) -> Callable[[Data], Outcome]:
     """Whether costs over the ideal model's are the paper's, by each way in which Table 10 tells them."""
 
-    def told(data: Data) -> Outcome:
+    def outcome(data: Data) -> Outcome:
         tests, words = [], []
         for way, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
             costs = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
@@ -315,7 +315,7 @@ def _costs(*models: Model) -> Callable[[Data], Outcome]:
         printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
         return _verdict(*tests), f"printed {printed}; at {'; at '.join(words)}"
 
-    return told
+    return outcome
 
 
 def _ratio(value: float) -> str:

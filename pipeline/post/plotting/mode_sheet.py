@@ -44,7 +44,7 @@ def frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -
             yield drawn[fraction]
 
 
-def told(bundle: xr.Dataset) -> str:
+def range_text(bundle: xr.Dataset) -> str:
     """Which modes these are, in words."""
     kind = str(bundle.attrs.get("reference", ""))
     return f"{bundle.sizes['mode']} modes{f', {kind}' if kind else ''}"
@@ -79,7 +79,7 @@ def _sheet(body: str, bundle: xr.Dataset, seen: View, fraction: float) -> Figure
     bar.set_label("displacement, largest = 1")
     style.heading(
         figure,
-        f"{body}: {told(bundle)}",
+        f"{body}: {range_text(bundle)}",
         "mass-normalised shapes (in kg^-1/2) times the factor beside each; dashed: at rest",
     )
     return figure

@@ -79,7 +79,7 @@ def _frames(
             struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
             _place(drawn, actors, int(step), struck)
             picture = image(scene)
-            caption.onto(picture, f"{pace.told(float(shown.slower[k]))}{_exaggeration(drawn)}")
+            caption.onto(picture, f"{pace.speed_text(float(shown.slower[k]))}{_exaggeration(drawn)}")
             yield np.concatenate([picture, plots.frame(int(step))], axis=1)
             if k % 15 == 0:
                 progress((k + 1) / steps.size, "film")

@@ -49,7 +49,7 @@ def frames(
             trail.set_data(x[first[k] : step + 1], y[first[k] : step + 1])
             dot.set_data([x[step]], [y[step]])
             mark.set_data([time[step]], [force[step]])
-            clock.set_text(f"t = {time[step]:.2f} ms, {pace.told(float(shown.slower[k]))}")
+            clock.set_text(f"t = {time[step]:.2f} ms, {pace.speed_text(float(shown.slower[k]))}")
             for artist in (trail, dot, mark):
                 artist.axes.draw_artist(artist)
             figure.draw_artist(clock)

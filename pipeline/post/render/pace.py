@@ -62,7 +62,7 @@ def strongest(run: xr.Dataset) -> np.ndarray:
     return np.sort(kept)
 
 
-def told(slower: float) -> str:
+def speed_text(slower: float) -> str:
     """The pace in words."""
     if 0.95 < slower < 1.05:
         return "as fast as it is"

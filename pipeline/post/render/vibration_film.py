@@ -63,14 +63,14 @@ class _Scene:
     """The mechanism on the stage, its skins, and the words below it."""
 
     def __init__(self, drawn: Mechanism, modes: Vibrations, size: tuple[int, int]) -> None:
-        self.told = modes
+        self.modes = modes
         self.stage = plotter(size)
         self.caption = Caption((size[0], 26), SOFT)
         self.skins = [self._skin(k) for k in range(len(modes.pieces))]
         look(self.stage, replace(drawn, cloud=_cloud(modes)))
 
     def _skin(self, k: int) -> pv.PolyData:
-        piece = self.told.pieces[k]
+        piece = self.modes.pieces[k]
         mesh = polydata(piece.surface)
         if piece.plain:
             solid(self.stage, piece.surface, piece.color, piece.opacity, mesh)
@@ -81,14 +81,14 @@ class _Scene:
 
     def picture(self, vibration: int, phase: float) -> np.ndarray:
         """One vibration at a phase [rad], shape (height, width, 3)."""
-        scale, largest = self.told.scale[vibration], self.told.largest[vibration] or 1.0
-        for piece, mesh in zip(self.told.pieces, self.skins, strict=True):
+        scale, largest = self.modes.scale[vibration], self.modes.largest[vibration] or 1.0
+        for piece, mesh in zip(self.modes.pieces, self.skins, strict=True):
             way = np.cos(phase) * piece.moved[vibration, 0] - np.sin(phase) * piece.moved[vibration, 1]
             mesh.points = piece.surface.points + scale * way
             if not piece.plain:
                 mesh["displacement"] = np.linalg.norm(way, axis=1) / largest
         picture = image(self.stage)
-        self.caption.onto(picture, f"{self.told.labels[vibration]}; drawn larger than it is")
+        self.caption.onto(picture, f"{self.modes.labels[vibration]}; drawn larger than it is")
         return picture
 
     def close(self) -> None:

@@ -92,11 +92,11 @@ def _sparse(
         def inverse(loads: np.ndarray) -> np.ndarray:
             return flexibility.relieved(flexibility.response(flexibility.balanced(loads)))
 
-    def told(loads: np.ndarray) -> np.ndarray:
+    def compliance(loads: np.ndarray) -> np.ndarray:
         progress(None, f"{count} normal modes of {model.size} coordinates")
         return inverse(loads.reshape(-1, 1)).ravel()
 
-    values, shapes = eigen.inverted(model.stiffness, model.mass, count, told, ROUGH if rough else 0.0)
+    values, shapes = eigen.inverted(model.stiffness, model.mass, count, compliance, ROUGH if rough else 0.0)
     # ARPACK leaves a trace of what is held in the shapes; one more step of the iteration takes it out
     shapes = inverse(model.mass @ shapes) * values
     rigid = NOBODY
