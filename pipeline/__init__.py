@@ -108,7 +108,7 @@ def cost(scene: Scene | str | Path) -> xr.Dataset:
 
     The quantities are those of the scene's `[accuracy]`, else the usual ones.  Raises FlexclearError.
     """
-    dataset, _ = _stages("cost").bring(_loaded(scene), _stages("run").workplace())
+    dataset, _ = _stages("cost").bring(_loaded(scene), _stages("run").open_workplace())
     return dataset
 
 
@@ -208,7 +208,9 @@ def compare(
     Raises FlexclearError.
     """
     without = "both" if ideal is True else ideal or None
-    comparison = _stages("compare").bring([_loaded(scene) for scene in scenes], _stages("run").workplace(), without)
+    comparison = _stages("compare").bring(
+        [_loaded(scene) for scene in scenes], _stages("run").open_workplace(), without
+    )
     return comparison.dataset()
 
 
@@ -218,7 +220,7 @@ def effects(scene: Scene | str | Path) -> xr.Dataset:
     Variables and meanings: `pipeline.post.effect_sizes`.  The quantities are those of `[view] watch`, else of
     `[accuracy]`, else the usual ones.  Raises FlexclearError.
     """
-    dataset: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").workplace())
+    dataset: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").open_workplace())
     return dataset
 
 
@@ -228,7 +230,7 @@ def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
     The dataset (`pipeline.post.plan.dataset`) holds the estimated influence of each effect on each quantity of
     `[accuracy]`, what was decided, and why.  Raises FlexclearError.
     """
-    planned = _stages("plan").bring(_loaded(scene), _stages("run").workplace())
+    planned = _stages("plan").bring(_loaded(scene), _stages("run").open_workplace())
     return planned.planned, planned.dataset()
 
 
@@ -239,7 +241,7 @@ def render(scene: Scene | str | Path) -> Path:
 
 def report(scene: Scene | str | Path) -> Path:
     """The page with everything about a scene, one file, brought up to date.  Raises FlexclearError."""
-    return _stages("own_report").make(_stages("run").graph(_loaded(scene)), _stages("run").workplace())
+    return _stages("own_report").make(_stages("run").graph(_loaded(scene)), _stages("run").open_workplace())
 
 
 def open(scene: Scene | str | Path) -> xr.DataTree:

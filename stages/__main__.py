@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
         options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
         if own:  # what is imported stays: neither now nor at the end is it garbage
             gc.freeze()
-        with workers.kept():
+        with workers.reused():
             return int(options.command(options) or 0)
     except FlexclearError as error:
         print(f"flexclear: {error}", file=sys.stderr)

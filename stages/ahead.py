@@ -27,32 +27,34 @@ if TYPE_CHECKING:
 USUAL = ("pendulum", "four-bar", "slider-crank", "leg")
 
 
-def compiled(names: list[str], place: Workplace) -> list[str]:
+def compiled(names: list[str], workplace: Workplace) -> list[str]:
     """Compile, or fetch, what runs of scenes call; the usual ones' without names.  What each scene is called.
 
     Code for one wiring is left to the runs that are long enough for it.
     """
     if names:
-        return _all(graphs(names), place)
+        return _all(graphs(names), workplace)
     with TemporaryDirectory() as folder:
-        apart = Workplace(Store(Path(folder) / "results"), place.sources, place.monitor, place.jobs, place.end)
+        apart = Workplace(
+            Store(Path(folder) / "results"), workplace.sources, workplace.monitor, workplace.jobs, workplace.end
+        )
         return _all(graphs([str(new.write(kind, Path(folder) / kind)[0]) for kind in USUAL]), apart)
 
 
-def _all(requested: Sequence[Graph], place: Workplace) -> list[str]:
-    outcome = place.bring([task for graph in requested for task in graph.bodies().values()])
+def _all(requested: Sequence[Graph], workplace: Workplace) -> list[str]:
+    outcome = workplace.bring([task for graph in requested for task in graph.bodies().values()])
     check(outcome)
-    place.monitor.start(len(requested))
+    workplace.monitor.start(len(requested))
     for graph in requested:
-        known = {name: place.store.load(outcome.records[id(task)]) for name, task in graph.bodies().items()}
-        name = place.monitor.begin(graph.scene.name, "kernels")
+        known = {name: workplace.store.load(outcome.records[id(task)]) for name, task in graph.bodies().items()}
+        name = workplace.monitor.begin(graph.scene.name, "kernels")
         _compile(
             s4_simulate.rebuild(graph.simulate.params, known),
             s4_simulate.bundles(known),
-            partial(place.monitor.update, name),
+            partial(workplace.monitor.update, name),
         )
-        place.monitor.finish(name, failed=False)
-    place.monitor.end()
+        workplace.monitor.finish(name, failed=False)
+    workplace.monitor.end()
     return [graph.scene.name for graph in requested]
 
 

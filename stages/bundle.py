@@ -108,7 +108,7 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
 
 def _opened(scene: Path, settings: Sequence[str]) -> list[Path]:
     """The scene, what it extends, recipes, tables, meshes and whatever their readers open."""
-    kept, names = [scene], dict[str, str]()
+    files, names = [scene], dict[str, str]()
     with file_dependencies.watched(
         scene.parent, outside=(results_root(), kernel_root(), TREE / "flexclear" / "stages")
     ) as read:
@@ -120,8 +120,8 @@ def _opened(scene: Path, settings: Sequence[str]) -> list[Path]:
             with contextlib.suppress(FlexclearError):
                 s1_mesh.run({**s1_mesh.params(recipe), "folder": str(recipe.parent)}, {}, silent)
         names = read
-    kept += [Path(os.path.normpath(scene.parent / place)) for place in names]
-    return sorted({path.resolve() for path in kept if path.is_file()})
+    files += [Path(os.path.normpath(scene.parent / where)) for where in names]
+    return sorted({path.resolve() for path in files if path.is_file()})
 
 
 def _recipes(scene: Path) -> list[Path]:
@@ -162,12 +162,12 @@ def _hidden(top: Path) -> dict[str, str]:
     places = {str(top): ".", str(results_root()): "<results>", str(kernel_root()): "<kernels>"}
     places |= {str(TREE): "<flexclear>", sys.prefix: "<python>", sys.base_prefix: "<python>"}
     places |= {str(Path.home()): "~", tempfile.gettempdir(): "<temporary>"}
-    return {place: places[place] for place in sorted(places, key=len, reverse=True) if len(place) > 1}
+    return {where: places[where] for where in sorted(places, key=len, reverse=True) if len(where) > 1}
 
 
 def _without(text: str, hidden: Mapping[str, str]) -> str:
-    for place, word in hidden.items():
-        text = text.replace(place, word)
+    for where, word in hidden.items():
+        text = text.replace(where, word)
     return text
 
 

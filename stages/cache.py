@@ -11,7 +11,7 @@ from stat import S_ISREG
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.paths import kernel_root
 from flexclear.pipeline.core.errors import InputError, ResourceError, shown
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 
 ACTIONS = {
     "size": "how much is kept, by stage",
@@ -43,7 +43,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def _size(options: argparse.Namespace) -> None:
-    store = workplace().store
+    store = open_workplace().store
     inventory = upkeep.inventory(store, whole=False)
     sizes: dict[str, list[int]] = {}
     for artifact in inventory.artifacts:
@@ -71,7 +71,7 @@ def _sizes(paths: Iterable[Path]) -> list[int]:
 def _check(options: argparse.Namespace) -> None:
     from flexclear.pipeline.dynamics.compile import files
 
-    store = workplace().store
+    store = open_workplace().store
     inventory = upkeep.inventory(store, whole=True)
     # one without a sum has not been compiled yet, or is about to be
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
@@ -94,7 +94,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _explain(options: argparse.Namespace) -> None:
-    store = workplace().store
+    store = open_workplace().store
     record = upkeep.find(store, options.what)
     if record is None:
         raise InputError(options.what, "is neither a shown file nor the beginning of one key", "see results/runs")
@@ -108,7 +108,7 @@ def _explain(options: argparse.Namespace) -> None:
 def _prune(options: argparse.Namespace) -> None:
     if not options.days >= 0.0:
         raise InputError(f"--days {options.days}", "must not be negative", "0 removes all that nothing shows")
-    store = workplace().store
+    store = open_workplace().store
     inventory = upkeep.inventory(store, whole=True)
     chosen = upkeep.prunable(store, inventory, options.days * upkeep.DAY)
     broken = [a for a in inventory.artifacts if store.fault(a.record) is not None]

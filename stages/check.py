@@ -139,7 +139,7 @@ def _recipe(path: Path) -> None:
     if s1_mesh.kind_of(path) == "beam":
         from flexclear.pipeline.structure.fe import mesh
 
-        mesh.build(table, place=str(path))
+        mesh.build(table, where=str(path))
 
 
 def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
@@ -189,7 +189,7 @@ def _undeformed(recipe: Path) -> xr.Dataset:
     from flexclear.pipeline.structure.fe.recipe import read_recipe
     from flexclear.pipeline.structure.modes import rigid
 
-    return rigid.build(mesh.build(read_recipe(recipe), place=str(recipe)))
+    return rigid.build(mesh.build(read_recipe(recipe), where=str(recipe)))
 
 
 def _collect(checks: Iterable[Callable[[], Any]], path: Path | None = None) -> list[FlexclearError]:

@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.ideal import EFFECTS, ideal, loose
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check, workplace
+from flexclear.stages.workplace import Workplace, check, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,9 +48,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring the comparison up to date, print its tables and say where it is."""
-    place = workplace(options)
+    workplace = open_workplace(options)
     scenes = [graph.scene for graph in run.graphs(options.scenes, options.set)]
-    comparison = bring(scenes, place, options.ideal)
+    comparison = bring(scenes, workplace, options.ideal)
     print(*(comparison.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")
     run.print_files(
         comparison.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"}
@@ -63,23 +63,23 @@ class Comparison:
 
     task: Task
     record: Record
-    place: Workplace
+    workplace: Workplace
 
     @property
     def folder(self) -> Path:
         """Where its files are shown."""
-        return self.place.store.root / self.task.folder
+        return self.workplace.store.root / self.task.folder
 
     def dataset(self) -> xr.Dataset:
         """All series, differences, errors, events and costs."""
-        return self.place.store.load(self.record)
+        return self.workplace.store.load(self.record)
 
     def file(self, name: str) -> Path:
         """One of its files, in the store."""
-        return self.place.store.path(self.task.stage, self.record.key, name)
+        return self.workplace.store.path(self.task.stage, self.record.key, name)
 
 
-def bring(scenes: list[Scene], place: Workplace, without: str | None = None) -> Comparison:
+def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None) -> Comparison:
     """Runs of the scenes, of their ideal twins, and of all at tighter tolerances, compared; and the page of it.
 
     without: one of IDEAL, or None for the scenes alone.  Raises InputError for what cannot be compared.
@@ -92,16 +92,16 @@ def bring(scenes: list[Scene], place: Workplace, without: str | None = None) -> 
             "name several, or compare it with its ideal twin: --ideal",
         )
     graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(_labels(sides), sides, strict=True)}
-    check(place.bring([graph.simulate for graph in graphs.values()]))
+    check(workplace.bring([graph.simulate for graph in graphs.values()]))
     # their kernels are there now, so that these do not compile side by side what the first ones did
     tight = {label: graph.tight for label, graph in graphs.items() if graph.has_tighter}
-    outcome = place.bring(list(tight.values()))
+    outcome = workplace.bring(list(tight.values()))
     for failure in outcome.failures:
-        place.monitor.say(f"no error can be told: {failure.message}")
+        workplace.monitor.say(f"no error can be told: {failure.message}")
     task = _task(graphs, {label: task for label, task in tight.items() if id(task) in outcome.records})
-    done = place.bring([task])
+    done = workplace.bring([task])
     check(done)
-    comparison = Comparison(task, done.records[id(task)], place)
+    comparison = Comparison(task, done.records[id(task)], workplace)
     publish(comparison.folder / "index.html", page(comparison, ", ".join(graphs)))
     return comparison
 

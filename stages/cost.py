@@ -14,7 +14,7 @@ from flexclear.stages import as_json, cost_design, cost_peers, kernels, run, s4_
 from flexclear.stages.cost_peers import Track
 from flexclear.stages.graph import Graph
 from flexclear.stages.run import Workplace, bundles, check
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,18 +50,18 @@ def command(options: argparse.Namespace) -> None:
     if options.page is not None:
         run.check_target(options.page, "--page")
     peers = {} if options.peer is None else cost_peers.read(options.peer)
-    place, studies = workplace(options), {}
+    workplace, studies = open_workplace(options), {}
     for graph in run.graphs(options.scenes, options.set):
         scene, others = graph.scene, peers.get(graph.scene.name, ())
         if not options.integrators and not options.json:
             # the points of the scene's own method come first: a table within a minute, of which the whole study is more
-            _, folder = bring(scene, place, others, [scene.solver.integrator])
+            _, folder = bring(scene, workplace, others, [scene.solver.integrator])
             print(
                 (folder / PRINTED[0]).read_text(encoding="utf-8"),
                 f"so far {scene.solver.integrator} alone; going on\n",
                 sep="\n",
             )
-        studies[scene.name] = _, folder = bring(scene, place, others, options.integrators)
+        studies[scene.name] = _, folder = bring(scene, workplace, others, options.integrators)
         if not options.json:
             print(
                 *((folder / name).read_text(encoding="utf-8") for name in PRINTED if (folder / name).is_file()),
@@ -76,14 +76,14 @@ def command(options: argparse.Namespace) -> None:
         write_page(studies, options.page, said)
 
 
-def study(scene: Scene, place: Workplace, peers: Sequence[Track] = (), integrators: Collection[str] = ()) -> Task:
+def study(scene: Scene, workplace: Workplace, peers: Sequence[Track] = (), integrators: Collection[str] = ()) -> Task:
     """The task of a scene's study; its points are its inputs, so that an interrupted study goes on where it was.
 
     peers: runs of other programs, see `stages.cost_peers`.  integrators: see `cost_design.runs`.
     Raises InputError when the scene has nothing to measure.
     """
     chosen = scene.requested()
-    designs = cost_design.runs(scene, _highest(scene, place), integrators)
+    designs = cost_design.runs(scene, _highest(scene, workplace), integrators)
     names = [quantity.name for quantity in chosen]
     compiled, more = _kernels(designs), {"quantities": names}
     points = {f"point{k}": _measured(design, "run", more, compiled) for k, design in enumerate(designs)}
@@ -108,13 +108,13 @@ def study(scene: Scene, place: Workplace, peers: Sequence[Track] = (), integrato
 
 
 def bring(
-    scene: Scene, place: Workplace, peers: Sequence[Track] = (), integrators: Collection[str] = ()
+    scene: Scene, workplace: Workplace, peers: Sequence[Track] = (), integrators: Collection[str] = ()
 ) -> tuple[xr.Dataset, Path]:
     """The study's dataset, brought up to date, and the folder with its tables and figures; arguments as of `study`."""
-    task = study(scene, place, peers, integrators)
-    outcome = place.bring([task])
+    task = study(scene, workplace, peers, integrators)
+    outcome = workplace.bring([task])
     check(outcome)
-    return place.store.load(outcome.records[id(task)]), place.store.root / task.folder
+    return workplace.store.load(outcome.records[id(task)]), workplace.store.root / task.folder
 
 
 def figures_and_tables(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:
@@ -149,9 +149,9 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, optio
         publish(page, markdown(tuple(sections), f"{page.as_posix()}{options}").encode())
 
 
-def _highest(scene: Scene, place: Workplace) -> float | None:
+def _highest(scene: Scene, workplace: Workplace) -> float | None:
     """The highest frequency in the scene's bundles [Hz]; they are made first."""
-    reduced = bundles(scene, place, jobs=None)
+    reduced = bundles(scene, workplace, jobs=None)
     return max((float(bundle["frequency"].max()) for bundle in reduced.values()), default=None)
 
 

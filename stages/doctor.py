@@ -17,7 +17,7 @@ from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
 from flexclear.stages import bundle
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 
 LIBRARIES = (
     "numpy",
@@ -105,7 +105,7 @@ def command(options: argparse.Namespace) -> None:
             raise UnwellError("it does not end here as it did there")
         return
     if options.compile is not None:
-        names = import_module("flexclear.stages.ahead").compiled(options.compile, workplace())
+        names = import_module("flexclear.stages.ahead").compiled(options.compile, open_workplace())
         print(f"compiled: all that runs of {', '.join(names)} call; {_kernels()[0]}")
         return
     wrong = []

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.units import quantity
 from flexclear.stages import as_json, run
-from flexclear.stages.workplace import common_arguments, workplace
+from flexclear.stages.workplace import common_arguments, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,7 +34,7 @@ def command(options: argparse.Namespace) -> None:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
-    modes = run.linear(graph.scene, time, moving=options.moving, place=workplace(options))
+    modes = run.linear(graph.scene, time, moving=options.moving, workplace=open_workplace(options))
     print(as_json.as_json(modes) if options.json else text(modes).rstrip("\n"))
 
 

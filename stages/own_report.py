@@ -57,7 +57,7 @@ PROVENANCE = {
 }
 
 
-def make(graph: Graph, place: Workplace, *, folder: bool = False) -> Path:
+def make(graph: Graph, workplace: Workplace, *, folder: bool = False) -> Path:
     """Bring everything that the report of a scene shows up to date; returns the page.
 
     One file with all inside; or with `folder` a folder with the page and its pictures as files.  Without GL libraries
@@ -67,16 +67,16 @@ def make(graph: Graph, place: Workplace, *, folder: bool = False) -> Path:
     compared = None
     if loose(scene) or scene.flexible():
         with in_file(scene.path):
-            compared = compare.bring([scene], place, "both")
+            compared = compare.bring([scene], workplace, "both")
     drawn = graph.render
-    outcome = place.bring([graph.overview, *drawn.values()])
+    outcome = workplace.bring([graph.overview, *drawn.values()])
     if any(failure.task not in drawn.values() for failure in outcome.failures):
         check(outcome)
     for failure in outcome.failures:
-        place.monitor.say(f"not in the report: {failure.message}")
-    run = place.store.load(outcome.records[id(graph.simulate)]) if id(graph.simulate) in outcome.records else None
-    text = _page(graph, place, outcome.records, compared, run)
-    return publish_page(place.store.root / f"runs/{scene.name}", "report", text, folder=folder)
+        workplace.monitor.say(f"not in the report: {failure.message}")
+    run = workplace.store.load(outcome.records[id(graph.simulate)]) if id(graph.simulate) in outcome.records else None
+    text = _page(graph, workplace, outcome.records, compared, run)
+    return publish_page(workplace.store.root / f"runs/{scene.name}", "report", text, folder=folder)
 
 
 def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
@@ -93,7 +93,7 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
 
 def _page(
     graph: Graph,
-    place: Workplace,
+    workplace: Workplace,
     records: Mapping[int, Record],
     compared: compare.Comparison | None,
     run: xr.Dataset | None,
@@ -107,8 +107,8 @@ def _page(
     doubts = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
     assumptions = by_weight(assumed(s5_post.sources(scene)), run)
     parts: list[Any] = [
-        Part("film", "The mechanism moving", _moving(graph, place, records)),
-        Part("run", "The run", _media(place, graph.overview, records, FIGURES)),
+        Part("film", "The mechanism moving", _moving(graph, workplace, records)),
+        Part("run", "The run", _media(workplace, graph.overview, records, FIGURES)),
         *(compare.parts(compared) if compared is not None else []),
         Part("doubts", "Warnings", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("no.", "warning"))),
         Part("assumptions", "Assumptions, the most influential first", listed(assumptions, ("value", "assumption"))),
@@ -119,7 +119,7 @@ def _page(
         ),
         Part("cost", "Computing cost", listed(_rows(attributes, COST), ("figure", "value"))),
         Part("stability", "Stability and constraints", listed(_stability(run), ("figure", "value"))),
-        Part("provenance", "Provenance", listed(_provenance(graph, place, records), ("item", "value"))),
+        Part("provenance", "Provenance", listed(_provenance(graph, workplace, records), ("item", "value"))),
         Part("downloads", "Downloads", downloads(_files(graph, compared))),
     ]
     dataset = None if compared is None else compared.dataset()
@@ -158,11 +158,11 @@ def _stability(run: xr.Dataset | None) -> dict[str, str]:
     return rows
 
 
-def _provenance(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> dict[str, str]:
+def _provenance(graph: Graph, workplace: Workplace, records: Mapping[int, Record]) -> dict[str, str]:
     rows = {"command": f"`flexclear report {graph.scene.path.name if graph.scene.path else graph.scene.name}`"}
     record = records.get(id(graph.simulate))
     if record is not None:
-        rows |= _rows(place.store.load(record).attrs, PROVENANCE)
+        rows |= _rows(workplace.store.load(record).attrs, PROVENANCE)
         rows["digest of the run"] = record.digest
     rows["sources of methods and data"] = f"`flexclear cite {graph.scene.name}`"
     return rows
@@ -182,7 +182,7 @@ def _files(graph: Graph, compared: compare.Comparison | None) -> dict[str, bytes
     return files
 
 
-def _moving(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> str:
+def _moving(graph: Graph, workplace: Workplace, records: Mapping[int, Record]) -> str:
     """The film, and the views that can be turned."""
     from flexclear.pipeline.post.pages import figures_of
 
@@ -193,21 +193,23 @@ def _moving(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> st
             continue
         if what.endswith("html"):
             for name in sorted(record.files):
-                text += figures_of(place.store.path(task.stage, record.key, name).read_text(encoding="utf-8"))
+                text += figures_of(workplace.store.path(task.stage, record.key, name).read_text(encoding="utf-8"))
         elif what == "motion mp4":
             names = {name: ("The mechanism moving", f"Film of {graph.scene.title}") for name in record.files}
-            text = _media(place, task, records, names) + text
+            text = _media(workplace, task, records, names) + text
     return text
 
 
-def _media(place: Workplace, task: Task, records: Mapping[int, Record], captions: Mapping[str, tuple[str, str]]) -> str:
+def _media(
+    workplace: Workplace, task: Task, records: Mapping[int, Record], captions: Mapping[str, tuple[str, str]]
+) -> str:
     from flexclear.pipeline.post.overview.page import media
 
     record = records.get(id(task))
     if record is None:
         return ""
     return "".join(
-        media(name, place.store.path(task.stage, record.key, name).read_bytes(), text, alt)
+        media(name, workplace.store.path(task.stage, record.key, name).read_bytes(), text, alt)
         for name, (text, alt) in captions.items()
         if name in record.files
     )

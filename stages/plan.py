@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run, s4_watched, s8_plan
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check, workplace
+from flexclear.stages.workplace import Workplace, check, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -41,23 +41,23 @@ def command(options: argparse.Namespace) -> None:
         if len(options.scenes) > 1:
             raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "plan the scenes one by one")
         run.check_target(options.out)
-    place = workplace(options)
+    workplace = open_workplace(options)
     missed = list[str]()
     for graph in run.graphs(options.scenes, options.set):
-        planned = bring(graph.scene, place)
+        planned = bring(graph.scene, workplace)
         print(planned.text())
         if options.out is not None:
             publish(options.out, planned.file(options.out))
         if options.verify:
-            missed += verify(planned, place)
+            missed += verify(planned, workplace)
         planned.tell()
     if missed:
         raise run.MissedAccuracyError("\n".join(missed))
 
 
-def planned_scenes(requested: list[Graph], place: Workplace) -> list[Planned]:
+def planned_scenes(requested: list[Graph], workplace: Workplace) -> list[Planned]:
     """The plans of scenes, brought up to date and printed."""
-    plans = [bring(graph.scene, place) for graph in requested]
+    plans = [bring(graph.scene, workplace) for graph in requested]
     print(*(plan.text() for plan in plans), sep="\n")
     return plans
 
@@ -70,12 +70,12 @@ class Planned:
     planned: Scene
     task: Task
     record: Record
-    place: Workplace
+    workplace: Workplace
 
     @property
     def folder(self) -> Path:
         """Where its files are shown."""
-        return self.place.store.root / self.task.folder
+        return self.workplace.store.root / self.task.folder
 
     @property
     def target(self) -> Path:
@@ -84,15 +84,15 @@ class Planned:
 
     def dataset(self) -> xr.Dataset:
         """Influences, decisions and evidence (`pipeline.post.plan.dataset`)."""
-        return self.place.store.load(self.record)
+        return self.workplace.store.load(self.record)
 
-    def kept(self, name: str) -> Path:
+    def stored(self, name: str) -> Path:
         """One of its files, in the store."""
-        return self.place.store.path(self.task.stage, self.record.key, name)
+        return self.workplace.store.path(self.task.stage, self.record.key, name)
 
     def text(self) -> str:
         """The table of decisions."""
-        return self.kept("plan.md").read_text(encoding="utf-8")
+        return self.stored("plan.md").read_text(encoding="utf-8")
 
     def file(self, target: Path) -> bytes:
         """The planned scene's file as it stands at a place; it extends the full scene's."""
@@ -103,7 +103,7 @@ class Planned:
 
     def missed(self) -> list[str]:
         """Verify the plan; see `verify`."""
-        return verify(self, self.place)
+        return verify(self, self.workplace)
 
     def tell(self) -> None:
         """One line on what was written where."""
@@ -118,7 +118,7 @@ def _example(scene: Scene) -> str:
     return f'{body}.position = "10 um"'
 
 
-def bring(scene: Scene, place: Workplace) -> Planned:
+def bring(scene: Scene, workplace: Workplace) -> Planned:
     """The plan of a scene, brought up to date; the planned scene's file and the page beside it.
 
     Raises InputError for a scene without `[accuracy]` or effects, or whose accuracy nothing meets or everything does,
@@ -136,10 +136,10 @@ def bring(scene: Scene, place: Workplace) -> Planned:
             where, "has no effect that could be left out: no clearance, flexible body, friction, gravity or stop"
         )
     task = s8_plan.task(scene)
-    outcome = place.bring([task])
+    outcome = workplace.bring([task])
     check(outcome)
     record = outcome.records[id(task)]
-    planned = Planned(scene, of(scene, place.store.load(record)), task, record, place)
+    planned = Planned(scene, of(scene, workplace.store.load(record)), task, record, workplace)
     if scene.path is not None:
         publish(planned.target, planned.file(planned.target))
         publish(planned.folder / "index.html", page(planned))
@@ -188,7 +188,7 @@ def page(planned: Planned) -> bytes:
     from flexclear.pipeline.post.plan import words
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
-    picture = media("plan.png", planned.kept("plan.png").read_bytes(), "Estimated influence of each effect, at most")
+    picture = media("plan.png", planned.stored("plan.png").read_bytes(), "Estimated influence of each effect, at most")
     text = html.escape(planned.file(planned.target).decode())
     parts = [
         Part("chart", "Influences", picture),
@@ -198,12 +198,12 @@ def page(planned: Planned) -> bytes:
     return made(f"Plan: {planned.scene.title}", words(planned.dataset()), parts)
 
 
-def verify(planned: Planned, place: Workplace) -> list[str]:
+def verify(planned: Planned, workplace: Workplace) -> list[str]:
     """Run the full and the planned scene, print how far they are apart, and return what was missed, in words."""
     from flexclear.pipeline.post.plan import verified
     from flexclear.pipeline.post.plotting.table import as_markdown
 
-    compared = beside(planned, place)
+    compared = beside(planned, workplace)
     print(as_markdown(verified(compared)))
     requested = planned.scene.accuracy
     over = [
@@ -216,7 +216,7 @@ def verify(planned: Planned, place: Workplace) -> list[str]:
     return over if requested is None or not requested.allow_missed else []
 
 
-def beside(planned: Planned, place: Workplace) -> xr.Dataset:
+def beside(planned: Planned, workplace: Workplace) -> xr.Dataset:
     """Distance of the planned run from the full one by quantity, each over members where it has contacts."""
     from flexclear.pipeline.core import effect_size
     from flexclear.pipeline.core.errors import SolverError
@@ -227,10 +227,10 @@ def beside(planned: Planned, place: Workplace) -> xr.Dataset:
     chosen = [parse(name, planned.scene.owners()) for name in names]
     full = edited(planned.scene, {"accuracy": None})
     tasks = [s4_watched.task(scene, chosen, MEMBERS) for scene in (full, planned.planned)]
-    outcome = place.bring(tasks)
+    outcome = workplace.bring(tasks)
     check(outcome)
     one, two = (
-        s4_watched.point(place.store.load(outcome.records[id(task)]), scene, chosen)
+        s4_watched.point(workplace.store.load(outcome.records[id(task)]), scene, chosen)
         for task, scene in zip(tasks, (full, planned.planned), strict=True)
     )
     for point, what in ((one, "full"), (two, "planned")):

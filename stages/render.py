@@ -12,7 +12,7 @@ from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
 from flexclear.stages.s6_render import FORMATS
-from flexclear.stages.workplace import Workplace, check, near, workplace
+from flexclear.stages.workplace import Workplace, check, near, open_workplace
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
@@ -49,16 +49,16 @@ def command(options: argparse.Namespace) -> None:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
-    graphs, place = run.graphs(options.scenes, options.set), workplace(options)
+    graphs, workplace = run.graphs(options.scenes, options.set), open_workplace(options)
     tasks = {graph.scene.name: _tasks(graph, requested, options.what is not None, time) for graph in graphs}
     made = [task for group in tasks.values() for task in group]
     if len(graphs) > 1 and requested == [("modes", "html")]:
         made.append(_beside(graphs))
-    outcome = place.bring(made)
+    outcome = workplace.bring(made)
     for task in made:
         record = outcome.records.get(id(task))
         if record is not None:
-            _tell(place, task.folder, list(record.files))
+            _tell(workplace, task.folder, list(record.files))
     check(outcome)
 
 
@@ -98,15 +98,15 @@ def _beside(graphs: list[Graph]) -> Task:
     )
 
 
-def _tell(place: Workplace, folder: str, files: list[str]) -> None:
+def _tell(workplace: Workplace, folder: str, files: list[str]) -> None:
     shown = [name for name in sorted(files) if not name.endswith(".vtp")]
     rest = len(files) - len(shown)
-    print(f"{near(place.store.root / folder)}: {', '.join(shown)}{f' and {rest} files beside' if rest else ''}")
+    print(f"{near(workplace.store.root / folder)}: {', '.join(shown)}{f' and {rest} files beside' if rest else ''}")
 
 
-def rendered(scene: Scene, place: Workplace | None = None) -> Path:
+def rendered(scene: Scene, workplace: Workplace | None = None) -> Path:
     """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
-    place, requested = place or workplace(), Graph(scene)
+    workplace, requested = workplace or open_workplace(), Graph(scene)
     run.require_names(scene)
-    check(place.bring(list(requested.render.values()), jobs=1))
-    return place.store.root / requested.simulate.folder
+    check(workplace.bring(list(requested.render.values()), jobs=1))
+    return workplace.store.root / requested.simulate.folder

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 
 from flexclear.pipeline.post.render import gl
-from flexclear.stages.workplace import Workplace, check, common_arguments, near, workplace
+from flexclear.stages.workplace import Workplace, check, common_arguments, near, open_workplace
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -26,28 +26,28 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
-    place = workplace(options)
+    workplace = open_workplace(options)
     if not options.scenes:
-        print(near(make(place, folder=options.folder)))
+        print(near(make(workplace, folder=options.folder)))
         return
     from flexclear.stages import own_report, run
 
     for graph in run.graphs(options.scenes, options.set):
-        print(near(own_report.make(graph, place, folder=options.folder)))
+        print(near(own_report.make(graph, workplace, folder=options.folder)))
 
 
-def make(place: Workplace, *, folder: bool = False) -> Path:
+def make(workplace: Workplace, *, folder: bool = False) -> Path:
     """Bring everything that the report shows up to date; returns the page; with `folder` one with files beside it.
 
     What fails is left out of the page and raised (FailedTasksError) after the page is written.
     """
     from flexclear.stages import paper_report
 
-    outcome = paper_report.bring(place)
+    outcome = paper_report.bring(workplace)
     if gl.state().endswith("none"):
-        place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
+        workplace.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
     check(outcome)
-    target = place.store.root / "report" / "index.html"
+    target = workplace.store.root / "report" / "index.html"
     if not folder:
         return target
     from flexclear.stages.own_report import publish_page

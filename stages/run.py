@@ -24,7 +24,7 @@ from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages import export, owner
 from flexclear.stages.graph import STAGES, Graph
 from flexclear.stages.s5_post import origins
-from flexclear.stages.workplace import Workplace, check, common_arguments, near, workplace
+from flexclear.stages.workplace import Workplace, check, common_arguments, near, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -60,24 +60,24 @@ def command(options: argparse.Namespace) -> None:
     if options.verify and not options.planned:
         raise InputError("--verify", "tells the true error of a plan, and no plan is asked for", "add --planned")
     requested = graphs(options.scenes, options.set)
-    place = workplace(options)
-    plans = import_module("flexclear.stages.plan").planned_scenes(requested, place) if options.planned else []
+    workplace = open_workplace(options)
+    plans = import_module("flexclear.stages.plan").planned_scenes(requested, workplace) if options.planned else []
     requested = [Graph(plan.planned) for plan in plans] or requested
     for graph in requested:
-        check_run(graph.scene, place.store.root)
-        taken = owner.claim(graph.scene, place.store)
+        check_run(graph.scene, workplace.store.root)
+        taken = owner.claim(graph.scene, workplace.store)
         if taken is not None:
-            place.monitor.say(taken)
-    outcome = place.bring([task for graph in requested for task in graph.up_to(options.to)])
+            workplace.monitor.say(taken)
+    outcome = workplace.bring([task for graph in requested for task in graph.up_to(options.to)])
     check(outcome)
     if options.to == "bundle":
-        print("\n\n".join(filter(None, (deficits(graph, place, outcome) for graph in requested))))
+        print("\n\n".join(filter(None, (deficits(graph, workplace, outcome) for graph in requested))))
     if options.out is not None:
-        copy_run(requested[0], place, options.out)
+        copy_run(requested[0], workplace, options.out)
     for graph in requested if options.to in ("simulate", "ensemble", "post") else ():
-        print_files(place.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
+        print_files(workplace.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
     missed = [text for plan in plans if options.verify for text in plan.missed()]
-    conclude(requested, place, outcome, missed)
+    conclude(requested, workplace, outcome, missed)
 
 
 def scene_arguments(parser: argparse.ArgumentParser) -> None:
@@ -120,20 +120,20 @@ def _known(name: str) -> str:
     return suggestion(name, sorted(p.relative_to(scenes).with_suffix("").as_posix() for p in scenes.rglob("*.toml")))
 
 
-def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
+def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
     """Dataset of the simulate stage, brought up to date; titled and named as the scene is.
 
     An edited scene (`override`) is cached like any other but does not take the place of its file's
     results under results/runs.  Raises FlexclearError.
     """
     require_names(scene)
-    place = place or workplace()
+    workplace = workplace or open_workplace()
     import_module("flexclear.pipeline.core.artifacts.modal")  # gives the dataset its accessor
     task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: workers would run a caller's script again from its top
-    outcome = place.bring([task], jobs=1)
+    outcome = workplace.bring([task], jobs=1)
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(
+    return workplace.store.load(outcome.records[id(task)]).assign_attrs(
         title=scene.title, scene=scene.name, **origins(scene)
     )
 
@@ -181,27 +181,27 @@ def _of_another_run(folder: Path) -> bool:
     return post is not None and made is not None and post.facts.get("input run") != made.digest
 
 
-def bundles(scene: Scene, place: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:
+def bundles(scene: Scene, workplace: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:
     """The reduced flexible bodies of a scene by name, brought up to date.
 
     jobs: as of `Workplace.bring`; one is this process, since workers would run a caller's script again from its top.
     Raises FlexclearError.
     """
-    place, graph = place or workplace(), Graph(scene, shown=False)
-    outcome = place.bring(list(graph.bundle.values()), jobs)
+    workplace, graph = workplace or open_workplace(), Graph(scene, shown=False)
+    outcome = workplace.bring(list(graph.bundle.values()), jobs)
     check(outcome)
-    return _loaded(graph, place, outcome)
+    return _loaded(graph, workplace, outcome)
 
 
-def _loaded(graph: Graph, place: Workplace, outcome: Outcome) -> dict[str, xr.Dataset]:
-    return {body: place.store.load(outcome.records[id(task)]) for body, task in graph.bundle.items()}
+def _loaded(graph: Graph, workplace: Workplace, outcome: Outcome) -> dict[str, xr.Dataset]:
+    return {body: workplace.store.load(outcome.records[id(task)]) for body, task in graph.bundle.items()}
 
 
-def deficits(graph: Graph, place: Workplace, outcome: Outcome) -> str:
+def deficits(graph: Graph, workplace: Workplace, outcome: Outcome) -> str:
     """What the scene's bundles lack, one table for each flexible body."""
     from flexclear.pipeline.core.artifacts.deficits import table
 
-    reduced = _loaded(graph, place, outcome)
+    reduced = _loaded(graph, workplace, outcome)
     return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
 
 
@@ -212,22 +212,22 @@ def linear(
     *,
     moving: bool = False,
     vibrations: bool = True,
-    place: Workplace | None = None,
+    workplace: Workplace | None = None,
 ) -> xr.Dataset:
     """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is."""
     if time is not None and not scene.time.start <= time <= scene.time.end:
         raise InputError(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
         )
-    place = place or workplace()
+    workplace = workplace or open_workplace()
     graph = Graph(scene, shown=as_in_its_file(scene))
     task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
-    outcome = place.bring([task])
+    outcome = workplace.bring([task])
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
+    return workplace.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
 
 
-def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
+def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
     """Tell what the scenes' runs are to be doubted for, as the last thing that a command says.
 
     Raises MissedAccuracyError, after that, for runs that are not as accurate as asked, and for what `plans` miss.
@@ -238,12 +238,12 @@ def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome, plans:
         if record is None:
             continue
         for sentence in filter(None, record.said.get("warnings", "").split("\n")):
-            place.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
+            workplace.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
         verdict, requested = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
         if verdict != "met" and requested is not None:
             text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is kept"
             if requested.allow_missed:
-                place.monitor.say(text)
+                workplace.monitor.say(text)
             else:
                 missed.append(f"{text}\n  hint: ask for less, or write allow_missed = true in [accuracy]")
     if missed:
@@ -336,22 +336,22 @@ def recipe_frames(mesh: str) -> list[str] | None:
     return list(frames) if isinstance(frames, dict) else None
 
 
-def copy_run(graph: Graph, place: Workplace, target: Path) -> None:
+def copy_run(graph: Graph, workplace: Workplace, target: Path) -> None:
     """Write the dataset of the run to a file of the user's, titled, and atomically like any other."""
-    dataset = run(graph.scene, place)
+    dataset = run(graph.scene, workplace)
     with disk_limits(target.parent):
         export.write(dataset, target)
 
 
 def check_target(target: Path, option: str = "--out") -> None:
     """InputError when a file cannot be put there; asked before the work, not after it."""
-    place = f"{option} {target}"
+    where = f"{option} {target}"
     try:
         if not target.parent.is_dir():
-            raise InputError(place, "its folder does not exist", f"mkdir -p {target.parent}")
+            raise InputError(where, "its folder does not exist", f"mkdir -p {target.parent}")
         if target.is_dir():
-            raise InputError(place, "is a folder", "name a file in it")
+            raise InputError(where, "is a folder", "name a file in it")
         if target.exists() and not target.is_file():  # a new file would take the place of a device
-            raise InputError(place, "is no ordinary file", "name a file, and look at it when it is there")
+            raise InputError(where, "is no ordinary file", "name a file, and look at it when it is there")
     except OSError as error:
-        raise InputError(place, f"can be no file: {error.strerror}", "name another one") from None
+        raise InputError(where, f"can be no file: {error.strerror}", "name another one") from None

@@ -45,14 +45,14 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
     return {"recipe": provenance.without(table | changes)}
 
 
-def sources(recipe: Path, place: str = "") -> dict[str, str]:
+def sources(recipe: Path, where: str = "") -> dict[str, str]:
     """Where the values of a recipe come from: place of the part or value -> text; InputError for what is no text."""
     table = read_toml(recipe)
     wrong = provenance.mistaken(table)
     if wrong is not None:
         problem = "expected text, or a table of texts by key"
         raise InputError(f"{recipe} [{wrong}]", problem, 'write source = "Table 2"')
-    return provenance.sources(table, place)
+    return provenance.sources(table, where)
 
 
 def check_size(recipe: Path, limits: Limits, edits: Mapping[str, Any] | None = None) -> None:

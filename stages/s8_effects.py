@@ -68,8 +68,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     chosen = [Quantity(*pair) for pair in params["quantities"]]
     points = {}
     for k, gone in enumerate(params["variants"]):
-        kept = effect_size.kept(params["owners"][k], chosen)
-        points[frozenset(gone)] = unpacked(inputs[f"variant{k}"], kept)["point"]
+        recorded = effect_size.recorded(params["owners"][k], chosen)
+        points[frozenset(gone)] = unpacked(inputs[f"variant{k}"], recorded)["point"]
     progress(None, "comparing")
     dataset = effect_sizes.assemble(effects, chosen, points, params["members"], params["units"])
     title = f"What each effect does: {params['title']}"

@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
 from flexclear.stages import export, limit, run, sweep_large, sweep_plan
 from flexclear.stages.sweep_engine import Engine, Job, engine, now
-from flexclear.stages.workplace import Workplace, near, said_arguments, workplace
+from flexclear.stages.workplace import Workplace, near, open_workplace, said_arguments
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,15 +61,15 @@ def command(options: argparse.Namespace) -> None:
         else:
             export.check_format(options.out, (".nc", sweep_large.SUFFIX))
             run.check_target(options.out)
-    place = workplace(options)
+    workplace = open_workplace(options)
     paths = [run.find_scene(name) for name in options.sweeps]
     requested = [sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path)]]
     if options.out is not None and options.out.suffix != sweep_large.SUFFIX and sweep_large.is_large(requested[0]):
         raise InputError(f"--out {options.out}", "the dataset is larger than memory", "let its name end in .zarr")
-    with engine(width(options.workers), options.scheduler) as workers, place.limited():
+    with engine(width(options.workers), options.scheduler) as workers, workplace.limited():
         for path, plan in zip(paths, requested, strict=True):
-            folder = place.store.root / "sweeps" / scene_name(path).removeprefix("sweeps/")
-            _show(plan, bring(plan, workers, place, folder), folder, options.out)
+            folder = workplace.store.root / "sweeps" / scene_name(path).removeprefix("sweeps/")
+            _show(plan, bring(plan, workers, workplace, folder), folder, options.out)
 
 
 def width(asked: int | None) -> int:
@@ -98,7 +98,7 @@ def of_scene(
 
     plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, UNNAMED), scene, UNNAMED)
     with engine(width(workers), scheduler) as runner:
-        return bring(plan, runner, workplace())
+        return bring(plan, runner, open_workplace())
 
 
 @dataclass
@@ -106,7 +106,7 @@ class _Desk:
     """Where finished points arrive: they are stored now and then, and told."""
 
     plan: sweep_plan.Plan
-    place: Workplace
+    workplace: Workplace
     total: int
     done: dict[str, Point]
     waiting: list[tuple[Job, Point]] = field(default_factory=list)
@@ -138,11 +138,11 @@ class _Desk:
         for family in self.plan.families:
             mine = {job.key: point for job, point in self.waiting if job.family == family.key}
             if mine:
-                family.keep(mine, self.place.store, self.plan.kept)
+                family.keep(mine, self.workplace.store, self.plan.recorded)
         self.waiting = []
 
 
-def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path | None = None) -> xr.Dataset:
+def bring(plan: sweep_plan.Plan, workers: Engine, workplace: Workplace, folder: Path | None = None) -> xr.Dataset:
     """The dataset of a sweep, brought up to date point by point.
 
     folder: where dataset and figures are shown; on Ctrl-C it is left there with the points that are finished. A dataset
@@ -152,20 +152,22 @@ def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path
     large = folder is not None and sweep_large.is_large(plan)
     if folder is None:
         sweep_large.require_small(plan)
-    ready = sweep_plan.prepare(plan, place)
+    ready = sweep_plan.prepare(plan, workplace)
     with ExitStack() as locks:
         for family in ready.families:
             locks.enter_context(
-                place.store.lock(*family.folder, lambda: place.monitor.say("waiting for another sweep"))
+                workplace.store.lock(*family.folder, lambda: workplace.monitor.say("waiting for another sweep"))
             )
         if folder is not None:
-            shown = str(folder.relative_to(place.store.root))
-            place.store.show_families(shown, {family.folder[0]: family.facts for family in ready.families})
-        kept = () if large else plan.kept
-        points = {key: point for family in ready.families for key, point in family.find(place.store, kept).items()}
+            shown = str(folder.relative_to(workplace.store.root))
+            workplace.store.show_families(shown, {family.folder[0]: family.facts for family in ready.families})
+        recorded = () if large else plan.recorded
+        points = {
+            key: point for family in ready.families for key, point in family.find(workplace.store, recorded).items()
+        }
         requested = {job.key: job for job in ready.jobs}
         desk = _Desk(
-            ready, place, len(requested), {key: points[key] for key in requested if key in points}, large=large
+            ready, workplace, len(requested), {key: points[key] for key in requested if key in points}, large=large
         )
         missing = [job for key, job in requested.items() if key not in desk.done]
         try:
@@ -174,7 +176,7 @@ def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path
         finally:
             desk.store()
             if folder is not None and large:
-                result = sweep_large.written(ready, place.store, desk.done, folder / f"{NAME}{sweep_large.SUFFIX}")
+                result = sweep_large.written(ready, workplace.store, desk.done, folder / f"{NAME}{sweep_large.SUFFIX}")
                 (folder / f"{NAME}.nc").unlink(missing_ok=True)
             else:
                 result = ready.dataset(desk.done)
@@ -184,7 +186,7 @@ def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path
 
 
 def _run(desk: _Desk, workers: Engine, missing: list[Job]) -> None:
-    monitor = desk.place.monitor
+    monitor = desk.workplace.monitor
     monitor.start(1)
     sweep, scene = desk.plan.sweep, desk.plan.scene
     name = monitor.begin(scene.name if sweep.name == UNNAMED else sweep.name, "sweep")

@@ -188,34 +188,34 @@ def _here(*given: Any) -> Future[Any]:
 @contextmanager
 def _cluster(address: str) -> Iterator[Engine]:
     """The workers of a Dask scheduler; InputError when there are none, or they run other sources."""
-    place = f"--scheduler {address}"
+    where = f"--scheduler {address}"
     try:
         from distributed import Client, KilledWorker
         from distributed.client import FutureCancelledError
     except ImportError:
-        raise InputError(place, "dask.distributed is not installed", "pip install 'flexclear[cluster]'") from None
+        raise InputError(where, "dask.distributed is not installed", "pip install 'flexclear[cluster]'") from None
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
-            place, f"no scheduler answers there ({type(error).__name__})", "start one with `dask scheduler`"
+            where, f"no scheduler answers there ({type(error).__name__})", "start one with `dask scheduler`"
         ) from None
     try:
-        yield _on_cluster(client, place)
+        yield _on_cluster(client, where)
     except KilledWorker as error:
-        text = f"{place}: workers died again and again over a task ({error}); is their memory full?"
+        text = f"{where}: workers died again and again over a task ({error}); is their memory full?"
         raise ResourceError(text) from None
     except (CancelledError, FutureCancelledError):
-        raise ResourceError(f"{place}: the scheduler has gone; what was finished is kept") from None
+        raise ResourceError(f"{where}: the scheduler has gone; what was finished is kept") from None
     except ImportError as error:  # of a worker that has joined since
-        raise InputError(place, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
+        raise InputError(where, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
     finally:
         client.close()
 
 
-def _on_cluster(client: Any, place: str) -> Engine:
+def _on_cluster(client: Any, where: str) -> Engine:
     """The engine of a cluster; points that are lost with a worker are run by another one, as its scheduler sees to."""
-    executor, seen = client.get_executor(), [now(), _threads(client, place)]
+    executor, seen = client.get_executor(), [now(), _threads(client, where)]
     held: dict[str, Any] = {}
 
     def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
@@ -234,18 +234,18 @@ def _on_cluster(client: Any, place: str) -> Engine:
     return Engine(submit, width, here=False)
 
 
-def _threads(client: Any, place: str) -> int:
+def _threads(client: Any, where: str) -> int:
     """Tasks that the workers run at a time; InputError where there are none, or they run other sources."""
     threads = sum(client.nthreads().values())
     if not threads:
-        raise InputError(place, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
+        raise InputError(where, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
     digests = client.run(source_digest, on_error="return")
     for worker, digest in digests.items():
         if isinstance(digest, Exception):
-            raise InputError(place, f"worker {worker} cannot import flexclear: {digest}", "install it where it runs")
+            raise InputError(where, f"worker {worker} cannot import flexclear: {digest}", "install it where it runs")
     others = [worker for worker, digest in digests.items() if digest != source_digest()]
     if others:
-        raise InputError(place, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")
+        raise InputError(where, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")
     return int(threads)
 
 

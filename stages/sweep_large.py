@@ -32,10 +32,10 @@ SLAB, BATCHES = 1 << 26, 8
 INSTALL = "pip install 'flexclear[zarr]'"
 
 
-def require_zarr(place: str) -> None:
+def require_zarr(where: str) -> None:
     """InputError where the form cannot be written."""
     if find_spec("zarr") is None:
-        raise InputError(place, "Zarr is not installed", INSTALL)
+        raise InputError(where, "Zarr is not installed", INSTALL)
 
 
 def is_large(plan: Plan) -> bool:
@@ -59,7 +59,7 @@ def require_small(plan: Plan) -> None:
 def plan_size(plan: Plan) -> float:
     """Bytes of all that is kept."""
     lengths = dimensions(plan.time, plan.sections)
-    each = sum(prod(lengths[dim] for dim in one.dims) for one in plan.kept) * len(plan.statistics)
+    each = sum(prod(lengths[dim] for dim in one.dims) for one in plan.recorded) * len(plan.statistics)
     return 8.0 * each * prod(plan.design.shape)
 
 
@@ -95,7 +95,7 @@ def written(plan: Plan, store: Store, done: Mapping[str, Point], path: Path) -> 
 
 def _slabs(plan: Plan, store: Store, done: Mapping[str, Point]) -> Iterator[xr.Dataset]:
     places = dict(_places(plan, store))
-    opened = lru_cache(BATCHES)(lambda k: unpacked(store.load(records[k]), plan.kept))
+    opened = lru_cache(BATCHES)(lambda k: unpacked(store.load(records[k]), plan.recorded))
     records = {record.key: record for record in places.values()}
     complete = int(all(job.key in done for job in plan.jobs))
     count = plan.design.shape[0]

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.limits import check_members
 from flexclear.pipeline.core.scene.load import edited, with_numbers
-from flexclear.pipeline.core.scene.output_quantities import Kept, parse_kept
+from flexclear.pipeline.core.scene.output_quantities import Recorded, parse_recorded
 from flexclear.pipeline.core.scene.schema import Sections
 from flexclear.pipeline.core.workflow.task import Task, facts, key
 from flexclear.pipeline.core.workflow.workers import without_main
@@ -62,20 +62,20 @@ class Family:
         """Stage of its batches in the store, and a name there that no batch has."""
         return f"sweep/{self.key}", FAMILY
 
-    def keep(self, points: Mapping[str, Point], store: Store, kept: Sequence[Kept]) -> None:
+    def keep(self, points: Mapping[str, Point], store: Store, recorded: Sequence[Recorded]) -> None:
         """Store finished points as one artifact."""
         from flexclear.pipeline.core.artifacts.points import batch
 
         name = hashlib.sha256("".join(sorted(points)).encode()).hexdigest()[:32]
-        store.put(self.folder[0], name, {"nc": batch(points, kept)}, self.facts)
+        store.put(self.folder[0], name, {"nc": batch(points, recorded)}, self.facts)
 
-    def find(self, store: Store, kept: Sequence[Kept]) -> dict[str, Point]:
+    def find(self, store: Store, recorded: Sequence[Recorded]) -> dict[str, Point]:
         """All points of the family that are stored and sound, with their values of what is `kept`."""
         from flexclear.pipeline.core.artifacts.points import unpacked
 
         points: dict[str, Point] = {}
         for _, batch in self.batches(store):
-            points |= unpacked(batch, kept)
+            points |= unpacked(batch, recorded)
         return points
 
     def batches(self, store: Store) -> Iterator[tuple[Record, xr.Dataset]]:
@@ -97,7 +97,7 @@ class Plan:
     sweep: Sweep
     scene: Scene
     design: Design
-    kept: tuple[Kept, ...]
+    recorded: tuple[Recorded, ...]
     turning: frozenset[str]
     families: tuple[Family, ...] = ()
     jobs: tuple[Job, ...] = ()
@@ -112,7 +112,15 @@ class Plan:
         attributes |= {"members": self.sweep.members} if self.sweep.members else {}
         keys = [job.key for job in self.jobs]
         return results.dataset(
-            self.design, self.kept, keys, points, self.time, self.sections, self.turning, attributes, self.statistics
+            self.design,
+            self.recorded,
+            keys,
+            points,
+            self.time,
+            self.sections,
+            self.turning,
+            attributes,
+            self.statistics,
         )
 
     def rows(self, first: int, last: int) -> Plan:
@@ -155,14 +163,14 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     made = design(sweep)
     _check_values(base, made, where)
     base = edited(base, made.points()[0])
-    kept = tuple(_kept(base, name, where) for name in sweep.keep)
-    _check_kept(sweep, base, made, kept, where)
-    return Plan(sweep, base, made, kept, _turning(base, made, kept, where))
+    recorded = tuple(_kept(base, name, where) for name in sweep.keep)
+    _check_recorded(sweep, base, made, recorded, where)
+    return Plan(sweep, base, made, recorded, _turning(base, made, recorded, where))
 
 
-def _placed(place: str, error: InputError) -> InputError:
+def _placed(where: str, error: InputError) -> InputError:
     problem, remedy = getattr(error, "problem", str(error)), getattr(error, "remedy", None)
-    return InputError(place, problem, remedy)
+    return InputError(where, problem, remedy)
 
 
 def _check_values(base: Scene, made: Design, where: str) -> None:
@@ -203,17 +211,17 @@ def _looked_at(axis: Axis) -> Sequence[int]:
     return by_size[0], by_size[-1]
 
 
-def _kept(base: Scene, name: str, where: str) -> Kept:
+def _kept(base: Scene, name: str, where: str) -> Recorded:
     try:
-        return parse_kept(name, base.owners())
+        return parse_recorded(name, base.owners())
     except ValueError as error:
         raise InputError(f"{where} [keep]", str(error)) from None
 
 
-def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], where: str) -> None:
-    varied = {place for axis in made.axes for place in axis.places}
+def _check_recorded(sweep: Sweep, base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> None:
+    varied = {path for axis in made.axes for path in axis.places}
     timed = sorted(varied & set(TIMES))
-    for one in kept:
+    for one in recorded:
         if one.reduction == "series" and timed:
             raise InputError(
                 f"{where} [keep]",
@@ -226,7 +234,7 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
             raise InputError(
                 f"{where} [keep]", f"'{one.quantity.owner}' leads a frame along a path and has no single force"
             )
-    sections = [one.reduction == "sections" for one in kept]
+    sections = [one.reduction == "sections" for one in recorded]
     if any(sections) and not (all(sections) and not sweep.members and not sweep.error):
         raise InputError(
             f"{where} [keep]",
@@ -238,7 +246,7 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
         raise InputError(
             f"{where} [members]", "members differ by a ball's offset, but the scene has no clearance joint", "remove it"
         )
-    if sweep.members and any(one.quantity.kind == "orientation" for one in kept):
+    if sweep.members and any(one.quantity.kind == "orientation" for one in recorded):
         raise InputError(f"{where} [keep]", "orientations have no mean over members", "keep a position instead")
     if sweep.error and base.solver.step is not None:
         raise InputError(
@@ -246,13 +254,13 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
         )
 
 
-def _turning(base: Scene, made: Design, kept: Sequence[Kept], where: str) -> frozenset[str]:
+def _turning(base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> frozenset[str]:
     """Names of the quantities that are about an axis; InputError for one that is so at some of the points only."""
     from flexclear.pipeline.dynamics.model.driving import turns
 
-    turning = frozenset(one.quantity.name for one in kept if turns(base, one.quantity))
+    turning = frozenset(one.quantity.name for one in recorded if turns(base, one.quantity))
     for axis, scene in _worded(base, made):
-        for one in kept:
+        for one in recorded:
             if turns(scene, one.quantity) != (one.quantity.name in turning):
                 raise InputError(
                     f"{where} [vary.{axis.name}]",
@@ -272,19 +280,19 @@ def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
             yield axis, edited(base, chosen)
 
 
-def prepare(requested: Plan, place: Workplace) -> Plan:
+def prepare(requested: Plan, workplace: Workplace) -> Plan:
     """The plan with its families, whose flexible bodies are brought up to date first, and its points by key."""
     points = requested.design.points()
     groups = _groups(requested.scene, points)
     graphs = {text: Graph(edited(requested.scene, first), shown=False) for text, first in groups.items()}
     with without_main():
-        outcome = place.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
+        outcome = workplace.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
     check(outcome)
     modules = _modules(requested)
     families = {}
     for text, graph in graphs.items():
         records = {name: outcome.records[id(task)] for name, task in graph.simulate.inputs.items()}
-        sections = any(one.reduction == "sections" for one in requested.kept)
+        sections = any(one.reduction == "sections" for one in requested.recorded)
         simulate = s4_simulate.params(graph.scene, sections=sections)
         task = Task(
             stage="sweep",
@@ -292,16 +300,16 @@ def prepare(requested: Plan, place: Workplace) -> Plan:
             run="flexclear.stages.sweep_points:work",
             params={
                 "simulate": _without_varied(simulate, points[0], groups[text]),
-                "keep": [one.name for one in requested.kept],
+                "keep": [one.name for one in requested.recorded],
                 "members": requested.sweep.members or 0,
                 "error": requested.sweep.error,
             },
             folder="",
             modules=modules,
         )
-        given = facts(task, {name: record.digest for name, record in records.items()}, place.sources)
-        inputs = {name: place.store.load(record) for name, record in records.items()}
-        keep = tuple(one.name for one in requested.kept)
+        given = facts(task, {name: record.digest for name, record in records.items()}, workplace.sources)
+        inputs = {name: workplace.store.load(record) for name, record in records.items()}
+        keep = tuple(one.name for one in requested.recorded)
         limited = {**simulate, "limits": graph.scene.limits.written()}  # no facts, and a point may ask for more
         work = Work(key(given), limited, inputs, keep, requested.sweep.members or 0, requested.sweep.error)
         families[text] = Family(work, given)
@@ -312,14 +320,14 @@ def prepare(requested: Plan, place: Workplace) -> Plan:
         # what decides the bodies is in the family's scene, whose bodies are numbers by now
         rest = {name: value for name, value in point.items() if name not in own}
         name, (stage, _) = _point_key(family, point), families[text].folder
-        jobs.append(Job(name, family, rest, place.store.path(stage, name, "part").with_suffix("")))
+        jobs.append(Job(name, family, rest, workplace.store.path(stage, name, "part").with_suffix("")))
     return replace(requested, families=tuple(families.values()), jobs=tuple(jobs))
 
 
 def _group(scene: Scene, point: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     """Those values of a point that decide the bodies which recipes describe, and their text."""
     bodies = tuple(f"body.{name}." for name in scene.recipes())
-    mine = {place: value for place, value in point.items() if place.startswith(bodies)} if bodies else {}
+    mine = {where: value for where, value in point.items() if where.startswith(bodies)} if bodies else {}
     return json.dumps(mine, sort_keys=True, default=str), mine
 
 
@@ -341,11 +349,11 @@ def _without_varied(simulate: Mapping[str, Any], point: Mapping[str, Any], own: 
     own: values that are those of a whole family.
     """
     table = copy.deepcopy(dict(simulate))
-    for place in point:
-        node, keys = table["scene"], place.split(".")
+    for where in point:
+        node, keys = table["scene"], where.split(".")
         for name in keys[:-1]:
             node = node[int(name) if isinstance(node, list) else name]
-        if place not in own:
+        if where not in own:
             node[int(keys[-1]) if isinstance(node, list) else keys[-1]] = VARIED
     return table
 

@@ -45,14 +45,14 @@ def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
     """The scene of a family and what runs its points; kept by a worker, since it holds the compiled functions."""
     import pickle
 
-    from flexclear.pipeline.core.scene.output_quantities import parse_kept
+    from flexclear.pipeline.core.scene.output_quantities import parse_recorded
     from flexclear.pipeline.dynamics.record.point import Runner
     from flexclear.stages.s4_simulate import bundles, rebuild
 
     family: Family = pickle.loads(packed)
     scene = rebuild(family.simulate, family.inputs)
-    kept = [parse_kept(name, scene.owners()) for name in family.keep]
-    return scene, Runner(bundles(family.inputs), kept, family.members, family.error)
+    recorded = [parse_recorded(name, scene.owners()) for name in family.keep]
+    return scene, Runner(bundles(family.inputs), recorded, family.members, family.error)
 
 
 def work(
@@ -101,8 +101,8 @@ def _abreast(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]], 
         def one(k: int, alive: Progress) -> Point:
             if crews is None:
                 return _point(runner, scene, points[k], own[k], alive=alive)
-            with crews.place() as place:
-                return _point(runner, scene, points[k], own[k], place, alive)
+            with crews.place() as where:
+                return _point(runner, scene, points[k], own[k], where, alive)
 
         return side_by_side(one, len(points), lambda _: None, 1 if crews is None else crews.lanes)
 
@@ -112,7 +112,7 @@ def _point(
     scene: Scene,
     point: Mapping[str, Any],
     own: Path | None,
-    place: Place | None = None,
+    where: Place | None = None,
     alive: Progress = silent,
 ) -> Point:
     """A point; what it has done so far, also when it is done, is kept where it has a journal."""
@@ -124,10 +124,10 @@ def _point(
     except InputError as error:
         return Point({}, {}, {}, 0, str(error))
     if own is None:
-        return runner.run(edited, place, alive)
-    with journal.kept(own.parent, own.name) as kept:
-        result = runner.run(edited, place, alive)
-        kept.write()  # others of its batch may take long
+        return runner.run(edited, where, alive)
+    with journal.storage(own.parent, own.name) as storage:
+        result = runner.run(edited, where, alive)
+        storage.write()  # others of its batch may take long
         return result
 
 

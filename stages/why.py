@@ -9,7 +9,7 @@ from flexclear.pipeline.core.errors import shown
 from flexclear.pipeline.core.workflow.execute import states
 from flexclear.stages import as_json, run
 from flexclear.stages.graph import STAGES
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,9 +21,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print the state of every stage."""
-    place, reasons = workplace(options), dict[str, dict[str, list[str]]]()
+    workplace, reasons = open_workplace(options), dict[str, dict[str, list[str]]]()
     for graph in run.graphs(options.scenes, options.set):
-        stages = states(graph.up_to(options.to), place.store, place.sources)
+        stages = states(graph.up_to(options.to), workplace.store, workplace.sources)
         reasons[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
     print(as_json.as_json(reasons) if options.json else text(reasons))
 

@@ -82,7 +82,7 @@ class FailedTasksError(FlexclearError):
         self.exit_code = failures[0].exit_code
 
 
-def workplace(options: argparse.Namespace | None = None) -> Workplace:
+def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
     """The usual one, with results where `results_root` says.
 
     options: of a command, with `jobs`, its `limit` and how much is said.

@@ -64,10 +64,10 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 def _influences() -> list[Record]:
     from flexclear.stages import effects, run
-    from flexclear.stages.workplace import workplace
+    from flexclear.stages.workplace import open_workplace
 
     scene = edited(load_scene(run.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
-    found = effects.dataset(scene, workplace())
+    found = effects.dataset(scene, open_workplace())
     records = []
     for quantity in WATCHED:
         part = found.sel(quantity=quantity)

@@ -51,11 +51,11 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 def _measured(seed: int, number: int, folder: Path) -> Record:
     from flexclear.stages import plan, s8_plan
-    from flexclear.stages.workplace import check, workplace
+    from flexclear.stages.workplace import check, open_workplace
 
     made = drawn(seed, number, folder / "recipes")
     scene, told = made.scene, dict(made.told)
-    place = workplace()
+    place = open_workplace()
     try:
         task = s8_plan.task(scene)
         outcome = place.bring(list(task.inputs.values()), 1)

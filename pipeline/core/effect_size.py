@@ -22,7 +22,7 @@ from scipy.special import stdtrit
 
 from flexclear.pipeline.core.algebra import rotation_between
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.output_quantities import Kept, parse_kept
+from flexclear.pipeline.core.scene.output_quantities import Recorded, parse_recorded
 from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 
@@ -78,13 +78,13 @@ def members_apart(scene: Scene) -> Scene:
     return changed
 
 
-def kept(owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) -> list[Kept]:
+def recorded(owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
     """What is kept of a run to compare it by; quantities that its scene does not have are left out.
 
     owners: of the scene, by what they are.
     """
     there = [q for q in chosen if q.owner in owners[KINDS[q.kind].owner]]
-    return [parse_kept(f"{q.name}.{r}", owners) for q in there for r in OF_KIND.get(q.kind, OTHERS)]
+    return [parse_recorded(f"{q.name}.{r}", owners) for q in there for r in OF_KIND.get(q.kind, OTHERS)]
 
 
 def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:

@@ -206,7 +206,7 @@ def free_space(folder: Path) -> int:
     return shutil.disk_usage(folder).free
 
 
-def others_can_write(place: Path, *, inside: bool) -> bool:
+def others_can_write(folder: Path, *, inside: bool) -> bool:
     """Whether anybody but this user and the system's can write to a folder, or it is not theirs.
 
     inside: whether what lies in it counts, not only its replacement.  Where folders belong to nobody by number
@@ -214,7 +214,7 @@ def others_can_write(place: Path, *, inside: bool) -> bool:
     """
     if not hasattr(os, "geteuid"):
         return False
-    status = place.stat()
+    status = folder.stat()
     open_to_all = bool(status.st_mode & stat.S_IWOTH) and not (status.st_mode & stat.S_ISVTX and not inside)
     return open_to_all or bool(inside and status.st_mode & stat.S_IWGRP) or status.st_uid not in (0, os.geteuid())
 

@@ -166,10 +166,10 @@ class Rewrites(untyped.GenericRewrites):
         for kind in rewrite_registry.rewrites["before-inference"]:
             rewrite, left = kind(state), list(blocks)
             while left:
-                place = left.pop()
-                if rewrite.match(state.func_ir, blocks[place], state.typemap, state.calltypes):
-                    blocks[place] = rewrite.apply()
-                    left.append(place)
+                block = left.pop()
+                if rewrite.match(state.func_ir, blocks[block], state.typemap, state.calltypes):
+                    blocks[block] = rewrite.apply()
+                    left.append(block)
         return True
 
 

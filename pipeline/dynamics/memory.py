@@ -90,12 +90,12 @@ def layout(declared: str) -> Any:
 
 
 def _table(array: str, declared: str, access: Callable[[int, int, int], Any]) -> Any:
-    (place,), fields = _places(1), _fields(declared)
+    (index,), fields = _places(1), _fields(declared)
     begins = _begins(fields)
     size = begins.pop("size")
     make: Any = namedtuple
     kind = make("Table", ["place", "size", "row", *fields])
-    table = kind(place, size, row_reader(place, size), *(access(place, size, begin) for begin in begins.values()))
+    table = kind(index, size, row_reader(index, size), *(access(index, size, begin) for begin in begins.values()))
     TABLES[array].append(table)
     number = np.int64 if array == "h" else np.float64
     _ROWS[kind] = np.dtype([(name, number, shape) for name, shape in fields.items()])
@@ -109,12 +109,12 @@ def wiring(declared: str) -> Any:
 
 def numbers(declared: str) -> Any:
     """A table in f: its `place` in the header, `size` and `row(h, i)` of its rows, and where each field begins."""
-    return _table("f", declared, lambda place, size, begin: begin)
+    return _table("f", declared, lambda path, size, begin: begin)
 
 
 def work(declared: str) -> Any:
     """A table in w, otherwise like `numbers`."""
-    return _table("w", declared, lambda place, size, begin: begin)
+    return _table("w", declared, lambda path, size, begin: begin)
 
 
 def named(rows: Any, entries: np.ndarray) -> np.ndarray:

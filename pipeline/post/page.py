@@ -82,9 +82,9 @@ def _answer(content: Content) -> str:
     lines = [f"<li>Of {len(said)} statements of the paper, judged by rules: {counts}.</li>"]
     for row in table.rows:
         if row[verdict] in BAD:
-            place, text, word, numbers = row
+            section, text, word, numbers = row
             lines.append(
-                f"<li><i>{html.escape(text)}</i> ({html.escape(place)}): {_word(word)}; {html.escape(numbers)}.</li>"
+                f"<li><i>{html.escape(text)}</i> ({html.escape(section)}): {_word(word)}; {html.escape(numbers)}.</li>"
             )
     where = "<a href='#verdicts'>All verdicts</a>, <a href='#tables'>tables beside the paper's</a>"
     return f"<ul>{''.join(lines)}</ul><p>{where}.</p>"

@@ -156,14 +156,14 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
 
 def words(planned: xr.Dataset) -> str:
     """The plan in a sentence or two, for a designer."""
-    kept = [str(w) for w, k in zip(planned["words"].values, planned["kept"].values, strict=True) if k]
+    remaining = [str(w) for w, k in zip(planned["words"].values, planned["kept"].values, strict=True) if k]
     gone = [str(w) for w, k in zip(planned["words"].values, planned["kept"].values, strict=True) if not k]
     asked = " and ".join(str(name) for name in planned["quantity"].values)
-    if not kept:
+    if not remaining:
         return f"For {asked} as wanted nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
     if not gone:
-        return f"For {asked} as wanted all effects are needed: {listed(kept)}."
-    return f"For {asked} as wanted {listed(kept)} must be kept; {listed(gone)} may be left out."
+        return f"For {asked} as wanted all effects are needed: {listed(remaining)}."
+    return f"For {asked} as wanted {listed(remaining)} must be kept; {listed(gone)} may be left out."
 
 
 def listed(names: list[str]) -> str:

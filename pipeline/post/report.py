@@ -90,11 +90,11 @@ def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[s
     """Each assumption once, with the scenes that make it; places in alphabetical order."""
     scenes: dict[tuple[str, str], list[str]] = {}
     for scene, facts in attributes.items():
-        for place, text in json.loads(str(facts.get("assumptions", "{}"))).items():
-            scenes.setdefault((place, text), []).append(scene)
+        for where, text in json.loads(str(facts.get("assumptions", "{}"))).items():
+            scenes.setdefault((where, text), []).append(scene)
     result: dict[str, tuple[str, tuple[str, ...]]] = {}
-    for (place, text), names in sorted(scenes.items()):
-        key = place if place not in result else f"{place} ({', '.join(names)})"
+    for (where, text), names in sorted(scenes.items()):
+        key = where if where not in result else f"{where} ({', '.join(names)})"
         result[key] = (text, tuple(names))
     return result
 
@@ -138,19 +138,19 @@ def assumption_rows(content: Content) -> list[tuple[str, str, str]]:
     """
     total = len(content.facts)
     grouped: dict[tuple[str, str], list[str]] = {}
-    for place, (text, scenes) in sorted(content.assumptions.items(), key=lambda item: weight(item[0])):
+    for path, (text, scenes) in sorted(content.assumptions.items(), key=lambda item: weight(item[0])):
         where = "all" if len(scenes) == total else ", ".join(scene.partition("/")[2] or scene for scene in scenes)
-        grouped.setdefault((text.removeprefix("assumed:").strip(), where), []).append(place.partition(" (")[0])
-    return [(", ".join(f"`{place}`" for place in places), text, where) for (text, where), places in grouped.items()]
+        grouped.setdefault((text.removeprefix("assumed:").strip(), where), []).append(path.partition(" (")[0])
+    return [(", ".join(f"`{path}`" for path in places), text, where) for (text, where), places in grouped.items()]
 
 
 #: parts on whose values most hangs in these scenes: the joint with clearance, the flexible rod, the layout
 WEIGHTY = ("joint.A1", "body.rod1", "body.ground", "body.platform", "drive", "joint", "body")
 
 
-def weight(place: str) -> int:
+def weight(where: str) -> int:
     """The rank of a value among the assumptions; small ones come first."""
-    known = [k for k, start in enumerate(WEIGHTY) if place == start or place.startswith(f"{start}.")]
+    known = [k for k, start in enumerate(WEIGHTY) if where == start or where.startswith(f"{start}.")]
     return known[0] if known else len(WEIGHTY)
 
 

@@ -147,8 +147,8 @@ def _curve(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
 
 
 def _refusals_and_scale(ax: Axes, sweep: xr.Dataset, x: np.ndarray) -> None:
-    for place in x[sweep["status"].values == 1]:
-        ax.axvline(place, color=REFUSED, lw=0.8, ls=":")
+    for value in x[sweep["status"].values == 1]:
+        ax.axvline(value, color=REFUSED, lw=0.8, ls=":")
     if x.min() > 0.0 and x.max() > DECADE * x.min():
         ax.set_xscale("log")
         plain(ax.xaxis)

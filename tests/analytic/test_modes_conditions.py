@@ -158,7 +158,7 @@ def test_modes_up_to_a_share_of_the_mass(rod: xr.Dataset) -> None:
 
 def test_a_mechanism_is_told_from_a_body(body: Flexibility) -> None:
     """A hinge: the stiffness of a chain whose middle node is cut in two that share their place only."""
-    middle = body.model.place[:, 0] < 0.11
+    middle = body.model.position[:, 0] < 0.11
     cut = sp.diags_array(middle.astype(float)) @ body.model.stiffness @ sp.diags_array(middle.astype(float))
     rest = sp.diags_array((~middle).astype(float)) @ body.model.stiffness @ sp.diags_array((~middle).astype(float))
     with pytest.raises(InputError, match="beyond its six rigid motions"):

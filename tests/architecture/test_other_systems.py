@@ -159,8 +159,8 @@ def test_a_flexible_body_is_made_without_links(without_links: Path) -> None:
 def test_a_checkout_without_links_has_the_keys_of_one_with_links(root: Path, without_links: Path) -> None:
     """Nothing is run again because of where a source lies."""
     text = (
-        "from flexclear.stages.run import graphs, workplace\n"
-        "place = workplace()\n"
+        "from flexclear.stages.run import graphs, open_workplace\n"
+        "place = open_workplace()\n"
         "(graph,) = graphs(['checks/pendulum'])\n"
         "from flexclear.pipeline.core.workflow.execute import key_of\n"
         "print(key_of(graph.simulate, {}, place.store, place.sources))\n"

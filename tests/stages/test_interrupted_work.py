@@ -63,7 +63,7 @@ def interrupted(
     monkeypatch.setattr(trajectory, "_stop_when_asked", look)
     while True:
         try:
-            with journal.kept(folder, "key") as kept:
+            with journal.storage(folder, "key") as kept:
                 found = work()
         except KilledError:
             kills += 1
@@ -253,7 +253,7 @@ def test_a_run_that_is_asked_to_stop_leaves_what_there_is_marked_and_goes_on_lat
         if fraction is not None and fraction > 0.3:
             stopping.request("the time is over")
 
-    with pytest.raises(StoppedError) as told, journal.kept(tmp_path, "key"):
+    with pytest.raises(StoppedError) as told, journal.storage(tmp_path, "key"):
         dynamics.simulate(scene, {}, progress)
     monkeypatch.setattr(stopping, "_why", "")
     assert told.value.exit_code == 4
@@ -265,7 +265,7 @@ def test_a_run_that_is_asked_to_stop_leaves_what_there_is_marked_and_goes_on_lat
         derive(left)
     with pytest.raises(InputError, match="not complete"):
         comparison.assemble({"whole": whole, "left": left}, {}, [])
-    with journal.kept(tmp_path, "key") as kept:
+    with journal.storage(tmp_path, "key") as kept:
         assert dynamics.simulate(scene, {}, silent).identical(whole)
     assert kept.restored > 0.0
 

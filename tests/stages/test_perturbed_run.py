@@ -243,14 +243,14 @@ def test_both_are_stopped_in_good_order_and_go_on_to_the_same_bits(
     with monkeypatch.context() as patch:
         if stopped == "twin":
             patch.setattr(Pair, "_enough", late_twin)
-        with pytest.raises(StoppedError) as told, journal.kept(tmp_path, "key"):
+        with pytest.raises(StoppedError) as told, journal.storage(tmp_path, "key"):
             dynamics.simulate(scene, {}, progress)
     stopping._why = ""
     left = told.value.partial
     assert left.attrs["complete"] == 0
     assert left.position.identical(whole.position[: left.sizes["time"]])
     assert (left.sizes["time"] == whole.sizes["time"]) is (stopped == "twin")
-    with journal.kept(tmp_path, "key"):
+    with journal.storage(tmp_path, "key"):
         assert dynamics.simulate(scene, {}, silent).identical(whole)
 
 

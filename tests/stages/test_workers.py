@@ -43,7 +43,7 @@ def stop() -> None:
 
 def test_a_command_starts_its_workers_once() -> None:
     """Also where a later part of it wants as many as there are cores."""
-    with workers.kept():
+    with workers.reused():
         first = one()
         assert one(cores.cores()) == first
         assert all(map(alive, first))
@@ -57,7 +57,7 @@ def test_outside_of_a_command_they_end_with_the_call() -> None:
 
 @pytest.mark.parametrize("end", [fail, stop])
 def test_workers_of_what_failed_or_was_stopped_are_not_kept(end: Callable[[], None]) -> None:
-    with workers.kept():
+    with workers.reused():
         first = one()
         end()
         assert not alive(first[1])

@@ -72,8 +72,8 @@ class LabelledArrays:
 
     def assign_coords(self, coordinates: Mapping[str, LabelledArray]) -> LabelledArrays:
         """The same with these coordinates last, in place of others of their names."""
-        kept = {name: array for name, array in self.variables.items() if name not in coordinates}
-        return replace(self, variables=kept | dict(coordinates), coords=self.coords | coordinates.keys())
+        remaining = {name: array for name, array in self.variables.items() if name not in coordinates}
+        return replace(self, variables=remaining | dict(coordinates), coords=self.coords | coordinates.keys())
 
     def to_xarray(self) -> xr.Dataset:
         """The same for users; values are shared."""

@@ -63,11 +63,11 @@ def _define(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str
     """A variable of the file, with all but its values."""
     values, kind = array.values, array.values.dtype.kind
     truth = _BOOL if kind == "b" else {}
-    kept = str if kind in "OU" else values.dtype.newbyteorder("=") if not truth else np.dtype("i1")
+    stored_type = str if kind in "OU" else values.dtype.newbyteorder("=") if not truth else np.dtype("i1")
     numeric = bool(values.ndim and values.size and kind in "fiu")
     variable = file.createVariable(
         name,
-        kept,
+        stored_type,
         array.dims,
         zlib=numeric and compress,
         complevel=1 if numeric and compress else 4,

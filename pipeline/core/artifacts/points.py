@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION, RUN
 from flexclear.pipeline.core.scene.design import Axis, Design
-from flexclear.pipeline.core.scene.output_quantities import Kept
+from flexclear.pipeline.core.scene.output_quantities import Recorded
 from flexclear.pipeline.core.scene.requested_accuracy import KINDS
 from flexclear.pipeline.core.units import udunits
 
@@ -41,35 +41,35 @@ class Point:
     refused: str = ""
 
 
-def batch(points: Mapping[str, Point], kept: Sequence[Kept]) -> xr.Dataset:
+def batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Dataset:
     """Finished points by their keys, as a dataset."""
     done = list(points.values())
-    variables = _arrays(done, kept, ("point",), (len(done),))
+    variables = _arrays(done, recorded, ("point",), (len(done),))
     variables["evaluations"] = (("point",), np.array([point.evaluations for point in done], dtype=np.int64))
     variables["refused"] = (("point",), np.array([point.refused for point in done], dtype=object))
     return xr.Dataset(variables, coords={"key": ("point", np.array(list(points), dtype=object))})
 
 
-def unpacked(stored: xr.Dataset, kept: Sequence[Kept]) -> dict[str, Point]:
+def unpacked(stored: xr.Dataset, recorded: Sequence[Recorded]) -> dict[str, Point]:
     """The points of a batch by their keys."""
     arrays = {str(name): stored[name].values for name in stored.variables}
     points = {}
     for k, key in enumerate(arrays["key"]):
         refused = str(arrays["refused"][k])
         values, error, deviation = (
-            {} if refused else {q.name: arrays[name][k] for q in kept if (name := variable(q, statistic)) in arrays}
+            {} if refused else {q.name: arrays[name][k] for q in recorded if (name := variable(q, statistic)) in arrays}
             for statistic in STATISTICS
         )
         points[str(key)] = Point(values, error, deviation, int(arrays["evaluations"][k]), refused)
     return points
 
 
-def variable(one: Kept, statistic: str) -> str:
+def variable(one: Recorded, statistic: str) -> str:
     """Name of a variable."""
     return one.name if statistic == "values" else f"{one.name}.{statistic}"
 
 
-def unit(one: Kept, turning: Collection[str]) -> str:
+def unit(one: Recorded, turning: Collection[str]) -> str:
     """Unit of what is kept, as UDUNITS reads it. turning: names of the quantities that are about an axis, not along."""
     declared = RUN[KINDS[one.quantity.kind].variable]
     along = declared.turning if one.quantity.name in turning else declared.units
@@ -78,7 +78,7 @@ def unit(one: Kept, turning: Collection[str]) -> str:
 
 def dataset(
     design: Design,
-    kept: Sequence[Kept],
+    recorded: Sequence[Recorded],
     keys: Sequence[str],
     points: Mapping[str, Point],
     time: np.ndarray,
@@ -95,8 +95,8 @@ def dataset(
     dims, shape = design.dims, design.shape
     every = [points.get(key) for key in keys]
     lengths = dimensions(time, sections)
-    variables = _arrays(every, kept, dims, shape)
-    for one, statistic in itertools.product(kept, statistics):  # where no point is done
+    variables = _arrays(every, recorded, dims, shape)
+    for one, statistic in itertools.product(recorded, statistics):  # where no point is done
         if variable(one, statistic) not in variables:
             inner = [lengths[dim] for dim in one.dims]
             variables[variable(one, statistic)] = ((*dims, *one.dims), np.full((*shape, *inner), np.nan))
@@ -120,7 +120,7 @@ def dataset(
     coordinates |= {"quat": list(QUATERNION)} if "quat" in sizes else {}
     coordinates |= {"time": time} if "time" in sizes else {}
     result = xr.Dataset(variables, coords=coordinates)
-    _describe(result, design.axes, kept, turning)
+    _describe(result, design.axes, recorded, turning)
     for name, (_, meaning) in plain.items():
         result[name].attrs = {"long_name": meaning}
     result["status"].attrs |= {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(STATUS)}
@@ -134,13 +134,13 @@ def dimensions(time: np.ndarray, sections: int) -> dict[str, int]:
 
 
 def _arrays(
-    points: Sequence[Point | None], kept: Sequence[Kept], dims: tuple[str, ...], shape: tuple[int, ...]
+    points: Sequence[Point | None], recorded: Sequence[Recorded], dims: tuple[str, ...], shape: tuple[int, ...]
 ) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """Values of points, row by row in the order of the dimensions; nan where there are none."""
     arrays = {}
     done = next((point for point in points if point is not None and not point.refused), None)
     for statistic in STATISTICS if done is not None else ():
-        for one in kept:
+        for one in recorded:
             if one.name not in getattr(done, statistic):
                 continue
             inner = np.shape(getattr(done, statistic)[one.name])
@@ -152,14 +152,14 @@ def _arrays(
     return arrays
 
 
-def _describe(result: xr.Dataset, axes: Sequence[Axis], kept: Sequence[Kept], turning: Collection[str]) -> None:
+def _describe(result: xr.Dataset, axes: Sequence[Axis], recorded: Sequence[Recorded], turning: Collection[str]) -> None:
     """Units and meanings."""
     words = {
         "values": "",
         "error": "; distance from the value at a hundredth of the tolerance",
         "deviation": "; standard deviation over the members",
     }
-    for one in kept:
+    for one in recorded:
         for statistic, more in words.items():
             if variable(one, statistic) in result:
                 result[variable(one, statistic)].attrs = {

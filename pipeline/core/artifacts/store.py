@@ -79,8 +79,8 @@ class Record:
 
     def table(self) -> dict[str, object]:
         """What its file holds, and `read_record` reads."""
-        kept = {"files": self.files, "facts": self.facts, "said": self.said}
-        return {"stage": self.stage, "key": self.key, **{name: dict(texts) for name, texts in kept.items()}}
+        content = {"files": self.files, "facts": self.facts, "said": self.said}
+        return {"stage": self.stage, "key": self.key, **{name: dict(texts) for name, texts in content.items()}}
 
 
 @dataclass(frozen=True, slots=True)

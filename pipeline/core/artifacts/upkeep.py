@@ -64,16 +64,16 @@ def prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
     all of whose points stay, since it goes on with them.
     """
     made = {artifact.record.digest: artifact.record for artifact in listed.artifacts}
-    kept, waiting = set(), list(_shown(store))
+    in_use, waiting = set(), list(_shown(store))
     while waiting:
         record = waiting.pop()
-        if (record.stage, record.key) not in kept:
-            kept.add((record.stage, record.key))
+        if (record.stage, record.key) not in in_use:
+            in_use.add((record.stage, record.key))
             above = (digest for fact, digest in record.facts.items() if fact.startswith("input "))
             waiting += [made[digest] for digest in above if digest in made]
-    of_sweeps = {stage for stage, key in kept if key == FAMILY}
+    of_sweeps = {stage for stage, key in in_use if key == FAMILY}
     mine = [a for a in listed.artifacts if a.age > older and a.record.stage not in of_sweeps]
-    return [a for a in mine if (a.record.stage, a.record.key) not in kept]
+    return [a for a in mine if (a.record.stage, a.record.key) not in in_use]
 
 
 def remove(store: Store, artifact: Artifact) -> None:

@@ -55,7 +55,7 @@ class Design:
         """Place of the scene -> value, point by point."""
         combined = (itertools.product if self.grid else zip)(*(axis.values for axis in self.axes))
         return [
-            {place: value for axis, value in zip(self.axes, values, strict=True) for place in axis.places}
+            {where: value for axis, value in zip(self.axes, values, strict=True) for where in axis.places}
             for values in combined
         ]
 

@@ -31,8 +31,8 @@ def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
             changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[joint.type], "between": list(joint.between)}
     if "flexibility" in effects:
         for name, body in scene.flexible().items():
-            kept = body.model_dump(mode="json", include=set(KEPT), exclude_none=True)
-            changes[f"body.{name}"] = {"type": "rigid", **kept}
+            unchanged = body.model_dump(mode="json", include=set(KEPT), exclude_none=True)
+            changes[f"body.{name}"] = {"type": "rigid", **unchanged}
     if not changes:
         raise InputError(
             str(scene.path or scene.name),

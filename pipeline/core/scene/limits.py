@@ -65,11 +65,11 @@ def check_rows(rows: float, interval: float, limits: Limits) -> None:
         )
 
 
-def check_members(members: int, limits: Limits, place: str = "[ensemble.members]") -> None:
+def check_members(members: int, limits: Limits, where: str = "[ensemble.members]") -> None:
     """ResourceError when an ensemble is to have more members than it may."""
     if members > limits.members:
         text = f"{min(members, 10**300):.6g}"  # a whole number may be beyond any float
-        raise ResourceError(f"{place}: {text} are more than the {limits.members} that limits.members allows")
+        raise ResourceError(f"{where}: {text} are more than the {limits.members} that limits.members allows")
 
 
 def check_parts(table: dict[str, Any], path: Path, families: tuple[str, ...]) -> None:

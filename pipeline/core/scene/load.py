@@ -46,8 +46,8 @@ def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -
     path = Path(path)
     name = scene_name(path)
     table = compose(path)
-    for place, value in (override or {}).items():
-        _put(table, place, value, f"override of {path}")
+    for where, value in (override or {}).items():
+        _put(table, where, value, f"override of {path}")
     _absolute_files(table, path)
     check_parts(table, path, FAMILIES)
     scene = _read(table, path)
@@ -61,16 +61,16 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
 
     override and errors as of `load_scene`.  Its name is its title's.
     """
-    place = Path("scene")
+    origin = Path("scene")
     copied = copy.deepcopy(dict(table))
-    _require_tables(copied, place)
+    _require_tables(copied, origin)
     if any(key in copied for key in EDITS):
         raise InputError("scene", "edits another scene, which only files do", "use edited(scene, changes)")
-    _absolute_files(copied, Path.cwd() / place)
+    _absolute_files(copied, Path.cwd() / origin)
     for key, value in (override or {}).items():
         _put(copied, key, value, "override of scene")
-    check_parts(copied, place, FAMILIES)
-    scene = _read(copied, place)
+    check_parts(copied, origin, FAMILIES)
+    scene = _read(copied, origin)
     name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
     scene._name = f"{name}-scene" if portable.is_device(name) else name
     return scene
@@ -82,28 +82,28 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
     Raises InputError for a part or key that is not there; a setting may be missing already.
     """
     table = scene.model_dump(mode="json", exclude_none=True)
-    for place, value in override.items():
+    for where, value in override.items():
         if value is not None:
-            _put(table, place, value, f"edit of {scene.name}")
-        elif "." in place:
-            owner, last = _find(table, place, f"edit of {scene.name}")
+            _put(table, where, value, f"edit of {scene.name}")
+        elif "." in where:
+            owner, last = _find(table, where, f"edit of {scene.name}")
             del owner[last]
         else:
-            table.pop(place, None)
+            table.pop(where, None)
     _absolute_files(table, scene._path or Path.cwd() / "scene")
     result = _read(table, Path(scene.name))
     result._name, result._path = scene._name, scene._path
     return result
 
 
-def _read(table: dict[str, Any], place: Path) -> Scene:
+def _read(table: dict[str, Any], where: Path) -> Scene:
     """The scene that a table says; mistakes, and what asks for more than `[limits]` allows, are told of this place."""
     try:
         return Scene.model_validate(table)
     except ValidationError as error:
-        raise input_errors(place, error, Scene) from None
+        raise input_errors(where, error, Scene) from None
     except ResourceError as error:
-        raise ResourceError(f"{place} {error}") from None
+        raise ResourceError(f"{where} {error}") from None
 
 
 def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
@@ -112,8 +112,8 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
     For many edits of one scene.  Raises InputError as `edited` does.
     """
     changed: dict[tuple[str, str], dict[str, object]] = {}
-    for place, value in override.items():
-        family, _, rest = place.partition(".")
+    for where, value in override.items():
+        family, _, rest = where.partition(".")
         name, _, key = rest.partition(".") if family in FAMILIES else ("", "", rest)
         names_file = key.rpartition(".")[2] in FILES or any(_tables(value))
         if value is None or not key or names_file or (family not in FAMILIES and family not in SETTINGS):
@@ -219,7 +219,7 @@ def _require_tables(table: dict[str, Any], path: Path) -> None:
                     f"write [{prefix}{family}.NAME]",
                 )
     removed = table.get("remove", [])
-    if not isinstance(removed, list) or not all(isinstance(place, str) for place in removed):
+    if not isinstance(removed, list) or not all(isinstance(where, str) for where in removed):
         raise InputError(f"{path} [remove]", f"is a list of places, not {removed!r}", 'write remove = ["joint.A1"]')
 
 
@@ -276,8 +276,8 @@ def _neighbours(path: Path) -> str | None:
 
 def _edited(result: dict[str, Any], table: dict[str, Any], path: Path) -> dict[str, Any]:
     """What a table makes of the one that it extends, which is changed."""
-    for place in table.get("remove", []):
-        parent, key = _find(result, place, f"{path} [remove]")
+    for where in table.get("remove", []):
+        parent, key = _find(result, where, f"{path} [remove]")
         del parent[key]
     for edit in ("replace", "set"):
         for family, parts in table.get(edit, {}).items():
@@ -332,9 +332,9 @@ def _add_parts(result: dict[str, Any], family: str, parts: dict[str, Any], path:
         there[name] = part
 
 
-def _find(table: Any, place: object, where: str) -> tuple[Any, Any]:
+def _find(table: Any, path: object, where: str) -> tuple[Any, Any]:
     """The table or list that holds a place, and its last key; entries of lists are numbered from 0."""
-    keys = str(place).split(".")
+    keys = str(path).split(".")
     for depth, name in enumerate(keys):
         key = _entry(table, name)
         if key is None:
@@ -354,8 +354,8 @@ def _entry(table: Any, name: str) -> str | int | None:
     return int(name) if isinstance(table, list) and name.isdecimal() and int(name) < len(table) else None
 
 
-def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
-    parent, _, key = place.rpartition(".")
+def _put(table: dict[str, Any], path: str, value: object, where: str) -> None:
+    parent, _, key = path.rpartition(".")
     if parent in SETTINGS:
         table.setdefault(parent, {})
     owner: Any = table
@@ -363,7 +363,7 @@ def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
         above, last = _find(table, parent, where)
         owner = above[last]
     if isinstance(owner, list):
-        owner, last = _find(table, place, where)
+        owner, last = _find(table, path, where)
         owner[last] = value
     elif isinstance(owner, dict):
         owner[key] = value

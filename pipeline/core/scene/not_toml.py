@@ -26,9 +26,9 @@ def not_toml(path: Path, text: str, message: str) -> InputError:
     match, lines = _LINE.search(message), text.splitlines()
     number = int(match[1]) if match else 0
     line = lines[number - 1] if 0 < number <= len(lines) else ""
-    place = f"{path}, line {number}" if number else str(path)
+    where = f"{path}, line {number}" if number else str(path)
     problem, hint = _guessed(line) or _said(message, line)
-    return InputError(place, f"is not TOML: {problem}", hint)
+    return InputError(where, f"is not TOML: {problem}", hint)
 
 
 def _guessed(line: str) -> tuple[str, str] | None:

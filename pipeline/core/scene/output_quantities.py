@@ -40,7 +40,7 @@ SCALARS = ("drive_force",)
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class Recorded:
     """A quantity and the reduction of it that is kept."""
 
     quantity: Quantity
@@ -80,7 +80,7 @@ def reductions(kind: str) -> dict[str, str]:
     return OF_CONTACTS.get(kind, without)
 
 
-def parse_kept(text: str, owners: Mapping[str, Collection[str]]) -> Kept:
+def parse_recorded(text: str, owners: Mapping[str, Collection[str]]) -> Recorded:
     """What is called `text`; the reduction may be left out where a quantity has one only.
 
     owners: as of `wanted.parse`.  Raises ValueError that names what could have been meant.
@@ -90,7 +90,7 @@ def parse_kept(text: str, owners: Mapping[str, Collection[str]]) -> Kept:
         only = list(reductions(last))
         if len(only) > 1:
             raise ValueError(f"what of '{text}' is kept? write {' or '.join(f'{text}.{name}' for name in only)}")
-        return Kept(parse(text, owners), only[0])
+        return Recorded(parse(text, owners), only[0])
     if head.rpartition(".")[2] not in KINDS:
         raise ValueError(
             f"'{text}' is no quantity: write <owner>.<quantity>.<reduction>, as in 'platform.velocity.largest' "
@@ -100,4 +100,4 @@ def parse_kept(text: str, owners: Mapping[str, Collection[str]]) -> Kept:
     known = reductions(quantity.kind)
     if last not in known:
         raise ValueError(f"'{quantity.name}' has no '{last}' ({suggestion(last, list(known))})")
-    return Kept(quantity, last)
+    return Recorded(quantity, last)

@@ -20,14 +20,14 @@ def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputE
     frames = {name: _frames(body, recipe) for name, body in _tables(table.get("body"))}
     joints = [name for name, _ in _tables(table.get("joint"))]
     errors: list[InputError] = []
-    for place, name in _named_frames(table):
-        errors += _frame(f"{path} [{place}]", name, frames)
-    for place, name in _named_joints(table):
+    for where, name in _named_frames(table):
+        errors += _frame(f"{path} [{where}]", name, frames)
+    for where, name in _named_joints(table):
         if name not in joints:
-            errors.append(InputError(f"{path} [{place}]", f"there is no joint '{name}'", suggestion(name, joints)))
-    for place, name in _named_bodies(table):
+            errors.append(InputError(f"{path} [{where}]", f"there is no joint '{name}'", suggestion(name, joints)))
+    for where, name in _named_bodies(table):
         if name not in frames:
-            errors.append(InputError(f"{path} [{place}]", f"there is no body '{name}'", suggestion(name, frames)))
+            errors.append(InputError(f"{path} [{where}]", f"there is no body '{name}'", suggestion(name, frames)))
     for name, body in _tables(table.get("body")):
         errors += _interfaces(f"{path} [body.{name}.modes", body, frames[name])
     return errors
@@ -46,26 +46,26 @@ def _frames(body: Mapping[str, Any], recipe: Recipe) -> Collection[str] | None:
     return list(frames) if isinstance(frames, dict) else None
 
 
-def _frame(place: str, name: str, frames: Mapping[str, Collection[str] | None]) -> list[InputError]:
+def _frame(where: str, name: str, frames: Mapping[str, Collection[str] | None]) -> list[InputError]:
     body, _, frame = name.partition(".")
     if not frame:
         return []  # it is said elsewhere that a frame is named with its body
     if body not in frames:
-        return [InputError(place, f"'{name}': there is no body '{body}'", suggestion(body, frames))]
+        return [InputError(where, f"'{name}': there is no body '{body}'", suggestion(body, frames))]
     known = frames[body]
     if known is None or frame in known:
         return []
-    return [InputError(place, f"'{name}': body '{body}' has no frame '{frame}'", suggestion(frame, list(known)))]
+    return [InputError(where, f"'{name}': body '{body}' has no frame '{frame}'", suggestion(frame, list(known)))]
 
 
-def _interfaces(place: str, body: Mapping[str, Any], frames: Collection[str] | None) -> list[InputError]:
+def _interfaces(where: str, body: Mapping[str, Any], frames: Collection[str] | None) -> list[InputError]:
     modes = body.get("modes")
     if frames is None or not isinstance(modes, dict):
         return []
     named = [("interfaces", name) for name in _texts(modes.get("interfaces"))]
     named += [("held", name.partition(".")[0]) for name in _texts(modes.get("held"))]
     return [
-        InputError(f"{place}.{key}]", f"the recipe has no frame '{name}'", suggestion(name, list(frames)))
+        InputError(f"{where}.{key}]", f"the recipe has no frame '{name}'", suggestion(name, list(frames)))
         for key, name in named
         if name not in frames
     ]

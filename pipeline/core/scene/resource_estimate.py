@@ -25,8 +25,8 @@ def check_run(scene: Scene, results: Path) -> None:
     machine.require_memory(HELD * need, what, SPEND, scene.limits.memory)
     machine.require_disk(KEPT * need, what, results, SPEND, scene.limits.disk)
     if scene.ensemble is not None:
-        kept = len(scene.ensemble.bodies or scene.contacts() or scene.body)
-        need = scene.ensemble.members * min(rows, MEMBER_ROWS) * kept * BODY
+        n_bodies = len(scene.ensemble.bodies or scene.contacts() or scene.body)
+        need = scene.ensemble.members * min(rows, MEMBER_ROWS) * n_bodies * BODY
         what = f"an ensemble of {scene.ensemble.members} members"
         machine.require_memory(HELD * need, what, "ask for fewer members, or say more in [limits]", scene.limits.memory)
     for name, body in scene.flexible().items():

@@ -161,11 +161,11 @@ class View(Part):
         return self
 
 
-def _leaves(table: dict[str, Any], place: str) -> list[tuple[str, Any]]:
+def _leaves(table: dict[str, Any], where: str) -> list[tuple[str, Any]]:
     """Dotted name -> value, of nested tables or quoted names alike."""
     leaves = []
     for key, value in table.items():
-        name = f"{place}.{key}".lstrip(".")
+        name = f"{where}.{key}".lstrip(".")
         if isinstance(value, dict) and not set(value) <= {"absolute", "relative"}:
             leaves += _leaves(value, name)
         elif name != "source":
@@ -239,11 +239,11 @@ class Scene(Part):
     def _quantities_are_there(self) -> None:
         named = [("accuracy.", name) for name in (self.accuracy.quantities if self.accuracy else ())]
         named += [("view.watch: ", name) for name in (self.view and self.view.watch) or ()]
-        for place, name in named:
+        for where, name in named:
             try:
                 parse(name, self.owners())
             except ValueError as error:
-                raise ValueError(f"{place}{name}: {error}") from None
+                raise ValueError(f"{where}{name}: {error}") from None
 
     def _stressed_bodies_are_flexible(self) -> None:
         for name in self.output.stress or ():
@@ -425,7 +425,7 @@ class Scene(Part):
     def sources(self) -> dict[str, str]:
         """Where each value comes from: ``part.key`` (or ``part``) -> text."""
         given = provenance.sources(self.model_dump())
-        return {place or "scene": text for place, text in given.items()}
+        return {where or "scene": text for where, text in given.items()}
 
     def assumptions(self) -> dict[str, str]:
         """The sources that say ``assumed: why``."""

@@ -177,10 +177,10 @@ class Sweep(Part):
                 raise ValueError(f"vary.{name}: results have a dimension '{name}' already; choose another name")
             if not name.strip() or "/" in name or not name.isprintable():
                 raise ValueError(f"vary.{name}: is no name of a dimension; choose one without slashes")
-            for place in self.places(name):
-                if place in seen:
-                    raise ValueError(f"vary.{name}: '{place}' is varied by '{seen[place]}' already")
-                seen[place] = name
+            for where in self.places(name):
+                if where in seen:
+                    raise ValueError(f"vary.{name}: '{where}' is varied by '{seen[where]}' already")
+                seen[where] = name
         return self
 
     def _check_sample(self) -> None:

@@ -92,10 +92,10 @@ def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputE
     elif kind == "union_tag_invalid":
         keys, value = [*keys, _choosing(context)], context["tag"]
         message, remedy = f"there is no such {keys[-1]}", suggestion(str(value), types)
-    place = ".".join(str(key) for key in keys if key != "[key]")
+    where = ".".join(str(key) for key in keys if key != "[key]")
     shows_value = isinstance(value, (str, int, float)) and kind not in ("missing", "union_tag_not_found")
     shown = f" (got {value!r})" if shows_value and (kind in BOUNDS or repr(value) not in message) else ""
-    return InputError(f"{path} [{place}]" if place else str(path), f"{message}{shown}", remedy)
+    return InputError(f"{path} [{where}]" if where else str(path), f"{message}{shown}", remedy)
 
 
 def _choosing(context: dict[str, Any]) -> str:

@@ -71,12 +71,12 @@ def effects(scene: Scene) -> tuple[Effect, ...]:
     return tuple(listed)
 
 
-def named(scene: Scene, names: Iterable[str], place: str) -> tuple[Effect, ...]:
+def named(scene: Scene, names: Iterable[str], where: str) -> tuple[Effect, ...]:
     """The effects of these names; InputError, with the nearest one, for a name that is none."""
     known = {effect.name: effect for effect in effects(scene)}
     for name in names:
         if name not in known:
-            raise InputError(f"{place} {name}", "is no effect of this scene", suggestion(name, known))
+            raise InputError(f"{where} {name}", "is no effect of this scene", suggestion(name, known))
     return tuple(known[name] for name in names)
 
 
@@ -88,9 +88,9 @@ def without(scene: Scene, gone: Collection[Effect]) -> Scene:
     if not gone:
         return scene
     changes = dict(_changes(scene, gone))
-    removed = [place for place, value in changes.items() if value is None]
-    table = {place: value for place, value in changes.items() if value is not None}
-    for family in dict.fromkeys(place.split(".")[0] for place in removed):
+    removed = [where for where, value in changes.items() if value is None]
+    table = {where: value for where, value in changes.items() if value is not None}
+    for family in dict.fromkeys(where.split(".")[0] for where in removed):
         left = {n: p.model_dump(mode="json", exclude_none=True) for n, p in getattr(scene, family).items()}
         table[family] = {n: p for n, p in left.items() if f"{family}.{n}" not in removed}
     result = edited(scene, table | _settings(scene, gone) | owned(scene, _left(gone)))
@@ -129,8 +129,8 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
         if effect.kind == CLEARANCE:
             changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[part.type], "between": list(part.between)}
         elif effect.kind == FLEXIBILITY:
-            kept = part.model_dump(mode="json", include=set(KEPT), exclude_none=True)
-            changes[f"body.{name}"] = {"type": "rigid", **kept}
+            unchanged = part.model_dump(mode="json", include=set(KEPT), exclude_none=True)
+            changes[f"body.{name}"] = {"type": "rigid", **unchanged}
         elif effect.name.count(".") == 1:
             changes[effect.name] = None
         else:

@@ -54,13 +54,13 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             begun = store.path(task.stage, _with_files(task, known, store)[1], "part")
             with (
                 threads.one(),
-                journal.kept(begun.parent, begun.stem) as kept,
+                journal.storage(begun.parent, begun.stem) as storage,
                 file_dependencies.watched(task.base, outside=(store.root,)) as read,
             ):
                 product = run({**task.params, **task.context}, data, progress)
             known |= _noted(task, plain, read, store)
             record = store.put(task.stage, key(known), product, known)
-            kept.remove()
+            storage.remove()
     store.show(record, task.folder, task.names, task.label)
     return record
 

@@ -85,8 +85,8 @@ def add(read: Mapping[str, str], base: Path) -> None:
     Raises ResourceError where such a file was another one when this process read it itself.
     """
     if _current is not None:
-        for place, then in read.items():
-            _current.learn(os.path.normpath(base / place), then)
+        for file, then in read.items():
+            _current.learn(os.path.normpath(base / file), then)
 
 
 @contextmanager
@@ -198,7 +198,7 @@ def _system() -> tuple[str, ...]:
     state = os.environ.get("XDG_CACHE_HOME"), os.environ.get("XDG_CONFIG_HOME")
     paths = sysconfig.get_paths()  # not its prefix: an environment may be the folder of a project itself
     own = {paths[name] for name in ("stdlib", "platstdlib", "purelib", "platlib", "scripts")}
-    own |= {os.path.realpath(place) for place in own}
+    own |= {os.path.realpath(folder) for folder in own}
     system = (
         "/proc",
         "/sys",

@@ -201,7 +201,7 @@ def current() -> Journal | None:
 
 
 @contextlib.contextmanager
-def kept(folder: Path, key: str) -> Iterator[Journal]:
+def storage(folder: Path, key: str) -> Iterator[Journal]:
     """Meanwhile unfinished work is written; whoever has stored what came of it removes it."""
     made = Journal(folder, key)
     before = _current.set(made)

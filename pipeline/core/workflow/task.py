@@ -101,32 +101,32 @@ def key(task_facts: Mapping[str, str]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def flatten(node: Any, place: str = "") -> list[tuple[str, str]]:
+def flatten(node: Any, where: str = "") -> list[tuple[str, str]]:
     """Dotted place -> canonical text of every leaf of a JSON tree; floats by repr.
 
     Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
     date or a nan that somebody wrote into a recipe) is kept as text; the stage will refuse it.
     """
     leaves: list[tuple[str, str]] = []
-    _gather(node, place, leaves)
+    _gather(node, where, leaves)
     return leaves
 
 
-def _gather(node: Any, place: str, leaves: list[tuple[str, str]]) -> None:
+def _gather(node: Any, where: str, leaves: list[tuple[str, str]]) -> None:
     """`flatten` into a list: a report has tens of thousands of leaves."""
     text = _plain(node)
     if text is not None:
-        leaves.append((place, text))
+        leaves.append((where, text))
         return
     if isinstance(node, Mapping) and node:
         items = ((str(name), value) for name, value in node.items())
     elif isinstance(node, (list, tuple)) and any(isinstance(x, (dict, list, tuple, Mapping)) for x in node):
         items = ((str(n), value) for n, value in enumerate(node))
     else:
-        leaves.append((place, _JSON.encode(node)))
+        leaves.append((where, _JSON.encode(node)))
         return
     for name, value in items:
-        _gather(value, f"{place}.{name}" if place else name.lstrip("."), leaves)
+        _gather(value, f"{where}.{name}" if where else name.lstrip("."), leaves)
 
 
 def _plain(node: Any) -> str | None:

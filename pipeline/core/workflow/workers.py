@@ -110,7 +110,7 @@ _keeping = 0
 
 
 @contextmanager
-def kept() -> Iterator[None]:
+def reused() -> Iterator[None]:
     """Meanwhile workers are not let go between one call of `crew` and the next: starting and importing take a second.
 
     They have the environment of when they were started, so this is for one command.

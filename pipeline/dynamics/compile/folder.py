@@ -42,12 +42,12 @@ def writable(root: Path, tell: Callable[[str], None]) -> Path:
 
 def refuse_shared(folder: Path) -> None:
     """InputError when anybody but this user (and the system's) can write to a folder of kernels, or replace it."""
-    for place in (folder, *folder.parents):
-        if others_can_write(place, inside=place == folder):
+    for part in (folder, *folder.parents):
+        if others_can_write(part, inside=part == folder):
             raise InputError(
                 str(folder),
-                f"compiled kernels are not loaded from there, since others can write to {place}",
-                f"chmod go-w {place}, or name another folder with FLEXCLEAR_KERNELS",
+                f"compiled kernels are not loaded from there, since others can write to {part}",
+                f"chmod go-w {part}, or name another folder with FLEXCLEAR_KERNELS",
             )
 
 

@@ -50,11 +50,11 @@ def image(function: Any) -> bytes:
     return json.dumps(facts, sort_keys=True).encode() + b"\n" + binary
 
 
-def load(kept: bytes) -> Code:
+def load(stored: bytes) -> Code:
     """The function of such an image; ValueError where it cannot be loaded."""
     import llvmlite.binding as llvm
 
-    line, _, binary = kept.partition(b"\n")
+    line, _, binary = stored.partition(b"\n")
     facts = json.loads(line)
     if facts["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM does not outlive what is no object file
         raise ValueError("names and code are not of one function")

@@ -178,9 +178,9 @@ def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
     seen = observe(bench, state(bench, q)[None, :])
     if seen.status[0] != m.OK:
         raise SolverError(f"at t = {bench.time:.6g} s: the loops cannot be closed in the pose of the drives")
-    for place, angle in angles(bench.model.arrays.table(m.GAUGES), seen.sites[0]).items():
-        before = bench.internal[place]
-        bench.internal[place] = angle + 2.0 * np.pi * np.round((before - angle) / (2.0 * np.pi))
+    for index, angle in angles(bench.model.arrays.table(m.GAUGES), seen.sites[0]).items():
+        before = bench.internal[index]
+        bench.internal[index] = angle + 2.0 * np.pi * np.round((before - angle) / (2.0 * np.pi))
     return seen.state[0, : len(q)].copy()
 
 

@@ -230,14 +230,14 @@ def openings(
 ) -> tuple[np.ndarray, dict[str, Carried]]:
     """How the elastic coordinates of a body open the joints, shape (rows, mode), and move what is fixed to it."""
     i = model.mechanism.link_of[name]
-    place = poses[i].of(model.mechanism.links[i].places[name])
+    placement = poses[i].of(model.mechanism.links[i].places[name])
     frames = [str(frame) for frame in bundle["frame"].values]
     matrix, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, Carried]()
     for body, frame in _carried(model.scene, name).items():
         k = frames.index(frame)
-        u = place.R @ bundle["frame_translation_shape"].values[k]
-        theta = place.R @ bundle["frame_rotation_shape"].values[k]
-        at = place.of(Placement(bundle["frame_position"].values[k])).p
+        u = placement.R @ bundle["frame_translation_shape"].values[k]
+        theta = placement.R @ bundle["frame_rotation_shape"].values[k]
+        at = placement.of(Placement(bundle["frame_position"].values[k])).p
         carried[body] = Carried(at, theta, u)
         twist = np.vstack([theta, u - np.cross(theta, at, axisa=0, axisb=0).T])
         for joint_name, (constraint, rows) in lever.joints.items():

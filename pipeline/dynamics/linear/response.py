@@ -165,10 +165,10 @@ def _mass(
     for name, body in model.scene.body.items():
         if not isinstance(body, RigidBody):
             continue
-        place = poses[model.mechanism.link_of[name]].of(
+        placement = poses[model.mechanism.link_of[name]].of(
             model.mechanism.links[model.mechanism.link_of[name]].places[name]
         )
-        inertia = place.R @ np.array(body.inertia) @ place.R.T
+        inertia = placement.R @ np.array(body.inertia) @ placement.R.T
         rigid = [clearance_response.shown(model, poses, name, turning=turning) for turning in (True, False)]
         turn, shift = (np.hstack(parts) for parts in zip(rigid, own[name], strict=True))
         spin, push = inertia @ turn, body.mass * shift
@@ -176,7 +176,7 @@ def _mass(
         if name in bundles:
             k = list(bundles).index(name)
             mine = slice(m + first[k], m + first[k + 1])
-            push_q, spin_q = _momenta(bundles[name], place, clearance_response.centre(model, poses, name))
+            push_q, spin_q = _momenta(bundles[name], placement, clearance_response.centre(model, poses, name))
             across = turn.T @ spin_q + shift.T @ push_q
             M[:, mine] += across
             M[mine, :] += across.T
@@ -187,12 +187,12 @@ def _mass(
     return 0.5 * (M + M.T), momenta
 
 
-def _momenta(bundle: xr.Dataset, place: Placement, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _momenta(bundle: xr.Dataset, placement: Placement, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Linear momentum of a body's deformation, and its moment about a point, per rate of q, world axes, (3, mode)."""
-    push = place.R @ bundle["modal_first_moment"].values
+    push = placement.R @ bundle["modal_first_moment"].values
     P = bundle["position_mode_moment"].values
-    about_frame = place.R @ np.stack([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]])
-    return push, about_frame + np.cross(place.p - centre, push, axisa=0, axisb=0).T
+    about_frame = placement.R @ np.stack([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]])
+    return push, about_frame + np.cross(placement.p - centre, push, axisa=0, axisb=0).T
 
 
 def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Sequence[Quantity]) -> Response:

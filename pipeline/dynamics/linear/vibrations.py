@@ -110,8 +110,8 @@ def _principal(K: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _damped(K: np.ndarray, D: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues lambda and vectors of z'' + D z' + K z = 0, one of each conjugate pair."""
     loose = limp & ~np.any(D, axis=0) & ~np.any(D, axis=1)
-    kept = np.ix_(~loose, ~loose)
-    K, D, scale = K[kept], D[kept], _scale(K)[~loose]
+    rows = np.ix_(~loose, ~loose)
+    K, D, scale = K[rows], D[rows], _scale(K)[~loose]
     # coordinates z and z'/scale change at comparable rates
     A = np.block([[np.zeros_like(K), np.diag(scale)], [-K / scale[None, :], -D]])
     value, vectors = np.linalg.eig(A)

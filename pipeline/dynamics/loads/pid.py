@@ -72,7 +72,7 @@ class Pid:
     apply = staticmethod(apply)
 
     @staticmethod
-    def row(load: Declared, place: str, coordinate: Coordinate, measured: Coordinate) -> Row:
+    def row(load: Declared, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
         """Six numbers (`numbers`), the reference, and the integral part as state."""
-        reference = (load.reference, measured.dimension, f"{place[:-1]}.reference]")
+        reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
         return Row(joint=load.joint, laws=(reference,), numbers=numbers(load, coordinate, measured), states=1)

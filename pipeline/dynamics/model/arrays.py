@@ -32,9 +32,9 @@ class Arrays:
     f: np.ndarray
     columns: int
 
-    def size(self, place: int) -> int:
+    def size(self, index: int) -> int:
         """A size in the header."""
-        return int(self.h[place])
+        return int(self.h[index])
 
     def table(self, table: Any, h: np.ndarray | None = None) -> np.ndarray:
         """A view of a wiring or number table with named fields, shape (rows,); of the wiring in another h if given."""
@@ -55,8 +55,8 @@ class Arrays:
         """
         h, end = self.h.copy(), 0
         lengths = _work_lengths(h, room, self.columns)
-        for place, length in lengths.items():
-            h[place] = end
+        for index, length in lengths.items():
+            h[index] = end
             end += length
         laws, contacts = self.size(m.N_LAWS), self.size(m.N_CONTACTS)
         w, n = np.zeros(end), np.zeros(m.INTEGERS + laws + contacts, dtype=np.int64)
@@ -72,7 +72,7 @@ def _neighbours() -> dict[int, tuple[bool, int | None]]:
     neighbours: dict[int, tuple[bool, int | None]] = {}
     for array in ("h", "f"):
         places = [table.place for table in m.TABLES[array]]
-        neighbours |= {place: (array == "h", after) for place, after in zip(places, [*places[1:], None], strict=True)}
+        neighbours |= {index: (array == "h", after) for index, after in zip(places, [*places[1:], None], strict=True)}
     return neighbours
 
 
@@ -101,8 +101,8 @@ def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> A
             counts[table], h[table.place] = len(filled), start
             start += filled.size
             arrays[array].append(filled.ravel())
-    for place, size in (_sizes(counts, tables) | dict(sizes)).items():
-        h[place] = size
+    for index, size in (_sizes(counts, tables) | dict(sizes)).items():
+        h[index] = size
     return Arrays(np.concatenate(arrays["h"]), np.concatenate(arrays["f"]), columns)
 
 
@@ -146,7 +146,7 @@ def envelope_size(envelope: np.ndarray) -> int:
 
 
 def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: int) -> dict[int, int]:
-    known, contacts, ny, nv = (int(h[place]) for place in (m.N_DRIVES, m.N_CONTACTS, m.NY, m.NV))
+    known, contacts, ny, nv = (int(h[index]) for index in (m.N_DRIVES, m.N_CONTACTS, m.NY, m.NV))
     closure_rows, links, nq = int(h[m.N_CLOSURE_ROWS]), int(h[m.N_LINKS]), int(h[m.NQ])
     coordinates, positions = nv + known, nq + known
     requested, bearings = room(h), int(h[m.N_BEARINGS])

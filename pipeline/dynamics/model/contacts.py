@@ -36,7 +36,7 @@ def fill(
     """
     contacts = numbering.mechanism.contacts
     rows, reals = [], []
-    for (name, joint, *_), law, sites, place in zip(contacts, laws, touching, bristle_places(numbering), strict=True):
+    for (name, joint, *_), law, sites, first in zip(contacts, laws, touching, bristle_places(numbering), strict=True):
         friction_kind, numbers, stick, kinks = -1, (0.0,) * 6, 0.0, (0.0, 0.0)
         if joint.friction is not None:
             friction = _friction(name, joint)
@@ -48,7 +48,7 @@ def fill(
         else:
             surfaces, shape = parts.surfaces.index(joint.type), joint.shape
         kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
-        rows.append((*sites, *kinds_of, place))
+        rows.append((*sites, *kinds_of, first))
         reals.append([joint.clearance, joint.radius, joint.floor, stick, *kinks, *law.numbers, *numbers, *shape])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
@@ -74,11 +74,11 @@ def ledger_size(mechanism: Mechanism) -> int:
 
 def bristle_places(numbering: Numbering) -> list[int]:
     """Where in the state each contact's deflection of bristles starts, or -1."""
-    place = numbering.nq + numbering.nv + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(numbering.mechanism.contacts)
+    first = numbering.nq + numbering.nv + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(numbering.mechanism.contacts)
     places = []
     for size in _bristles(numbering.mechanism):
-        places.append(-1 if size is None else place)
-        place += 0 if size is None else 3
+        places.append(-1 if size is None else first)
+        first += 0 if size is None else 3
     return places
 
 
@@ -95,25 +95,25 @@ def _friction(name: str, joint: Clearance | End) -> Any:
 
 
 def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
-    joint, place = contact.joint, f"[{contact.place}.normal]"
+    joint, path = contact.joint, f"[{contact.place}.normal]"
     masses = [mechanism.links[site.link].mass for site in (contact.outer, contact.inner)]
-    normal = lookup(NORMAL_LAWS, joint.normal.law, where=place)
+    normal = lookup(NORMAL_LAWS, joint.normal.law, where=path)
     if isinstance(joint, End):
-        return _resolved(normal, joint, joint.normal.stiffness, None, place)
-    surfaces = lookup(CONTACTS, joint.type, where=place)
+        return _resolved(normal, joint, joint.normal.stiffness, None, path)
+    surfaces = lookup(CONTACTS, joint.type, where=path)
     exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
     try:
         stiffness = surfaces.stiffness(joint, exponent)
     except ValueError as error:
-        raise InputError(place, str(error)) from None
-    return _resolved(normal, joint, stiffness, _reduced_mass(masses), place)
+        raise InputError(path, str(error)) from None
+    return _resolved(normal, joint, stiffness, _reduced_mass(masses), path)
 
 
-def _resolved(normal: Any, joint: Clearance | End, stiffness: float | None, mass: float | None, place: str) -> Resolved:
+def _resolved(normal: Any, joint: Clearance | End, stiffness: float | None, mass: float | None, path: str) -> Resolved:
     try:
         law: Resolved = normal.resolve(joint.normal, stiffness, mass)
     except ValueError as error:
-        raise InputError(place, str(error)) from None
+        raise InputError(path, str(error)) from None
     return law
 
 

@@ -53,17 +53,17 @@ def _of_joints(model: Model) -> Iterator[Rate]:
     for start in given_coordinates(model.scene):
         if start.velocity is None:
             continue
-        place, size = f"{start.place[:-1]}.velocity]", 1.0 if start.coordinate.turning else model.length
+        path, size = f"{start.place[:-1]}.velocity]", 1.0 if start.coordinate.turning else model.length
         for i, link in enumerate(model.links):
             edge = link.branch.edge
             if edge is not None and edge.name == start.joint and not link.drives:
                 numbers = dict(zip(link.joint.positions, model.numbering.coordinates[i], strict=True))
                 if start.number in numbers:
-                    yield Rate(place, start.velocity, size, numbers[start.number], link.joint.sign)
+                    yield Rate(path, start.velocity, size, numbers[start.number], link.joint.sign)
         for row, closure in zip(closures, model.closures, strict=True):
             if not isinstance(closure, Coupling) and closure.edge.name == start.joint:
                 sites = int(row["site_a"]), int(row["site_b"])
-                yield Rate(place, start.velocity, size, sites=sites, coordinate=start.coordinate)
+                yield Rate(path, start.velocity, size, sites=sites, coordinate=start.coordinate)
 
 
 def _of_modes(model: Model) -> Iterator[Rate]:

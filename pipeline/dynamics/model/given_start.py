@@ -56,7 +56,8 @@ class Miss:
         """What is given, and what the law says."""
         unit = "rad" if self.turning else "m"
         return (
-            f"{self.what} starts at {_written(self.now)} {unit} in the poses given, and at {_written(self.value)} {unit} by "
+            f"{self.what} starts at {_written(self.now)} {unit} in the poses given, and at "
+            f"{_written(self.value)} {unit} by "
             f"{self.rule}: {self.size:.3g} {unit} apart"
         )
 
@@ -106,9 +107,9 @@ def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Miss]:
         # the angle nearest to the law's, where turns are counted
         start = value + float(apart) if coordinate.turning else float(now[k])
         named = joint.name if len(declared.COORDINATES) == 1 else f"{joint.name}.{coordinate.name}"
-        place = f"[drive.{drive}.law]" if drive else f"[start.joint.{named}.position]"
+        path = f"[drive.{drive}.law]" if drive else f"[start.joint.{named}.position]"
         rule = f"the law of drive '{drive}'" if drive else "its own start"
-        yield Miss(drive, place, rule, what, start, value, coordinate.turning)
+        yield Miss(drive, path, rule, what, start, value, coordinate.turning)
 
 
 def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str, Pieces]) -> Iterator[Miss]:
@@ -120,8 +121,8 @@ def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str,
         turn = rotation_vector_to_matrix(np.array(requested[3:6], dtype=float))
         apart = float(rotation_between(matrix_to_quaternion(turn), matrix_to_quaternion(G.R)))
         drive, what = str(edge.drives[3]), f"the turn of '{edge.frame_b}'"
-        place = f"[drive.{drive.partition('.')[0]}.rotation]"
-        yield Miss(drive, place, f"the law of drive '{drive}'", what, apart, 0.0, True, True)
+        path = f"[drive.{drive.partition('.')[0]}.rotation]"
+        yield Miss(drive, path, f"the law of drive '{drive}'", what, apart, 0.0, True, True)
     for k, (name, value) in enumerate(zip(edge.drives, requested, strict=True)):
         if name is None or value is None or (edge.vector and k >= 3):
             continue

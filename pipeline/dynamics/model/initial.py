@@ -131,7 +131,7 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: flo
         speeds, miss = _least(equations.matrix, equations.target)
     largest = float(np.max(np.abs(equations.asked), initial=0.0))
     if equations.given and miss > max(WRITTEN * equations.fastest, fraction * largest):
-        names = ", ".join(place.removeprefix("[body.").removesuffix(".velocity]") for place in equations.given)
+        names = ", ".join(path.removeprefix("[body.").removesuffix(".velocity]") for path in equations.given)
         raise InputError(
             equations.given[0],
             f"joints and drives do not allow the velocities given for {names} (they miss by "
@@ -258,8 +258,8 @@ def centre_of(model: Model, name: str) -> Centre:
     i, body = model.mechanism.link_of[name], model.scene.body[name]
     link = model.links[i]
     if isinstance(body, RigidBody):
-        place = link.places[name]
-        return Centre(i, place.p + place.R @ np.array(body.com), np.zeros((3, 0)))
+        placement = link.places[name]
+        return Centre(i, placement.p + placement.R @ np.array(body.com), np.zeros((3, 0)))
     assert link.bundle is not None
     first, shape = (link.bundle[key].values / link.mass for key in ("first_moment", "modal_first_moment"))
     bent, numbering = bow(model.mechanism, i), model.numbering
@@ -270,8 +270,8 @@ def centre_of(model: Model, name: str) -> Centre:
 def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray:
     """Y with the internal states of parts as they start; `sites`: their frames at y, rows of SITE_FRAMES."""
     y, first = y.copy(), model.ny - model.arrays.size(m.N_INTERNAL)
-    for place, angle in angles(model.arrays.table(m.GAUGES), sites).items():
-        y[first + place] = angle
+    for index, angle in angles(model.arrays.table(m.GAUGES), sites).items():
+        y[first + index] = angle
     return y
 
 

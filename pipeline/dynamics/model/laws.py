@@ -38,17 +38,17 @@ def drive_laws(scene: Scene, given: Mapping[str, Pieces]) -> list[Pieces]:
     return laws
 
 
-def checked_law(scene: Scene, law: Any, dimension: str, place: str) -> Pieces:
+def checked_law(scene: Scene, law: Any, dimension: str, path: str) -> Pieces:
     """The pieces of a law; InputError for the wrong dimension, or when it does not cover the run."""
     try:
         made = pieces_of(law, dimension)
     except ValueError as error:
-        raise InputError(place, str(error)) from None
+        raise InputError(path, str(error)) from None
     start, end = scene.time.start, scene.time.end
     if not covers(made, start, end):
         low, high = made.span
         raise InputError(
-            place,
+            path,
             f"its points reach from {low:.6g} s to {high:.6g} s, the run from {start:.6g} s to {end:.6g} s",
             "add points, or shorten the run",
         )

@@ -204,8 +204,8 @@ class Mechanism:
 def _site(frames: Mapping[str, Frame], links: list[Link], link_of: Mapping[str, int], name: str) -> Site:
     frame = find_frame(frames, name, "frame")
     i = link_of[frame.body]
-    place = links[i].places[frame.body].of(frame.place)
-    return Site(i, place, name if links[i].flexible else None)
+    placement = links[i].places[frame.body].of(frame.place)
+    return Site(i, placement, name if links[i].flexible else None)
 
 
 def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
@@ -316,8 +316,8 @@ def size_of(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> flo
     for frame in frames.values():
         of_body.setdefault(frame.body, []).append(frame.place.p)
     for link in links:
-        for name, place in link.places.items():
-            points += [link.start.point(place.point(p)) for p in of_body.get(name, [])]
+        for name, placement in link.places.items():
+            points += [link.start.point(placement.point(p)) for p in of_body.get(name, [])]
             if link.inertia is not None:
                 points.append(link.start.point(link.inertia.com))
     cloud = np.array(points) if points else np.zeros((1, 3))

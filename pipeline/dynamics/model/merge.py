@@ -72,8 +72,8 @@ def frames_of(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, Fram
         if isinstance(body, FlexibleBody):
             bundle = bundles[name]
             for k, frame in enumerate(bundle["frame"].values):
-                place = Placement(bundle["frame_position"].values[k], bundle["frame_rotation"].values[k])
-                frames[f"{name}.{frame}"] = Frame(name, place)
+                placement = Placement(bundle["frame_position"].values[k], bundle["frame_rotation"].values[k])
+                frames[f"{name}.{frame}"] = Frame(name, placement)
         elif isinstance(body, MeshedRigidBody):
             raise InputError(f"[body.{name}.mesh]", "its mass and frames have not been read from the recipe")
         else:
@@ -83,10 +83,10 @@ def frames_of(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, Fram
     return frames
 
 
-def find_frame(frames: Mapping[str, Frame], name: str, place: str) -> Frame:
+def find_frame(frames: Mapping[str, Frame], name: str, path: str) -> Frame:
     """The frame called `name`; InputError with the nearest name when there is none."""
     if name not in frames:
-        raise InputError(place, f"there is no frame '{name}'", suggestion(name, list(frames)))
+        raise InputError(path, f"there is no frame '{name}'", suggestion(name, list(frames)))
     return frames[name]
 
 
@@ -191,11 +191,13 @@ def start_places(
     known: dict[int, Placement] = {0: Placement()}
     same = _same_place(scene, frames)
     for i, group in enumerate(groups[1:], start=1):
-        for name, place in group.places.items():
+        for name, placement in group.places.items():
             pose = scene.body[name].pose  # type: ignore[union-attr]
             if pose is None:
                 continue
-            here = Placement(np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())).of(place.inverse())
+            here = Placement(np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())).of(
+                placement.inverse()
+            )
             if i in known and not _close(known[i], here, same):
                 raise InputError(
                     f"[body.{name}.pose]",

@@ -262,8 +262,8 @@ def _rubbing(numbering: Numbering, parts: Parts, closures: tuple[Closure | Coupl
     return joint_friction.fill(numbering, parts.joint_frictions, closures, slot)
 
 
-def _pose_row(place: Placement) -> np.ndarray:
-    return np.concatenate([place.p, place.R.ravel()])
+def _pose_row(placement: Placement) -> np.ndarray:
+    return np.concatenate([placement.p, placement.R.ravel()])
 
 
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:

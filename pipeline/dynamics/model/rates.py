@@ -136,11 +136,11 @@ def _coupling_row(
     numbering, L = model.numbering, model.length
     row, size = np.zeros((2, model.nv + len(model.drives)))
     for side, factor in coupling.parts:
-        place, along = poses[side.b.link].of(side.b.place).p, side.along(poses)
+        origin, along = poses[side.b.link].of(side.b.place).p, side.along(poses)
         unit = abs(factor) / row_unit(coupling, L)
         route = uncommon(closure_route(numbering, numbering.site(side.a), numbering.site(side.b)))
         for coordinate, column, sign in route:
-            turn, arm = motion.turn[column], place - motion.at[column]
+            turn, arm = motion.turn[column], origin - motion.at[column]
             shift = motion.shift[column] + np.cross(turn, arm)
             angle = float(np.linalg.norm(turn))
             way = float(np.linalg.norm(motion.shift[column])) + angle * (float(np.linalg.norm(arm)) + L * LEAST_ARM)
@@ -195,8 +195,8 @@ def motions(model: Model, poses: Sequence[Placement]) -> Motions:
     for site, frame, first in numbering.ports:
         on = numbering.sites[site].link
         mine, moving = slice(first, first + len(numbering.moving(on))), numbering.bases[on].moving
-        turns, slides, place = _shape_motions(model, on, frame, poses[on])
-        turn[mine], shift[mine], at[mine] = moving.T @ turns, moving.T @ slides, place
+        turns, slides, moved = _shape_motions(model, on, frame, poses[on])
+        turn[mine], shift[mine], at[mine] = moving.T @ turns, moving.T @ slides, moved
     return Motions(turn, shift, at)
 
 
@@ -205,8 +205,8 @@ def _shape_motions(model: Model, link: int, frame: str, pose: Placement) -> tupl
     own, unit = model.links[link].branch.frame, model.length * model.links[link].mass ** 0.5
     turn, shift, at = _frame_motions(model, link, frame, pose)
     if own is not None:
-        held, moved_by, place = _frame_motions(model, link, own, pose)
-        turn, shift = turn - held, shift - moved_by - np.cross(held, at - place)
+        held, moved_by, origin = _frame_motions(model, link, own, pose)
+        turn, shift = turn - held, shift - moved_by - np.cross(held, at - origin)
     return unit * turn, unit * shift, at
 
 

@@ -32,16 +32,16 @@ def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray
     """
     from scipy.linalg import qr  # slow to import, and most mechanisms have nothing to choose
 
-    kept, count = np.zeros(len(spread), dtype=bool), min(rank, *spread.shape)
+    selected, count = np.zeros(len(spread), dtype=bool), min(rank, *spread.shape)
     if not count:
-        return kept, 1.0
+        return selected, 1.0
     compared = spread / np.where(scale > 0.0, scale, 1.0)[:, None]
     if not np.isfinite(compared).all():
-        kept[:count] = True
-        return kept, 0.0
+        selected[:count] = True
+        return selected, 0.0
     R, order = qr(compared.T, mode="r", pivoting=True)
-    kept[order[:count]] = True
-    return kept, float(R[count - 1, count - 1] ** 2)
+    selected[order[:count]] = True
+    return selected, float(R[count - 1, count - 1] ** 2)
 
 
 def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ def _coupling_length(
     return total**0.5
 
 
-def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
+def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
     """Write into h, a copy of the model's wiring, that the `kept` rows are solved for.
 
     kept: per row of the closure table.  No size and no offset changes except the number of rows solved for.
@@ -118,9 +118,9 @@ def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
     start = 0
     for closure, was in zip(closures, all_rows, strict=True):
         span = slice(was["row0"], was["row0"] + was["n_rows"])
-        order = np.argsort(~kept[span], kind="stable")
+        order = np.argsort(~selected[span], kind="stable")
         rows[span] = declared[span][order]
-        closure["kept0"], closure["n_kept"] = start, np.sum(kept[span])
+        closure["kept0"], closure["n_kept"] = start, np.sum(selected[span])
         closure["threes"] = threes(closure["n_kept"])
         start += int(closure["n_kept"])
     envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)

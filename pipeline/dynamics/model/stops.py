@@ -55,8 +55,8 @@ def ends(scene: Scene, length: float) -> list[tuple[str, End]]:
 
 
 def _both(scene: Scene, name: str, stop: Stop, length: float) -> dict[str, End]:
-    place = f"[stop.{name}]"
-    joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, place)
+    path = f"[stop.{name}]"
+    joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, path)
 
     def read(key: str, dimension: str) -> float:
         try:
@@ -67,7 +67,7 @@ def _both(scene: Scene, name: str, stop: Stop, length: float) -> dict[str, End]:
     limits = {end: read(end, coordinate.dimension) for end in stop.ends}
     if len(limits) == 2 and not limits["lower"] < limits["upper"]:
         raise InputError(
-            place,
+            path,
             f"its lower end must lie below its upper one; lower = {limits['lower']:.6g}, upper = {limits['upper']:.6g}",
             "exchange them, or leave one out",
         )

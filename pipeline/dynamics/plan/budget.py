@@ -68,14 +68,14 @@ class Search:
     def decide(
         self,
         effect: Effect,
-        kept: bool,
+        recorded: bool,
         evidence: str,
         reason: str,
         estimate: Mapping[str, float] | None = None,
         uncertainty: Mapping[str, float] | None = None,
     ) -> None:
         """Write down what becomes of an effect."""
-        self.decisions[effect.name] = Decision(effect, kept, evidence, reason, estimate or {}, uncertainty or {})
+        self.decisions[effect.name] = Decision(effect, recorded, evidence, reason, estimate or {}, uncertainty or {})
 
     def judge(
         self,

@@ -250,13 +250,13 @@ def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) ->
 
 def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -> None:
     """Gravity, friction, damping, stiffening, stops: kept unless a cheap run shows that they do little."""
-    kept = {d.effect.name for d in search.decisions.values() if d.kept}
+    remaining = {d.effect.name for d in search.decisions.values() if d.kept}
     gone = list(search.gone)
     dear = any(d.kept and d.effect.kind == FLEXIBILITY for d in search.decisions.values()) and any(
         d.kept and d.effect.kind == CLEARANCE for d in search.decisions.values()
     )
     for effect in others:
-        if effect.within and effect.within not in kept:
+        if effect.within and effect.within not in remaining:
             owner = next(e for e in every if e.name == effect.within)
             search.decide(effect, False, search.decisions[owner.name].evidence, f"goes with the {owner.words}")
             gone.append(effect)

@@ -55,10 +55,10 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         with making:
             return another(other(name))
 
-    def alone(k: int, alive: Progress, place: Place | None = None) -> tuple[xr.Dataset, str]:
+    def alone(k: int, alive: Progress, lane: Place | None = None) -> tuple[xr.Dataset, str]:
         """A member on an engine of its own, so that it does not depend on who ran before."""
         mine = another(engine)
-        mine.straight.place = place
+        mine.straight.place = lane
         last, trajectory, switched = follow(mine, starts[k], alive, heir)
         return _member(last, trajectory, names), switched
 
@@ -71,8 +71,8 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         else:
 
             def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
-                with crews.place() as place:
-                    return alone(k, alive, place)
+                with crews.place() as lane:
+                    return alone(k, alive, lane)
 
             runs = side_by_side(member, requested.members, done, crews.lanes)
     members, reasons = [one for one, _ in runs], [switched for _, switched in runs if switched]
@@ -90,7 +90,7 @@ def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np
         yield (offsets * (requested.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True))).ravel()
 
 
-def kept_bodies(model: Model, requested: tuple[str, ...] | None, place: str) -> list[str]:
+def kept_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> list[str]:
     """Bodies whose motion is kept: those asked for, else those that have contacts, without contacts all."""
     known = [n for n, b in model.scene.body.items() if b.type != "ground"]
     if requested is None:
@@ -98,7 +98,7 @@ def kept_bodies(model: Model, requested: tuple[str, ...] | None, place: str) -> 
         return sorted({frames[f].body for c in model.contacts for f in c.joint.between} & set(known)) or known
     for name in requested:
         if name not in known:
-            raise InputError(place, f"there is no body '{name}'", f"known: {', '.join(known)}")
+            raise InputError(path, f"there is no body '{name}'", f"known: {', '.join(known)}")
     return list(requested)
 
 
@@ -106,16 +106,16 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     model = engine.model
     regular = output_times(engine.breaks, model.scene.output.interval)
     peak, count, fraction = _contact_statistics(engine, trajectory)
-    kept = np.searchsorted(trajectory.time, regular)
+    rows = np.searchsorted(trajectory.time, regular)
     seen = observed(engine, trajectory)
     require_closed(model, trajectory, seen)
     series = motion_series(Motions(model, seen).several(names), model.mechanism.origin)
     variables = {
-        **{name: (dims, values[kept]) for name, (dims, values) in series.items()},
+        **{name: (dims, values[rows]) for name, (dims, values) in series.items()},
         # of the rows at events, too: an impact is shorter than the output interval
         "peak_acceleration": (("body", "axis"), np.abs(series["acceleration"][1]).max(axis=0)),
-        "contact_normal_force": (("time", "contact"), seen.touch["normal_force"][kept]),
-        "contact_offset": (("time", "contact", "axis"), seen.touch["offset"][kept]),
+        "contact_normal_force": (("time", "contact"), seen.touch["normal_force"][rows]),
+        "contact_offset": (("time", "contact", "axis"), seen.touch["offset"][rows]),
         "impact_count": (("contact",), count),
         "peak_force": (("contact",), peak),
         "contact_time_share": (("contact",), fraction),

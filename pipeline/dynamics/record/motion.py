@@ -128,8 +128,8 @@ class Motions:
         i = self.model.mechanism.link_of[name]
         link, body = self.model.links[i], self.model.scene.body[name]
         if isinstance(body, RigidBody):
-            place = link.places[name]
-            return self.link(i).at(place.point(np.array(body.com)), place.R)
+            placement = link.places[name]
+            return self.link(i).at(placement.point(np.array(body.com)), placement.R)
         assert link.bundle is not None
         shape, first = link.bundle["modal_first_moment"].values, link.bundle["first_moment"].values
         arm, rate, second = self.modal(i).shift(shape, bow(self.model.mechanism, i))
@@ -157,12 +157,12 @@ class Motions:
         if self.model.mechanism.all_rigid:
             return
         for k, name in enumerate(names):
-            i, place = self._place(name)
+            i, placement = self._place(name)
             link, bundle = self.link(i), self.model.links[i].bundle
             if bundle is not None:
                 label = name.partition(".")[2]
                 S = bundle["frame_translation_shape"].sel(frame=label).values
-                bent = place.p + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
+                bent = placement.p + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
                 positions[:, k] = link.p + turned(link.R, bent)
 
     @cached_property
@@ -175,16 +175,16 @@ class Motions:
         """Velocity of the origin and angular velocity of every named frame, world axes, shape (time, 3) each."""
         velocities = {}
         for name in self.model.mechanism.frames:
-            i, place = self._place(name)
+            i, placement = self._place(name)
             link, bundle = self.link(i), self.model.links[i].bundle
             if bundle is None:
-                velocities[name] = link.at(place.p).v, link.omega
+                velocities[name] = link.at(placement.p).v, link.omega
                 continue
             label, state = name.partition(".")[2], self.modal(i)
             S, P = (bundle[f"frame_{k}_shape"].sel(frame=label).values for k in ("translation", "rotation"))
             arm, rate, second = state.shift(S, bow(self.model.mechanism, i, label))
             turning = turned(link.R, _angular_velocity(state.q @ P.T, state.u @ P.T))
-            velocities[name] = link.moving(place.p + arm, rate, second).v, link.omega + turning
+            velocities[name] = link.moving(placement.p + arm, rate, second).v, link.omega + turning
         return velocities
 
     def _place(self, name: str) -> tuple[int, Placement]:

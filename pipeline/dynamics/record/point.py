@@ -16,7 +16,7 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
 from flexclear.pipeline.core.scene.load import with_numbers
-from flexclear.pipeline.core.scene.output_quantities import OF_CONTACTS, Kept
+from flexclear.pipeline.core.scene.output_quantities import OF_CONTACTS, Recorded
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
@@ -55,7 +55,7 @@ class Runner:
     """
 
     bundles: Mapping[str, xr.Dataset]
-    kept: Sequence[Kept]
+    recorded: Sequence[Recorded]
     members: int = 0
     error: bool = False
     engine: Engine | None = None
@@ -63,19 +63,19 @@ class Runner:
     #: what is seen of all rows is large, and seen in turn it is there once
     _looking: Lock = field(default_factory=Lock)
 
-    def run(self, scene: Scene, place: Place | None = None, alive: Progress = silent) -> Point:
+    def run(self, scene: Scene, lane: Place | None = None, alive: Progress = silent) -> Point:
         """One point; what physics or the input of this point refuses is told in the point, not raised.
 
         place: where its steps may be taken beside those of other points, which changes no bit of it.  alive: called now
         and then; what it raises ends the work.
         """
-        scene = thinned(scene, self.kept)
+        scene = thinned(scene, self.recorded)
         try:
-            values, deviation, count = self._values(scene, place, alive)
+            values, deviation, count = self._values(scene, lane, alive)
             if not self.error:
                 return Point(values, {}, deviation, count)
             tight = with_numbers(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
-            better, _, more = self._values(tight, place, alive)
+            better, _, more = self._values(tight, lane, alive)
         except (SolverError, InputError) as error:
             return Point({}, {}, {}, 0, str(error))
         return Point(values, {name: np.abs(better[name] - v) for name, v in values.items()}, deviation, count + more)
@@ -91,24 +91,24 @@ class Runner:
 
     def _steps_abreast(self, scene: Scene) -> bool:
         try:
-            self._engines(thinned(scene, self.kept))
+            self._engines(thinned(scene, self.recorded))
         except (SolverError, InputError):
             return False  # as the points will tell, each by itself
         return self.engine is not None and side_by_side(self.engine)
 
-    def _values(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[Values, Values, int]:
+    def _values(self, scene: Scene, lane: Place | None, alive: Progress) -> tuple[Values, Values, int]:
         engine, other = self._engines(scene)
         # exact, since how many points are run side by side depends on the machine and on how long they take
         engine.straight.requested = engine.straight.exact = True
-        engine.straight.place = place
-        if in_sections(self.kept):
-            values, count = _sections(engine, self.kept, alive)
+        engine.straight.place = lane
+        if in_sections(self.recorded):
+            values, count = _sections(engine, self.recorded, alive)
             return values, {}, count
         rows, count = list[Values](), 0
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, alive, other)
             with self._looking:
-                rows.append(_kept(last, trajectory, self.kept))
+                rows.append(_kept(last, trajectory, self.recorded))
             count += trajectory.counters["evaluations"]
         if not self.members:
             return rows[0], {}, count
@@ -137,23 +137,23 @@ class Runner:
         return [perturbed(engine, start, jacobian, moved) for moved in offsets]
 
 
-def in_sections(kept: Sequence[Kept]) -> bool:
+def in_sections(recorded: Sequence[Recorded]) -> bool:
     """Whether points are motions that their laws repeat, looked at once in each period."""
-    return any(one.reduction == "sections" for one in kept)
+    return any(one.reduction == "sections" for one in recorded)
 
 
-def thinned(scene: Scene, kept: Sequence[Kept]) -> Scene:
+def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
     """The scene with no more regular outputs than what is kept needs."""
-    if in_sections(kept):
+    if in_sections(recorded):
         # only the states between the stretches of a period are looked at
         return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": section_period(scene)})})
-    if any(one.throughout for one in kept):
+    if any(one.throughout for one in recorded):
         return scene
     interval = max(scene.output.interval, (scene.time.end - scene.time.start) / LOOKS)
     return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": interval})})
 
 
-def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Kept]) -> Values:
+def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
@@ -175,7 +175,7 @@ def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Kept]) -> Value
     return values
 
 
-def _sections(engine: Engine, kept: Sequence[Kept], alive: Progress) -> tuple[Values, int]:
+def _sections(engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> tuple[Values, int]:
     """What is kept once in each period, after the transient, and the evaluations that all periods took."""
     scene = engine.model.scene
     requested, period = scene.sections or Sections(), section_period(scene)
@@ -189,14 +189,14 @@ def _sections(engine: Engine, kept: Sequence[Kept], alive: Progress) -> tuple[Va
         if done.number >= requested.transient:
             here = done.parts[looked_at]
             motions = Motions(engine.model, observed(parts[looked_at], replace(here, rows=here.rows[:1])))
-            for one in kept:
+            for one in recorded:
                 values.setdefault(one.name, []).append(_series(motions, {}, one)[0])
         if done.number + 1 == requested.transient + requested.periods:
             break
     return {name: np.array(rows) for name, rows in values.items()}, evaluations
 
 
-def _series(motions: Motions, forces: Mapping[str, tuple[np.ndarray, np.ndarray]], one: Kept) -> np.ndarray:
+def _series(motions: Motions, forces: Mapping[str, tuple[np.ndarray, np.ndarray]], one: Recorded) -> np.ndarray:
     """Values at all rows, shape (rows, components), as the run's dataset has them."""
     owner, kind = one.quantity.owner, one.quantity.kind
     if kind in ("force", "moment"):
@@ -211,7 +211,7 @@ def _series(motions: Motions, forces: Mapping[str, tuple[np.ndarray, np.ndarray]
     return values[:, 0]
 
 
-def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Kept) -> float:
+def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Recorded) -> float:
     contact = [c.name for c in engine.model.contacts].index(one.quantity.owner)
     if one.quantity.kind == "impulse":
         ledger = seen.state[-1, engine.model.speeds.stop :]

@@ -58,11 +58,11 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     count = requested.transient + requested.periods
     followed = range(requested.transient, min(count, requested.transient + requested.exponent_periods))
     tape, begin = _Tape(names, engine.start + requested.phase), Cursor()
-    kept = _Recorder.of(engine, start)
-    if kept is not None and kept.state is not None:
-        remember(engine, kept.state.arrays)
-        tape.unpack(kept.state.arrays)
-        begin = Cursor.unpacked(kept.state.arrays)
+    recorder = _Recorder.of(engine, start)
+    if recorder is not None and recorder.state is not None:
+        remember(engine, recorder.state.arrays)
+        tape.unpack(recorder.state.arrays)
+        begin = Cursor.unpacked(recorder.state.arrays)
     for done in periods(parts, start, followed, begin):
         progress((done.number + 1) / count, f"period {done.number + 1} of {count}")
         if done.number >= requested.transient:
@@ -70,8 +70,8 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         if done.number + 1 == count:
             tape.orbit = tape.motion_at_waypoints(parts, done)
             break
-        if kept is not None:
-            kept.keep({**memory(engine), **done.after.packed()}, tape)
+        if recorder is not None:
+            recorder.keep({**memory(engine), **done.after.packed()}, tape)
     growth = np.array(tape.growth[: len(followed)])
     facts = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": tape.lost}
     variables = tape.variables(engine.model) | {"growth": (("followed",), growth)}
@@ -162,8 +162,8 @@ class _Tape:
 
     def _motion(self, part: Engine, trajectory: Trajectory, rows: np.ndarray) -> Variables:
         """Motion of the kept bodies, and the contacts' offsets, at some rows."""
-        kept = replace(trajectory, rows=trajectory.rows[rows])
-        seen, model = observed(part, kept), part.model
+        at_rows = replace(trajectory, rows=trajectory.rows[rows])
+        seen, model = observed(part, at_rows), part.model
         series = motion_series(Motions(model, seen).several(self.names), model.mechanism.origin)
         if model.contacts:
             series["contact_offset"] = (("time", "contact", "axis"), seen.touch["offset"].copy())

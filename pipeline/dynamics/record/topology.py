@@ -58,8 +58,8 @@ def _singular_values(
 ) -> np.ndarray:
     """Singular values of every row's closure Jacobian, with the rows solved for there; shape (time, rank)."""
     parts = []
-    for part, kept in trajectory.parts():
-        engine.keep(kept)
+    for part, selected in trajectory.parts():
+        engine.keep(selected)
         stored = seen.jacobian[part]
         for first in range(0, max(len(stored), 1), AT_ONCE):
             J = selection.dense(engine.model, engine.h, stored[first : first + AT_ONCE])

@@ -132,13 +132,13 @@ def _forest(model: Model, names: list[str], bodies: list[str]) -> list[str]:
             b = root[b]
         return b
 
-    kept = []
+    tree = []
     for name in names:
         a, b = (top(model.mechanism.frames[f].body) for f in model.scene.joint[name].between)
         if a != b:
             root[a] = b
-            kept.append(name)
-    return kept
+            tree.append(name)
+    return tree
 
 
 def _far_side(model: Model, name: str, tree: list[str]) -> tuple[set[str], float]:

@@ -47,8 +47,8 @@ class Crew:
     kept: closure rows that its code solves for.
     """
 
-    def __init__(self, kept: bytes, code: Code, lanes: int) -> None:
-        self.kept, self.lanes = kept, lanes
+    def __init__(self, rows: bytes, code: Code, lanes: int) -> None:
+        self.rows, self.lanes = rows, lanes
         self.wait = stacks.addresses()["wait"]
         self._run = functions.LANES(code.abreast)
         self._stacks = stacks.Stacks(lanes)
@@ -141,12 +141,12 @@ class Crews:
             with self._boarding:
                 self._aboard[thread] -= 1
 
-    def crew(self, thread: int, kept: bytes, code: Code) -> Crew:
+    def crew(self, thread: int, rows: bytes, code: Code) -> Crew:
         """That of a thread which evaluates with this code."""
         with self._boarding:
             made = self._crews.get((thread, code.abreast))
             if made is None:
-                made = self._crews[thread, code.abreast] = Crew(kept, code, self.width)
+                made = self._crews[thread, code.abreast] = Crew(rows, code, self.width)
             return made
 
     def close(self) -> None:

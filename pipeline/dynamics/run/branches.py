@@ -96,7 +96,7 @@ class _Pose:
         self.engine, self.nv, self.units = engine, engine.model.nv, engine.model.speed_scales
         self.rest = y.copy()
         self.rest[engine.model.speeds] = 0.0
-        engine.keep(np.ones(len(engine.kept), dtype=bool))
+        engine.keep(np.ones(len(engine.selected), dtype=bool))
         self.asked = initial.velocity_equations(engine.model, start_motions(engine), self.rest)
         self.J = self.asked.matrix[self.asked.n_given :]
         U, values, _ = np.linalg.svd(self.J)

@@ -68,7 +68,7 @@ class Engine:
     w: np.ndarray
     n: np.ndarray
     lengths: Mapping[int, int]
-    kept: np.ndarray
+    selected: np.ndarray
     mobility: Mobility
     start: float
     end: float
@@ -112,18 +112,18 @@ class Engine:
 
     def keep(self, rows: np.ndarray) -> None:
         """Solve for these closure rows from now on; the others must follow from them."""
-        if not np.array_equal(self.kept, rows):
-            self.kept[:] = rows
-            selection.write(self.model, self.h, self.kept)
+        if not np.array_equal(self.selected, rows):
+            self.selected[:] = rows
+            selection.write(self.model, self.h, self.selected)
         self.view(m.ROW_SCALE)[: len(rows)] = 0.0
         self.connect()
 
     def connect(self) -> None:
         """Let the steps evaluate with straight code where there is some for the rows solved for."""
-        kept, known = self.kept.tobytes(), self.straight
+        rows, known = self.selected.tobytes(), self.straight
         compiled = None
-        if known.used and kept in known.rows:
-            compiled = known.crew.wait if known.crew and known.crew.kept == kept else known.addresses.get(kept)
+        if known.used and rows in known.rows:
+            compiled = known.crew.wait if known.crew and known.crew.rows == rows else known.addresses.get(rows)
         self.h[m.RATES] = compiled or self.h[m.EVALUATE]
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
@@ -132,10 +132,10 @@ class Engine:
         by = crew.advance if crew is not None and self.h[m.RATES] == crew.wait else None
         self.entry.advance(self.h, self.model.arrays.f, self.w, self.n, outputs, rows, events, by)
 
-    def view(self, place: int) -> np.ndarray:
+    def view(self, index: int) -> np.ndarray:
         """A stretch of the work space, not copied."""
-        o = self.h[place]
-        return self.w[o : o + self.lengths[place]]
+        o = self.h[index]
+        return self.w[o : o + self.lengths[index]]
 
     def table(self, table: Any) -> np.ndarray:
         """A table of the work space with named fields, not copied, shape (rows,)."""
@@ -214,8 +214,8 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
     """The engine of a model whose functions are compiled, with a work space of its own."""
     solver, space = model.scene.solver, model.arrays.work_space(method.room)
     entry.connect(space.h)
-    kept, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
-    engine = Engine(model, entry, method, *space, kept, mobility, time.start, time.end, solver.rtol, Straight())
+    selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
+    engine = Engine(model, entry, method, *space, selected, mobility, time.start, time.end, solver.rtol, Straight())
     engine.control[m.LENGTH] = model.length
     return engine
 

@@ -96,24 +96,24 @@ def hermite(time: np.ndarray, before: np.ndarray, after: np.ndarray) -> Pieces:
     return Pieces(tuple(pieces))
 
 
-def _coordinate(scene: Scene, actuator: str, place: str = "[drive]") -> tuple[str, int, Coordinate]:
+def _coordinate(scene: Scene, actuator: str, path: str = "[drive]") -> tuple[str, int, Coordinate]:
     """Joint of an actuator, ``joint`` or ``joint.coordinate``; number and declaration of its coordinate."""
     joint, _, coordinate = actuator.partition(".")
-    return coordinate_of(scene, joint, coordinate or None, place)
+    return coordinate_of(scene, joint, coordinate or None, path)
 
 
 def _with_drives(scene: Scene, requested: Mapping[str, PathDrive], names: list[str]) -> Scene:
     """The scene with a drive per actuator, called like it; its law is given later."""
-    kept = {n: d for n, d in scene.drive.items() if n not in requested}
+    others = {n: d for n, d in scene.drive.items() if n not in requested}
     made = {}
     for path, drive in requested.items():
         for name in (a for a in drive.actuators or () if a in names):
-            place = f"[drive.{path}.actuators]"
-            if name in kept or name in made or name in scene.load:
-                raise InputError(place, f"something called '{name}' acts already", "name each actuator once")
-            joint, _, _ = _coordinate(scene, name, place)
+            where = f"[drive.{path}.actuators]"
+            if name in others or name in made or name in scene.load:
+                raise InputError(where, f"something called '{name}' acts already", "name each actuator once")
+            joint, _, _ = _coordinate(scene, name, where)
             made[name] = JointDrive(joint=joint, coordinate=_named(name), law=Constant(type="constant"))
-    return _changed(scene, {"drive": {**kept, **made}})
+    return _changed(scene, {"drive": {**others, **made}})
 
 
 def _named(actuator: str) -> str | None:
@@ -138,11 +138,11 @@ def _enough(engine: Engine, scene: Scene, requested: Mapping[str, PathDrive], na
         free = free @ null_space(free[[nv + k for k in held]], rcond=RANK)
     of_path = free[[nv + k for k in known]]
     of_actuators = np.array([_rate(engine, scene, name) @ free for name in names])
-    place = f"[drive.{next(iter(requested))}.actuators]"
+    where = f"[drive.{next(iter(requested))}.actuators]"
     rank, both = _rank(of_actuators), _rank(np.vstack([of_actuators, of_path]))
     if both > rank:
         raise InputError(
-            place,
+            where,
             f"{', '.join(names)} cannot produce this motion: with them held, {both - rank} of its freedoms remain",
             "name further actuators",
         )
@@ -150,7 +150,7 @@ def _enough(engine: Engine, scene: Scene, requested: Mapping[str, PathDrive], na
         return names
     if any(path.allocation == "unique" for path in requested.values()):
         raise InputError(
-            place,
+            where,
             f"{len(names)} actuators act on {rank} freedoms: their forces are not unique",
             f'name {rank} of them, or ask for allocation = "least-norm"',
         )

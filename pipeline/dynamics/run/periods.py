@@ -198,16 +198,16 @@ def _follow(part: Engine, here: Moment) -> Moment | None:
 def _handed(part: Engine, here: Moment) -> Handover:
     """A moment as what another method would have left of this stretch: one row, and the contacts' open events."""
     counters = np.zeros(m.INTEGERS - m.STATUS, dtype=np.int64)
-    for place, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.begun))):
-        counters[place - m.STATUS] = value
+    for index, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.begun))):
+        counters[index - m.STATUS] = value
     lasting = np.zeros(len(LASTING))
     lasting[0] = part.start
     rows = m.empty_record(1, len(part.model.contacts), len(here.y))
     first = m.record(rows, len(part.model.contacts))
     first.time[:], first.state[:] = part.start, here.y
     first.modes[:], first.latched[:] = here.modes[: len(part.model.contacts)], here.latched[: len(part.model.contacts)]
-    kept = ((part.start, part.kept.copy()),)
-    return Handover(here.y, here.modes, here.latched, here.watched, counters, lasting, rows, here.begun, kept)
+    selections = ((part.start, part.selected.copy()),)
+    return Handover(here.y, here.modes, here.latched, here.watched, counters, lasting, rows, here.begun, selections)
 
 
 def _moment(part: Engine, trajectory: Trajectory) -> Moment:

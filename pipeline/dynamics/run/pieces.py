@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.singular_pass import Pass
 
 #: arrays of an engine that change as it works
-MEMORY = ("w", "n", "h", "kept")
+MEMORY = ("w", "n", "h", "selected")
 
 
 #: closure rows solved for, each from a time on [s]
@@ -169,13 +169,13 @@ def piece(engine: Engine, y: np.ndarray, outputs: np.ndarray, left: Handover | N
 
     left: what another method left or None.
     """
-    kept = journal.current()
-    if kept is None:
+    storage = journal.current()
+    if storage is None:
         return None
     begun = journal.seconds()
-    with kept.uncounted():
-        made = Piece(kept, engine, kept.name(digest(engine, y, outputs, *_arrays(left))), begun)
-        stored = kept.find(made.name)
+    with storage.uncounted():
+        made = Piece(storage, engine, storage.name(digest(engine, y, outputs, *_arrays(left))), begun)
+        stored = storage.find(made.name)
         if stored is not None:
             made.restore(stored, outputs)
     return made
@@ -187,7 +187,7 @@ def digest(engine: Engine, *arrays: np.ndarray) -> str:
     hashed = hashlib.sha256(described.encode())
     h = engine.h.copy()
     h[list(m.ADDRESSES)] = 0
-    for array in (h, engine.model.arrays.f, engine.w, engine.n, engine.kept, *arrays):
+    for array in (h, engine.model.arrays.f, engine.w, engine.n, engine.selected, *arrays):
         hashed.update(np.ascontiguousarray(array).tobytes())
     return hashed.hexdigest()
 

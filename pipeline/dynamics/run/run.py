@@ -228,8 +228,8 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
     Raises SolverError where one of them could not be evaluated.
     """
     parts = list[Blocks]()
-    for part, kept in trajectory.parts():
-        engine.keep(kept)
+    for part, selected in trajectory.parts():
+        engine.keep(selected)
         out = observe_blocks(engine, trajectory.rows[part])
         for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
             row, lost = trajectory.rows[part][k], out["status"][k, 0]

@@ -30,16 +30,16 @@ def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
 
     As many as the rank of the mechanism.  Where no row is redundant there is nothing to choose.
     """
-    everything = np.ones(len(engine.kept), dtype=bool)
+    everything = np.ones(len(engine.selected), dtype=bool)
     if not engine.mobility.redundant:
         return 1.0
     engine.keep(everything)
     engine.attempt(y, t)
     spread = engine.rows(m.SPREAD)
     scales = selection.row_scales(engine.model, spread, _natural_lengths(engine))
-    kept, ratio = selection.choose(spread, scales, engine.mobility.rank)
-    engine.keep(kept)
-    engine.view(m.ROW_SCALE)[: kept.sum()] = scales[kept] ** 2
+    selected, ratio = selection.choose(spread, scales, engine.mobility.rank)
+    engine.keep(selected)
+    engine.view(m.ROW_SCALE)[: selected.sum()] = scales[selected] ** 2
     return ratio
 
 
@@ -53,12 +53,12 @@ def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
 
     The state in Y and its slope stay as they are: the motion does not depend on the selection.
     """
-    row_scale = engine.view(m.ROW_SCALE)[: len(engine.kept)].copy()
+    row_scale = engine.view(m.ROW_SCALE)[: len(engine.selected)].copy()
     y, slope = engine.view(m.Y).copy(), engine.slope.copy()
-    pivots, before = engine.view(m.PIVOT), engine.kept.copy()
+    pivots, before = engine.view(m.PIVOT), engine.selected.copy()
     present = float(pivots[m.LAST_PIVOT])
     ratio = select_rows(engine, y, t) if engine.mobility.redundant else present
-    better = ratio > max(requested * present, BLIND) and not np.array_equal(before, engine.kept)
+    better = ratio > max(requested * present, BLIND) and not np.array_equal(before, engine.selected)
     if not better:
         engine.keep(before)
         engine.view(m.ROW_SCALE)[: len(row_scale)] = row_scale

@@ -158,8 +158,8 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
         J = singular.natural(engine.model, engine.h, engine.rows(m.JACOBIAN))
         return float(np.linalg.svd(J, compute_uv=False)[engine.mobility.rank - 1])
 
-    kept = engine.kept.copy()
-    engine.keep(np.ones(len(kept), dtype=bool))
+    saved = engine.selected.copy()
+    engine.keep(np.ones(len(saved), dtype=bool))
     low, times_of_passes = np.array([least(t) for t in times]), list[float]()
     bounded = np.concatenate([[np.inf], low, [np.inf]])
     for k in np.flatnonzero((low <= bounded[:-2]) & (low <= bounded[2:])):
@@ -168,7 +168,7 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
         t = _between(least, float(min((t, *bracket), key=least)), NEARLY * made.span, bracket)
         if least(t) < VANISHED * np.max(low) and not (times_of_passes and t - times_of_passes[-1] < SAME * made.span):
             times_of_passes.append(t)
-    engine.keep(kept)
+    engine.keep(saved)
     return tuple(_pass(sampler, made, t) for t in times_of_passes)
 
 

@@ -38,7 +38,7 @@ class StartMotion:
     """A motion out of the pose; kept: closure rows that are solved for on it."""
 
     motion: Collocation
-    kept: np.ndarray
+    selected: np.ndarray
 
     @property
     def state(self) -> np.ndarray:
@@ -59,7 +59,7 @@ def start_motion(engine: Engine, y: np.ndarray) -> StartMotion:
     way = _along(engine, motions[0], turn) if motions else None
     if way is None:
         raise SolverError(engine.mobility.start_refusal)
-    engine.keep(way.kept)
+    engine.keep(way.selected)
     return way
 
 
@@ -71,13 +71,13 @@ def _along(engine: Engine, way: Direction, turn: float) -> StartMotion | None:
     for k in range(HALVINGS):
         span = min(way.reaching(FIRST * 0.5**k), engine.breaks[1] - engine.start)
         singular.select_rows(engine, way.state(engine.start + span), engine.start + span)
-        kept, sampler = engine.kept.copy(), Sampler(engine)
+        saved, sampler = engine.selected.copy(), Sampler(engine)
         lead = Lead(way.state, turn if way.at_speed else 0.0)
         made = collocate(sampler, engine.start, way.start, span, None, lead)
         sampler.restore()
         engine.n[m.EVALUATIONS] += sampler.evaluations
         if made is not None:
-            return StartMotion(made, kept)
+            return StartMotion(made, saved)
     return None
 
 
@@ -90,9 +90,9 @@ def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) 
         until = engine.start + min(way.reaching(branches.WAY) for way in ways)
         changes = [_changes(engine, way, until) for way in ways]
         for number, choice in enumerate(choices):
-            place = "[start.branch]" if len(choices) == 1 else f"[start.branch.{number}]"
+            path = "[start.branch]" if len(choices) == 1 else f"[start.branch.{number}]"
             scene = engine.model.scene
-            joint, k, _ = coordinate_of(scene, choice.joint, choice.coordinate, place)
+            joint, k, _ = coordinate_of(scene, choice.joint, choice.coordinate, path)
             requested = [choice.sign * change[label(joint, scene.joint[joint].type, k)] for change in changes]
             near = [max(requested) - value <= ALIKE * max(map(abs, requested)) for value in requested]
             ways = [way for way, best in zip(ways, near, strict=True) if best]

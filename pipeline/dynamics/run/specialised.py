@@ -65,7 +65,7 @@ def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> I
     """
     engine.straight.requested = engine.straight.exact = True
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
-    if members >= FEW * threads and side_by_side(engine) and _code(engine, engine.kept.tobytes(), progress, lanes):
+    if members >= FEW * threads and side_by_side(engine) and _code(engine, engine.selected.tobytes(), progress, lanes):
         with crews(lanes, threads) as made:
             yield made
     else:
@@ -88,31 +88,31 @@ def _make(engine: Engine, progress: Progress) -> None:
 
     An integration that goes on in another process needs that of the rows which it has met before, too.
     """
-    straight, kept = engine.straight, engine.kept.tobytes()
+    straight, rows_of_engine = engine.straight, engine.selected.tobytes()
     if not suited(engine):
         return
     if straight.place is not None and straight.crew is None:
-        straight.crew = _crew(engine, kept, straight.place, progress)
-    if kept not in straight.rows and len(straight.rows) < SELECTIONS:
-        straight.rows.append(kept)
+        straight.crew = _crew(engine, rows_of_engine, straight.place, progress)
+    if rows_of_engine not in straight.rows and len(straight.rows) < SELECTIONS:
+        straight.rows.append(rows_of_engine)
     for rows in straight.rows:
-        if rows not in straight.addresses and not (straight.crew and straight.crew.kept == rows):
+        if rows not in straight.addresses and not (straight.crew and straight.crew.rows == rows):
             straight.addresses[rows] = _code(engine, rows, progress, lanes=int(straight.exact))
 
 
-def _crew(engine: Engine, kept: bytes, place: Place, progress: Progress) -> Crew | None:
+def _crew(engine: Engine, rows: bytes, lane: Place, progress: Progress) -> Crew | None:
     """Who takes the steps at a place, with the closure rows that the first integration there begins with."""
-    several = _code(engine, kept, progress, place.crews.width)
+    several = _code(engine, rows, progress, lane.crews.width)
     if not several:
         return None
-    code = Code(several, _code(engine, kept, progress, lanes=1), len(engine.model.arrays.f))
-    return place.crews.crew(place.thread, kept, code)
+    code = Code(several, _code(engine, rows, progress, lanes=1), len(engine.model.arrays.f))
+    return lane.crews.crew(lane.thread, rows, code)
 
 
-def _code(engine: Engine, kept: bytes, progress: Progress, lanes: int) -> int:
+def _code(engine: Engine, rows: bytes, progress: Progress, lanes: int) -> int:
     """Address of the code for closure rows; 0 where there is none."""
     h, parts = engine.h.copy(), engine.model.parts
-    selection.write(engine.model, h, np.frombuffer(kept, dtype=bool))
+    selection.write(engine.model, h, np.frombuffer(rows, dtype=bool))
     with _making:  # engines may run side by side
         wired = wiring(engine.model.arrays, h)
         known = _known.get((parts, wired, lanes))

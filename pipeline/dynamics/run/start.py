@@ -74,9 +74,9 @@ def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
         return project(engine, y)
     except SolverError as error:
         paths = [name for name, drive in engine.model.scene.drive.items() if isinstance(drive, PathDrive)]
-        place = f"[drive.{paths[0]}]" if paths else "[joint]"
+        path = f"[drive.{paths[0]}]" if paths else "[joint]"
         what = "correct where the path starts, or the poses" if paths else "correct lengths, frames or poses"
-        raise InputError(place, f"the mechanism cannot be assembled: {error}", what) from None
+        raise InputError(path, f"the mechanism cannot be assembled: {error}", what) from None
 
 
 def _look(engine: Engine, y: np.ndarray) -> None:

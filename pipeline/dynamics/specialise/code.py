@@ -58,8 +58,8 @@ def loads(program: Program) -> list[tuple[str, Any]]:
 def uses(program: Program) -> Counter[Symbol]:
     """How often each symbol is used by what the stores need."""
     counts: Counter[Symbol] = Counter()
-    for _, place, value in program.stores:
-        counts.update(s for s in (place, value) if isinstance(s, Symbol))
+    for _, index, value in program.stores:
+        counts.update(s for s in (index, value) if isinstance(s, Symbol))
     _use(program.block, counts)
     return counts
 
@@ -143,18 +143,18 @@ class Emitter:
     def emit(self) -> None:
         """Write everything."""
         self._block(self.program.block)
-        for array, place, value in self.program.stores:
+        for array, index, value in self.program.stores:
             operand = self._value(value, INTEGER if array in "hn" else FLOAT)
             for lane in range(self.lanes):
-                self.builder.store(self._of(operand, lane), self.where(array, self._place(place, lane), lane))
+                self.builder.store(self._of(operand, lane), self.where(array, self._place(index, lane), lane))
 
     def _value(self, value: Any, kind: str) -> Any:
         if isinstance(value, Symbol):
             return self.values[value]
         return ir.Constant(self.types[kind], value if self.lanes == 1 else [value] * self.lanes)
 
-    def _place(self, place: Any, lane: int) -> Any:
-        return self._of(self.values[place], lane) if isinstance(place, Symbol) else place
+    def _place(self, index: Any, lane: int) -> Any:
+        return self._of(self.values[index], lane) if isinstance(index, Symbol) else index
 
     # Lanes -------------------------------------------------------------------------------------------------------
 
@@ -276,11 +276,11 @@ class Emitter:
             return self._instruction(INTRINSICS[name], values)
         return self._together([self._call(name, [self._of(v, lane) for v in values]) for lane in range(self.lanes)])
 
-    def _load(self, array: str, place: Any) -> Any:
+    def _load(self, array: str, index: Any) -> Any:
         builder = self.builder
-        if array == "f" and self.number is not None and not isinstance(place, Symbol):
-            return self.number(place)
-        places = [self.where(array, self._place(place, lane), lane) for lane in range(self.lanes)]
+        if array == "f" and self.number is not None and not isinstance(index, Symbol):
+            return self.number(index)
+        places = [self.where(array, self._place(index, lane), lane) for lane in range(self.lanes)]
         return self._together([builder.load(pointer) for pointer in places])
 
     def _product(self, s: Symbol, values: list[Any]) -> Any:

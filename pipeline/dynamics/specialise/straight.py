@@ -38,8 +38,8 @@ def program(rates: Callable, wiring: wired.Wiring) -> Program:
         trace.plain(rates)(h, f, w, n, wired.start(wired.STATE), wired.start(wired.RATES))
     except ZeroDivisionError:
         raise UnsuitedError("rows are solved for of which the wiring says that they depend on each other") from None
-    kept = _kept(h)
-    stores = [("w", place, value) for place, value in w.values.items() if kept(*wired.split(place))]
+    is_stored = _kept(h)
+    stores = [("w", index, value) for index, value in w.values.items() if is_stored(*wired.split(index))]
     return Program(trace.tape.block, [*stores, ("n", m.EVALUATION, n.values[m.EVALUATION]), ("n", m.ABRIDGED, 1)])
 
 
@@ -49,9 +49,9 @@ def _kept(h: list[int]) -> Callable[[int, int], bool]:
     rows = [(h[o + 2 * r], h[o + 2 * r + 1]) for r in range(h[m.N_KEPT_ROWS])]
     diagonal = {start - first + r for r, (first, start) in enumerate(rows)}
 
-    def kept(stretch: int, place: int) -> bool:
-        scale = stretch == m.ROW_SCALE and place >= h[m.N_CLOSURE_ROWS]
-        return stretch in KEPT or scale or (stretch == m.SCHUR and place in diagonal)
+    def kept(stretch: int, index: int) -> bool:
+        scale = stretch == m.ROW_SCALE and index >= h[m.N_CLOSURE_ROWS]
+        return stretch in KEPT or scale or (stretch == m.SCHUR and index in diagonal)
 
     return kept
 
@@ -88,8 +88,8 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
             h, f, numbers, lane = values
             begins = dict[int, Any]()
-            for k, place in enumerate(_numbers(made())):
-                stretch, inside = wired.split(place)
+            for k, index in enumerate(_numbers(made())):
+                stretch, inside = wired.split(index)
                 if stretch not in begins:
                     begins[stretch] = builder.gep(f, [builder.load(builder.gep(h, [_INTEGER(stretch)]))])
                 value = builder.load(builder.gep(begins[stretch], [_INTEGER(inside)]))
@@ -104,10 +104,10 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
             tape, (places, numbers) = made(), values
             given = [_arguments(builder, places, lane, lanes) for lane in range(lanes)]
             side_by_side = builder.bitcast(numbers, ir.VectorType(ir.DoubleType(), lanes).as_pointer())
-            row = {place: k for k, place in enumerate(_numbers(tape))}
+            row = {index: k for k, index in enumerate(_numbers(tape))}
 
-            def number(place: int) -> Any:
-                loaded = builder.load(builder.gep(side_by_side, [_INTEGER(row[place])]))
+            def number(index: int) -> Any:
+                loaded = builder.load(builder.gep(side_by_side, [_INTEGER(row[index])]))
                 loaded.align = 8
                 return loaded
 
@@ -121,7 +121,7 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
 
 def _numbers(tape: Program) -> list[int]:
     """Places in f of all that a program loads from there."""
-    return sorted({place for array, place in loads(tape) if array == "f" and isinstance(place, int)})
+    return sorted({index for array, index in loads(tape) if array == "f" and isinstance(index, int)})
 
 
 def exactly(kernel: Any) -> Any:
@@ -146,8 +146,8 @@ def _places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
     given: h, f, w, n, y and dy of each lane.
     """
     begins = dict[Any, Any]()
-    places = [(array, place) for array, place, _ in tape.stores] + loads(tape)
-    stretches = sorted({(array, wired.split(place)[0]) for array, place in places if isinstance(place, int)})
+    places = [(array, index) for array, index, _ in tape.stores] + loads(tape)
+    stretches = sorted({(array, wired.split(index)[0]) for array, index in places if isinstance(index, int)})
     for lane, (h, f, w, n, y, dy) in enumerate(given):
         builder.store(y, builder.gep(n, [_INTEGER(m.STATE)]))
         for array, stretch in stretches:
@@ -156,10 +156,10 @@ def _places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
                 begin = builder.load(builder.gep(h, [_INTEGER(stretch)]))
             begins[array, stretch, lane] = builder.gep({"f": f, "w": w, "n": n}[array], [begin])
 
-    def where(array: str, place: Any, lane: int) -> Any:
-        if not isinstance(place, int):
-            return builder.gep(given[lane]["hfwn".index(array)], [place])
-        stretch, inside = wired.split(place)
+    def where(array: str, index: Any, lane: int) -> Any:
+        if not isinstance(index, int):
+            return builder.gep(given[lane]["hfwn".index(array)], [index])
+        stretch, inside = wired.split(index)
         return builder.gep(begins[array, stretch, lane], [_INTEGER(inside)])
 
     return where

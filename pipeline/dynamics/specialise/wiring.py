@@ -40,16 +40,16 @@ def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
 
 def header(wired: Wiring) -> list[int]:
     """The array h of a wiring, with a stretch in the place of every offset in f and w."""
-    h = [*wired[0], *((place + 1) << STRETCH for place in range(SIZES, m.HEADER))]
+    h = [*wired[0], *((index + 1) << STRETCH for index in range(SIZES, m.HEADER))]
     for table, rows in zip(m.TABLES["h"], wired[1:], strict=True):
         h[table.place] = len(h)
         h += rows
     return h
 
 
-def split(place: int) -> tuple[int, int]:
+def split(index: int) -> tuple[int, int]:
     """The header's place of a stretch, -1 of an array itself, and where in it."""
-    return (place >> STRETCH) - 1, place & ((1 << STRETCH) - 1)
+    return (index >> STRETCH) - 1, index & ((1 << STRETCH) - 1)
 
 
 def start(stretch: int) -> int:
@@ -62,7 +62,7 @@ def ground(h: list[int]) -> dict[int, Any]:
     frame, own = h[m.LINK_FRAMES.place], h[m.OWN.place]
     axes = range(frame + m.FRAME.axes, frame + m.FRAME.axes + 9, 4)
     return {
-        **{place: 0.0 for place in range(frame, frame + m.FRAME.size)},
-        **{place: 1.0 for place in axes},
-        **{place: 0.0 for place in range(own, own + m.OWN.size)},
+        **{index: 0.0 for index in range(frame, frame + m.FRAME.size)},
+        **{index: 1.0 for index in axes},
+        **{index: 0.0 for index in range(own, own + m.OWN.size)},
     }

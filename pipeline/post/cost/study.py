@@ -129,12 +129,12 @@ def _span(
     costs = {name: np.full(shape, np.nan) for name in COSTS}
     for point in points:
         run = runs[point.key]
-        place = tuple(values[factor].index(point.factors[factor]) for factor in factors)
+        index = tuple(values[factor].index(point.factors[factor]) for factor in factors)
         if "refused" in run.attrs:
             continue
-        error[place] = errors(run)
+        error[index] = errors(run)
         for name in COSTS:
-            costs[name][place] = cost(run, name)
+            costs[name][index] = cost(run, name)
     coordinates |= values
     data[f"error_by_{group}"] = ((*factors, "quantity"), error)
     data |= {f"{name}_by_{group}": (factors, array) for name, array in costs.items()}

@@ -82,12 +82,12 @@ def curves(study: xr.Dataset) -> list[Curve]:
 
 def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Indices of the points that no other beats in both cost and error, by rising cost; NaN never wins."""
-    best, kept = np.inf, []
+    best, front = np.inf, []
     for k in np.lexsort((error, seconds)):
         if np.isfinite(seconds[k]) and np.isfinite(error[k]) and error[k] < best:
             best = error[k]
-            kept.append(int(k))
-    return np.array(kept, dtype=int)
+            front.append(int(k))
+    return np.array(front, dtype=int)
 
 
 def peers(study: xr.Dataset, tracks: Sequence[Mapping[str, Any]]) -> list[Curve]:

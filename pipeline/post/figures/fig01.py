@@ -108,8 +108,8 @@ def _centre(axes: Axes, seen: View, at: dict[str, np.ndarray], zorder: float) ->
 
 def _ball(axes: Axes, seen: View, centre: np.ndarray, color: str, zorder: float) -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 61)
-    place = seen.project(centre)
-    axes.fill(place[0] + BALL * np.cos(turn), place[1] + BALL * np.sin(turn), color=color, lw=0, zorder=zorder)
+    point = seen.project(centre)
+    axes.fill(point[0] + BALL * np.cos(turn), point[1] + BALL * np.sin(turn), color=color, lw=0, zorder=zorder)
 
 
 def _name(axes: Axes, seen: View, point: np.ndarray, text: str, shift: tuple[float, float]) -> None:
@@ -128,10 +128,10 @@ def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> N
         axes.plot(*foot[:2], "s", color="#3b4754", ms=7)
         axes.plot(*top[:2], "o", color=CSJ.color if f"A{k}" == JOINT else "#3b4754", ms=8)
         up = 1.0 if foot[1] > 0.0 else -1.0
-        for place, name, way in ((foot, f"B{k}", up), (top, f"A{k}", -up)):
-            text = f"{name}\n({place[0]:.1f}, {place[1]:.1f})"
+        for point, name, way in ((foot, f"B{k}", up), (top, f"A{k}", -up)):
+            text = f"{name}\n({point[0]:.1f}, {point[1]:.1f})"
             axes.annotate(
-                text, (place[0], place[1]), (0.0, 8.0 * way), textcoords="offset points", ha="center",
+                text, (point[0], point[1]), (0.0, 8.0 * way), textcoords="offset points", ha="center",
                 va="bottom" if way > 0.0 else "top", fontsize=8.2,
             )  # fmt: skip
     axes.plot(0.0, 0.0, "o", color="#3b4754", ms=8)

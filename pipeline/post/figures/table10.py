@@ -105,9 +105,9 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
         "can be predicted point by point (the smooth ideal stroke has far less at any tolerance); one whose energy "
         "ledger does not close at it, at the next decade at which it does. "
         f"Paper's step: a predictor-corrector at Table 6's step of {facts['step']:g} s, contacts noticed at "
-        f"the ends of steps, whatever the error. Paper's tolerance: {facts['damped']}, a damped implicit method of variable "
-        "step, at "
-        f"Table 6's integration tolerance of {1e3 * facts['tolerance']:g} mm as a share of the drives' stroke "
+        f"the ends of steps, whatever the error. Paper's tolerance: {facts['damped']}, a damped implicit method of "
+        f"variable step, at Table 6's integration tolerance of {1e3 * facts['tolerance']:g} mm as a fraction of the "
+        "drives' stroke "
         f"(rtol {float(timing.tolerance_rtol.median()):.1e}), whatever becomes of the energy (up to "
         f"{float(timing.tolerance_energy_error.max()):.1g} J).",
         *(_verdict(timing, way) for way in WAYS),

@@ -148,8 +148,8 @@ def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[st
     loose = {n for n, j in scene.get("joint", {}).items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"}
     flexible = {n for n, b in scene.get("body", {}).items() if b["type"] == "flexible"}
 
-    def weight(place: str) -> int:
-        family, _, rest = place.partition(".")
+    def weight(path: str) -> int:
+        family, _, rest = path.partition(".")
         part = rest.partition(".")[0]
         if (family, part in loose) == ("joint", True):
             return 0

@@ -152,7 +152,7 @@ def floor(scene: pv.Plotter, drawn: Mechanism) -> None:
 def look(scene: pv.Plotter, drawn: Mechanism) -> None:
     """Put the camera where all that is drawn over the run is in the picture."""
     width, height = scene.window_size
-    place, focus = eye(drawn.view, drawn.cloud, width / height, drawn.looks.zoom)
-    scene.camera_position = [tuple(place), tuple(focus), tuple(drawn.view.up)]
+    position, focus = eye(drawn.view, drawn.cloud, width / height, drawn.looks.zoom)
+    scene.camera_position = [tuple(position), tuple(focus), tuple(drawn.view.up)]
     scene.camera.view_angle = ANGLE
     scene.enable_anti_aliasing("msaa", multi_samples=4)

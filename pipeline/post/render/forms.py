@@ -70,7 +70,7 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     if flat is not None:
         return _plate(places, flat, 1.3 * width, layer)
     middle = places.mean(axis=0)
-    bars = [surfaces.bar(middle, place, 0.8 * width) for place in places if np.linalg.norm(place - middle) > width]
+    bars = [surfaces.bar(middle, point, 0.8 * width) for point in places if np.linalg.norm(point - middle) > width]
     return surfaces.merged([surfaces.moved(surfaces.sphere(1.2 * width), middle), *bars])
 
 
@@ -98,23 +98,23 @@ def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
 def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
     """A body whose joints are all in one place, or that has none."""
     width = WIDTH * size
-    place = places[0] if len(places) else com
-    arm = com - place
+    point = places[0] if len(places) else com
+    arm = com - point
     reach = float(np.linalg.norm(arm))
     kinds = [seat.joint for seat in seats]
     if reach > 1.5 * width:
-        return _arm(place, com, solid, width)
+        return _arm(point, com, solid, width)
     slide = next((seat for seat in seats if seat.joint in SLIDING), None)
     if slide is not None:
         block = surfaces.box((3.0 * width, 3.0 * width, 4.4 * width))
-        return surfaces.moved(block, place, slide.axes)
+        return surfaces.moved(block, point, slide.axes)
     wheel = next((seat for seat in seats if seat.joint in TURNING), None)
     if wheel is not None:
-        return surfaces.moved(_wheel(solid, wheel.axes[:, 2], size), place, surfaces.along(wheel.axes[:, 2]))
+        return surfaces.moved(_wheel(solid, wheel.axes[:, 2], size), point, surfaces.along(wheel.axes[:, 2]))
     if any(kind in BALLS for kind in kinds):
         return surfaces.EMPTY
     if solid is None:
-        return surfaces.moved(surfaces.sphere(2.0 * width), place)
+        return surfaces.moved(surfaces.sphere(2.0 * width), point)
     half = solid.half * min(1.0, LARGEST * size / float(solid.half.max()))
     if kinds and np.ptp(half) <= 1e-9 * half.max():  # alike about all axes and fixed to something: a ball
         return surfaces.moved(surfaces.sphere(float(half[0])), com)
@@ -122,15 +122,15 @@ def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Sol
     return surfaces.moved(part, com, solid.axes)
 
 
-def _arm(place: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) -> Surface:
+def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) -> Surface:
     """A body that hangs on one joint: a bar where its inertia is that of one, else a bob on an arm."""
-    axis = (com - place) / np.linalg.norm(com - place)
+    axis = (com - point) / np.linalg.norm(com - point)
     half = 0.0 if solid is None else float(solid.half.max())
-    if solid is not None and _slender(solid, axis) and half < 1.5 * np.linalg.norm(com - place):
+    if solid is not None and _slender(solid, axis) and half < 1.5 * np.linalg.norm(com - point):
         far = com + half * axis
-        return surfaces.bar(place, far, _thickness(solid, axis, width))
+        return surfaces.bar(point, far, _thickness(solid, axis, width))
     radius = 2.4 * width if solid is None else float(np.clip(0.8 * half, 1.8 * width, 4.0 * width))
-    return surfaces.merged([surfaces.bar(place, com, 0.7 * width), surfaces.moved(surfaces.sphere(radius), com)])
+    return surfaces.merged([surfaces.bar(point, com, 0.7 * width), surfaces.moved(surfaces.sphere(radius), com)])
 
 
 def _wheel(solid: Solid | None, axis: np.ndarray, size: float) -> Surface:
@@ -189,7 +189,7 @@ def _plane(places: np.ndarray, width: float) -> np.ndarray | None:
 def _apart(places: Sequence[np.ndarray], same: float) -> np.ndarray:
     """The places, those closer than `same` to an earlier one left out, shape (n, 3)."""
     offsets: list[np.ndarray] = []
-    for place in places:
-        if all(np.linalg.norm(place - other) > same for other in offsets):
-            offsets.append(place)
+    for point in places:
+        if all(np.linalg.norm(point - other) > same for other in offsets):
+            offsets.append(point)
     return np.array(offsets).reshape(-1, 3)

@@ -54,12 +54,12 @@ def strongest(run: xr.Dataset) -> np.ndarray:
         np.asarray(all_impacts["impact_time"][1]),
         np.nan_to_num(np.asarray(all_impacts["impact_peak_force"][1])),
     )
-    kept: list[float] = []
+    chosen: list[float] = []
     least = 4.0 * AROUND * float(run["time"].values[-1] - run["time"].values[0])
     for k in np.argsort(-force, kind="stable"):
-        if len(kept) < SHOWN and all(abs(times[k] - other) > least for other in kept):
-            kept.append(float(times[k]))
-    return np.sort(kept)
+        if len(chosen) < SHOWN and all(abs(times[k] - other) > least for other in chosen):
+            chosen.append(float(times[k]))
+    return np.sort(chosen)
 
 
 def speed_text(slower: float) -> str:
@@ -81,8 +81,8 @@ class Caption:
         shade = self.drawn(text)
         height = len(shade)
         ink = np.array([int(self.color[k : k + 2], 16) for k in (1, 3, 5)])
-        place = picture[-height:, : shade.shape[1]]
-        place[:] = np.round(place * (1.0 - shade[..., None]) + ink * shade[..., None]).astype(picture.dtype)
+        area = picture[-height:, : shade.shape[1]]
+        area[:] = np.round(area * (1.0 - shade[..., None]) + ink * shade[..., None]).astype(picture.dtype)
 
     def _drawn(self, text: str) -> np.ndarray:
         """How dark each pixel is, in [0, 1]."""

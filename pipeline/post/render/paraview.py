@@ -84,15 +84,15 @@ def _bodies(drawn: Mechanism, step: int) -> bytes:
 def _arrows(drawn: Mechanism, step: int, largest: float) -> bytes:
     shapes, forces = [], []
     for _, places, force in _forces(drawn.run):
-        for place, value in zip(places[step], force[step], strict=True):
+        for point, value in zip(places[step], force[step], strict=True):
             length = LONGEST * drawn.size * float(np.linalg.norm(value)) / largest
             if length > 0.01 * LONGEST * drawn.size:
-                shapes.append(arrow(place, value / np.linalg.norm(value) * length, THICK * drawn.size))
+                shapes.append(arrow(point, value / np.linalg.norm(value) * length, THICK * drawn.size))
                 forces.append(np.tile(value, (len(shapes[-1].points), 1)))
     return vtp(surfaces.merged(shapes), {"force": np.concatenate(forces) if forces else np.empty((0, 3))})
 
 
-def arrow(place: np.ndarray, way: np.ndarray, thick: float) -> Surface:
+def arrow(point: np.ndarray, way: np.ndarray, thick: float) -> Surface:
     """An arrow that begins at a place, as long and directed as `way`."""
     length = float(np.linalg.norm(way))
     head = min(6.0 * thick, 0.4 * length)
@@ -105,7 +105,7 @@ def arrow(place: np.ndarray, way: np.ndarray, thick: float) -> Surface:
     cone = np.concatenate(
         [np.column_stack([ring, after, np.full(n, n)]), np.column_stack([after, ring, np.full(n, n + 1)])]
     )
-    return surfaces.moved(surfaces.merged([shaft, surfaces.shaded(points, cone)]), place, surfaces.along(way))
+    return surfaces.moved(surfaces.merged([shaft, surfaces.shaded(points, cone)]), point, surfaces.along(way))
 
 
 def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
@@ -117,15 +117,15 @@ def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     for family, variable, dim in (("joint", "joint_force", "joint"), ("load", "load_force", "load")):
         if variable not in run:
             continue
-        places, kept = [], []
+        places, forces = [], []
         for k, name in enumerate(str(n) for n in run[dim].values):
             part = given.get(family, {}).get(name, {})
             frame = part["between"][1] if "between" in part else part.get("frame")
             if frame in frames:
                 places.append(run["frame_position"].values[:, frames[frame]])
-                kept.append(k)
-        if kept:
-            yield family, np.stack(places, axis=1), run[variable].values[:, kept]
+                forces.append(k)
+        if forces:
+            yield family, np.stack(places, axis=1), run[variable].values[:, forces]
 
 
 def vtp(shape: Surface, data: dict[str, np.ndarray]) -> bytes:

@@ -47,10 +47,10 @@ def motion(drawn: Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     for body in drawn.flexible:
         track = tracks.setdefault((body.index, None), len(tracks))
         meshes.append(_bent(run, body, steps) | {"track": track})
-    kept = [_track(run, owner, frame, steps) for owner, frame in tracks]
+    tracks_of = [_track(run, owner, frame, steps) for owner, frame in tracks]
     return {
         "meshes": meshes,
-        "tracks": [_floats(track) for track in kept],
+        "tracks": [_floats(track) for track in tracks_of],
         "times": _rounded(run, steps),
         "rate": len(steps) / (drawn.looks.duration or pace.SECONDS),
         "exaggeration": max((body.scale for body in drawn.flexible), default=1.0),
@@ -196,12 +196,12 @@ def _skin(bundle: xr.Dataset, points: np.ndarray) -> dict[str, Any]:
 
 def _camera(seen: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
     """Where the eye is, and how far what it sees reaches across and upright, over the distance."""
-    place, focus = eye(seen, cloud, ASPECT)
-    back = (place - focus) / np.linalg.norm(place - focus)
+    position, focus = eye(seen, cloud, ASPECT)
+    back = (position - focus) / np.linalg.norm(position - focus)
     right = np.cross(seen.up, back) / np.linalg.norm(np.cross(seen.up, back))
-    local = (cloud - place) @ np.array([right, np.cross(back, right), -back]).T
+    local = (cloud - position) @ np.array([right, np.cross(back, right), -back]).T
     reach = np.abs(local[:, :2] / local[:, 2:]).max(axis=0) / zoom
-    return {"eye": place.tolist(), "focus": focus.tolist(), "up": seen.up.tolist(), "reach": reach.tolist()}
+    return {"eye": position.tolist(), "focus": focus.tolist(), "up": seen.up.tolist(), "reach": reach.tolist()}
 
 
 def _floats(values: np.ndarray) -> str:

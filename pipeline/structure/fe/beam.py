@@ -48,7 +48,7 @@ class Beam:
     node_position: np.ndarray  #: [m], mesh frame, shape (nodes, 3)
     axes: np.ndarray  #: R_MR, rod axes (x along the rod) to mesh frame, shape (3, 3)
     component: np.ndarray  #: index in DOFS of each unknown, in rod axes, shape (ndof,)
-    along: np.ndarray  #: place of each unknown along the rod [m], shape (ndof,)
+    along: np.ndarray  #: position of each unknown along the rod [m], shape (ndof,)
 
     @property
     def size(self) -> int:
@@ -91,9 +91,9 @@ def geometric_stiffness(mesh: xr.Dataset, axial_force: np.ndarray) -> sp.csr_arr
 def rigid_vectors(beam: Beam, about: np.ndarray | None = None) -> np.ndarray:
     """Three translations and three rotations about a point, by default the mesh origin, shape (ndof, 6)."""
     inside = beam.size - beam.nodal_size
-    place = np.concatenate([np.repeat(beam.node_position, N_DOFS, axis=0), np.zeros((inside, 3))])
+    positions = np.concatenate([np.repeat(beam.node_position, N_DOFS, axis=0), np.zeros((inside, 3))])
     component = np.append(np.tile(np.arange(N_DOFS), len(beam.node_position)), np.full(inside, N_DOFS))
-    return rigid_motions(place, component, np.zeros(3) if about is None else about)
+    return rigid_motions(positions, component, np.zeros(3) if about is None else about)
 
 
 def node_dofs(nodes: np.ndarray) -> np.ndarray:
@@ -184,8 +184,8 @@ def _basis(mesh: xr.Dataset, kinematics: Kinematics) -> Basis:
 def _unknowns(mesh: xr.Dataset, basis: Basis, kinematics: Kinematics) -> tuple[np.ndarray, np.ndarray, sp.csr_array]:
     """Component and place of each unknown, and the signed permutation from vectors to scikit-fem's order."""
     x, cells = mesh["abscissa"].values, mesh["cell_node"].values
-    place = np.argsort(NODE_COMPONENT)
-    nodal = basis.nodal_dofs[place].T.ravel()
+    by_node = np.argsort(NODE_COMPONENT)
+    nodal = basis.nodal_dofs[by_node].T.ravel()
     inside = [c for e, c in zip(basis.elem.elems, kinematics.component, strict=True) for _ in range(e.interior_dofs)]
     interior = basis.interior_dofs.T.ravel() if inside else np.empty(0, dtype=int)
     rows = np.concatenate([nodal, interior])

@@ -24,7 +24,7 @@ from flexclear.pipeline.structure.fe.quadrature import POINTS
 TAPERED = ("area", "second_moment", "inertia_moment", "shear_coefficient")
 
 
-def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, place: str) -> xr.Dataset:
+def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, where: str) -> xr.Dataset:
     """The mesh dataset (schema MESH); InputError for a frame or mass that lies on no node (with the nearest)."""
     parts = segments(recipe)
     x = _nodes(parts)
@@ -32,7 +32,7 @@ def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, place: str) -> xr.Da
     position = np.array(recipe.pose.position) + np.outer(x, R_MR[:, 0])
     cells = np.arange(len(x) - 1)
     names = list(recipe.frames)
-    nodes = np.array([_node_at(x, recipe.frames[name].x, f"{place} [frames.{name}.x]") for name in names])
+    nodes = np.array([_node_at(x, recipe.frames[name].x, f"{where} [frames.{name}.x]") for name in names])
     turned = [frame.orientation() for frame in recipe.frames.values()]
     data: dict[str, Any] = {
         "node_position": (("node", "axis"), position),
@@ -43,7 +43,7 @@ def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, place: str) -> xr.Da
         "frame_position": (("frame", "axis"), position[nodes]),
         "frame_rotation": (("frame", "axis", "axis2"), R_MR @ np.array(turned)),
     }
-    data |= _constants(recipe, parts) | _lumps(recipe, x, R_MR, place)
+    data |= _constants(recipe, parts) | _lumps(recipe, x, R_MR, where)
     return conform(xr.Dataset(data, coords={"frame": names}), MESH, **_attributes(recipe, parts))
 
 
@@ -113,13 +113,13 @@ def _each(s: np.ndarray, *values: Any) -> np.ndarray:
 
 
 def _lumps(
-    recipe: StraightBeamRecipe | SegmentedBeamRecipe, x: np.ndarray, R_MR: np.ndarray, place: str
+    recipe: StraightBeamRecipe | SegmentedBeamRecipe, x: np.ndarray, R_MR: np.ndarray, where: str
 ) -> dict[str, Any]:
     if not recipe.masses:
         return {}
     masses = recipe.masses
     inertia = np.array([mass.inertia for mass in masses.values()])
-    nodes = [_node_at(x, mass.x, f"{place} [masses.{name}.x]") for name, mass in masses.items()]
+    nodes = [_node_at(x, mass.x, f"{where} [masses.{name}.x]") for name, mass in masses.items()]
     return {
         "lump_node": (("lump",), np.array(nodes)),
         "lump_mass": (("lump",), np.array([mass.mass for mass in masses.values()])),
@@ -144,15 +144,15 @@ def _types(types: Any) -> str:
     return " ".join(dict.fromkeys(section.type for section in types))
 
 
-def _node_at(x: np.ndarray, place: float, where: str) -> int:
+def _node_at(x: np.ndarray, position: float, where: str) -> int:
     """Index of the node at `place` [m]; what lies between nodes would need interpolated constraints."""
-    nearest = int(np.argmin(np.abs(x - place)))
-    if abs(x[nearest] - place) <= SAME_PLACE * x[-1]:
+    nearest = int(np.argmin(np.abs(x - position)))
+    if abs(x[nearest] - position) <= SAME_PLACE * x[-1]:
         return nearest
-    near = sorted(np.argsort(np.abs(x - place))[:2])
+    near = sorted(np.argsort(np.abs(x - position))[:2])
     shown = " and ".join(f"{x[k] * 1e3:.6g} mm" for k in near)
     raise InputError(
         where,
-        f"{place * 1e3:.6g} mm lies on no node; {len(x) - 1} elements over {x[-1] * 1e3:.6g} mm have nodes at {shown}",
-        f"move the {'mass' if '[masses.' in where else 'frame'} to a node or choose another number of elements",
+        f"no node lies at {position * 1e3:.6g} mm; {len(x) - 1} elements over {x[-1] * 1e3:.6g} mm have nodes at {shown}",
+        f"move the {'mass' if '[masses.' in where else 'frame'} to a node, or choose another number of elements",
     )

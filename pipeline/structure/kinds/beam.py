@@ -30,7 +30,7 @@ def assemble(mesh: xr.Dataset) -> Model:
         stiffness=beam.stiffness,
         mass=beam.mass,
         rigid=beams.rigid_vectors(beam, beam.node_position.mean(axis=0)),
-        place=_place(beam),
+        position=_place(beam),
         interfaces=_interfaces(mesh, beam),
         ends=_ends(mesh, beam),
         integrate=lambda vectors: integrate(slices(mesh, beam), vectors),

@@ -100,11 +100,11 @@ def _static(body: Body) -> np.ndarray:
 
 
 def _joined(body: Body, static: np.ndarray, modes: Normal, count: int) -> Basis:
-    kept = modes.shapes[:, :count]
+    shapes = modes.shapes[:, :count]
     if body.condition.residual and static.size:
         # what the kept modes answer of a load: phi phi^T f / omega^2, with f = K u
-        static = static - kept @ (kept.T @ (body.model.mass @ static))
-    vectors = np.hstack([static, kept])
+        static = static - shapes @ (shapes.T @ (body.model.mass @ static))
+    vectors = np.hstack([static, shapes])
     if body.condition.mean_axes and body.condition.held.shape[0]:
         momentum = body.model.mass @ body.model.rigid
         vectors = vectors - body.model.rigid @ np.linalg.solve(body.model.rigid.T @ momentum, momentum.T @ vectors)

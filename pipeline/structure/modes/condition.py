@@ -105,7 +105,7 @@ def check(model: Model, condition: Condition) -> None:
         size = np.linalg.norm(rows, axis=1, keepdims=True)
         if np.any(size == 0.0) or np.linalg.matrix_rank(rows / size, tol=1e-9) < len(rows):
             raise InputError(WHERE, "the held motions are not independent of each other", ONCE)
-    lengths = np.linalg.norm(model.place - model.place.mean(axis=0), axis=1)
+    lengths = np.linalg.norm(model.position - model.position.mean(axis=0), axis=1)
     scale = np.array([1.0, 1.0, 1.0, *[1.0 / max(lengths.max(), 1e-300)] * 3])
     left = 6 - np.linalg.matrix_rank(np.asarray(held @ model.rigid) * scale, tol=1e-9)
     if left:

@@ -121,20 +121,20 @@ def _nothing_missed(model: Model, held: sp.csr_array, count: int, between: float
     """Sylvester's law of inertia: K - s M has as many negative pivots as there are eigenvalues below s."""
     shifted = sp.csr_array(model.stiffness - between * model.mass)
     dofs = own_dofs(held)
-    extra, place = 0, model.place
+    extra, positions = 0, model.position
     if held.shape[0] == 0:
         count += model.rigid.shape[1]
     elif dofs is not None:
         free = np.setdiff1d(np.arange(model.size), dofs)
-        shifted, place = sp.csr_array(shifted[free][:, free]), place[free]
+        shifted, positions = sp.csr_array(shifted[free][:, free]), positions[free]
     else:
         # each held functional brings one eigenvalue of either sign (Gould 1985)
         extra = held.shape[0]
         shifted = sp.csr_array(
             sp.vstack([sp.hstack([shifted, held.T]), sp.hstack([held, sp.csr_array((extra, extra))])])
         )
-        place = np.vstack([place, np.zeros((extra, 3))])
-    below = negative_pivots(shifted, place, extra) - extra
+        positions = np.vstack([positions, np.zeros((extra, 3))])
+    below = negative_pivots(shifted, positions, extra) - extra
     if below != count:
         where = float(eigen.frequency(np.array([between]))[0])
         raise SolverError(f"modes: {below} frequencies lie below {where:.6g} Hz, the eigensolver found {count}")

@@ -58,7 +58,7 @@ def support(model: Model, tell: Callable[[float], None]) -> Flexibility:
     free = np.setdiff1d(np.arange(model.size), places[:6])
     inner = sp.csr_array(model.stiffness[free][:, free])
     try:
-        factor = cholesky(inner, model.place[free], tell)
+        factor = cholesky(inner, model.position[free], tell)
     except SolverError:
         raise _mechanism() from None
     if factor.smallest_pivot(inner.diagonal()) < PIVOT:

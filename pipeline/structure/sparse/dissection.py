@@ -32,13 +32,13 @@ class Tree:
     parent: np.ndarray
 
 
-def dissect(pattern: sp.csr_array, place: np.ndarray, last: int = 0) -> Tree:
+def dissect(pattern: sp.csr_array, positions: np.ndarray, last: int = 0) -> Tree:
     """Elimination tree of a symmetric matrix.
 
-    pattern: shape (n, n).  place: where each row belongs [m], shape (n, 3); rows of one place stay together.
+    pattern: shape (n, n).  positions: where each row belongs [m], shape (n, 3); rows at one position stay together.
     last: this many last rows come last in the order.
     """
-    points, group = np.unique(place[: len(place) - last], axis=0, return_inverse=True)
+    points, group = np.unique(positions[: len(positions) - last], axis=0, return_inverse=True)
     group = np.concatenate([group.ravel(), len(points) + np.arange(last)])
     points = np.concatenate([points, np.zeros((last, 3))])
     graph = _quotient(pattern, group, len(points))

@@ -109,13 +109,13 @@ def _add_lower(matrix: np.ndarray, runs: Runs, theirs: np.ndarray) -> None:
             matrix[row, column] += theirs[rows, columns]
 
 
-def cholesky(matrix: sp.csr_array, place: np.ndarray, tell: Tell = lambda fraction: None) -> Factor:
+def cholesky(matrix: sp.csr_array, positions: np.ndarray, tell: Tell = lambda fraction: None) -> Factor:
     """Factor of a symmetric positive definite matrix, shape (n, n).
 
-    place: where each row belongs [m], shape (n, 3); it decides the order of elimination only.
+    positions: where each row belongs [m], shape (n, 3); it decides the order of elimination only.
     tell: is told the done share.  Raises SolverError when the matrix is not positive definite.
     """
-    tree = dissect(matrix, place)
+    tree = dissect(matrix, positions)
     blocks = []
     for front in _fronts(matrix, tree, tell):
         diagonal, info = lapack.dpotrf(front.diagonal, lower=1, clean=1, overwrite_a=1)
@@ -135,12 +135,14 @@ def _under(diagonal: np.ndarray, front: Front) -> np.ndarray:
     return under
 
 
-def negative_pivots(matrix: sp.csr_array, place: np.ndarray, last: int = 0, tell: Tell = lambda fraction: None) -> int:
+def negative_pivots(
+    matrix: sp.csr_array, positions: np.ndarray, last: int = 0, tell: Tell = lambda fraction: None
+) -> int:
     """Number of negative eigenvalues of a symmetric matrix, by Sylvester's law of inertia.
 
     last: this many last rows are eliminated last, since they have no diagonal entry of their own.
     """
-    tree = dissect(matrix, place, last)
+    tree = dissect(matrix, positions, last)
     return sum(_eliminate(front) for front in _fronts(matrix, tree, tell))
 
 

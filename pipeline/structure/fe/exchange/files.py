@@ -52,8 +52,8 @@ def table(model: Model) -> Table:
     moved = np.abs(model.rigid) > 0.0
     component = np.where(moved[:, :3].any(axis=1), np.argmax(moved[:, :3], axis=1), 3 + np.argmax(moved[:, 3:], axis=1))
     component[~moved.any(axis=1)] = COMPONENTS.index("internal")
-    _, node = np.unique(model.place, axis=0, return_inverse=True)
-    return Table(node.ravel() + 1, component, model.place)
+    _, node = np.unique(model.position, axis=0, return_inverse=True)
+    return Table(node.ravel() + 1, component, model.position)
 
 
 def write_npz(model: Model, path: Path) -> None:
@@ -75,8 +75,8 @@ def write_matrix_market(model: Model, folder: Path) -> None:
     with (folder / "unknowns.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
-        for node, place, component in zip(content.node, content.position, content.component, strict=True):
-            writer.writerow([node, *map(repr, place.tolist()), COMPONENTS[component]])
+        for node, position, component in zip(content.node, content.position, content.component, strict=True):
+            writer.writerow([node, *map(repr, position.tolist()), COMPONENTS[component]])
 
 
 def moments(model: Model) -> dict[str, Any]:

@@ -103,11 +103,11 @@ def _sizes(file: TextIO) -> list[int]:
 def _sparse(entries: np.ndarray, rows: int, columns: int, count: int, symmetric: bool) -> sp.coo_array:
     if len(entries) != count or (count and entries.shape[1] != 3):
         raise ValueError(f"it holds {len(entries)} entries where its header says {count}")
-    place, value = entries[:, :2].T - 1.0, entries[:, 2]
-    inside = (place >= 0.0) & (place < np.array([[rows], [columns]])) & (place == np.floor(place))
+    index, value = entries[:, :2].T - 1.0, entries[:, 2]
+    inside = (index >= 0.0) & (index < np.array([[rows], [columns]])) & (index == np.floor(index))
     if not inside.all():
         raise ValueError(f"an entry lies outside of its {rows} x {columns}")
-    row, column = place.astype(np.int64)
+    row, column = index.astype(np.int64)
     if symmetric:
         off = row != column
         row, column = np.concatenate([row, column[off]]), np.concatenate([column, row[off]])

@@ -113,7 +113,7 @@ def shape_functions(name: str, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
     element = ELEMENTS[name]
     places = np.asarray(element.basis.doflocs)
     # scikit-fem's order to VTK's
-    order = [int(np.argmin(np.abs(places - place).sum(axis=1))) for place in element.local]
+    order = [int(np.argmin(np.abs(places - point).sum(axis=1))) for point in element.local]
     pairs = [element.basis.lbasis(points, i) for i in order]
     value = np.stack([np.broadcast_to(phi, points.shape[1:]) for phi, _ in pairs], axis=1)
     gradient = np.stack([np.broadcast_to(slope, points.shape).T for _, slope in pairs], axis=1)

@@ -41,7 +41,7 @@ def made(shape: Cylinder | Block) -> Geometry:
     nodes, cells = lattice.cut(nodes, cells, shape.element)
     x = nodes[:, 0]
     bare = Geometry(shape.element, nodes, cells, {}, {"body": np.arange(len(cells))})
-    start, end = (np.flatnonzero(np.abs(x - place) < 1e-9 * length) for place in (0.0, length))
+    start, end = (np.flatnonzero(np.abs(x - end_at) < 1e-9 * length) for end_at in (0.0, length))
     faces = face_nodes(bare, *boundary(bare))
     # faces of the mantle have nodes at different x
     mantle = np.unique(faces[np.ptp(x[faces], axis=1) > 1e-9 * length])

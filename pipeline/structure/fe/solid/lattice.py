@@ -31,8 +31,8 @@ def cylinder(radius: float, length: float, along: int, across: int, rings: int) 
     offsets = np.cumsum([0, *(len(points) for points, _ in patches)])
     points = np.vstack([points for points, _ in patches])
     quads = np.vstack([quads + offset for (_, quads), offset in zip(patches, offsets, strict=False)])
-    points, kept = _merged(points, radius)
-    return _extruded(points, kept[quads], length, along)
+    points, mask = _merged(points, radius)
+    return _extruded(points, mask[quads], length, along)
 
 
 def cut(nodes: np.ndarray, cells: np.ndarray, element: str) -> tuple[np.ndarray, np.ndarray]:
@@ -44,8 +44,8 @@ def cut(nodes: np.ndarray, cells: np.ndarray, element: str) -> tuple[np.ndarray,
     local = _tetrahedra(element)
     value, _ = shape_functions("hex27", local.reshape(-1, 3).T)
     points = np.einsum("pa,cai->cpi", value, nodes[cells], optimize=True).reshape(-1, 3)
-    points, kept = _merged(points, float(np.ptp(nodes, axis=0).max()))
-    return points, kept.reshape(-1, local.shape[1])
+    points, mask = _merged(points, float(np.ptp(nodes, axis=0).max()))
+    return points, mask.reshape(-1, local.shape[1])
 
 
 def _tetrahedra(element: str) -> np.ndarray:
@@ -63,10 +63,10 @@ def _tetrahedra(element: str) -> np.ndarray:
     return np.array(cells)
 
 
-def _patch(place: object, cells_s: int, cells_t: int) -> tuple[np.ndarray, np.ndarray]:
+def _patch(position: object, cells_s: int, cells_t: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 2) and 3 by 3 node quads (c, 3, 3) of a mapped unit square, node [i, j] at s_i, t_j."""
     s, t = np.meshgrid(np.linspace(0.0, 1.0, 2 * cells_s + 1), np.linspace(0.0, 1.0, 2 * cells_t + 1), indexing="ij")
-    points = place(s, t).reshape(-1, 2)  # type: ignore[operator]
+    points = position(s, t).reshape(-1, 2)  # type: ignore[operator]
     number = np.arange(points.shape[0]).reshape(s.shape)
     quads = [number[2 * i : 2 * i + 3, 2 * j : 2 * j + 3] for i in range(cells_s) for j in range(cells_t)]
     return points, np.array(quads)

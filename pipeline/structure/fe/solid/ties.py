@@ -39,7 +39,7 @@ def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
     if nodes.size == 0:
         x = geometry.nodes
         box = " to ".join(str([float(f"{v:.6g}") for v in end]) for end in (x.min(axis=0), x.max(axis=0)))
-        raise InputError(where, f"selects no node; the body lies within {box} m", "check the place and the units")
+        raise InputError(where, f"selects no node; the body lies within {box} m", "check position and units")
     return nodes
 
 
