@@ -153,6 +153,7 @@ def _node_at(x: np.ndarray, position: float, where: str) -> int:
     shown = " and ".join(f"{x[k] * 1e3:.6g} mm" for k in near)
     raise InputError(
         where,
-        f"no node lies at {position * 1e3:.6g} mm; {len(x) - 1} elements over {x[-1] * 1e3:.6g} mm have nodes at {shown}",
+        f"{position * 1e3:.6g} mm lies on no node; {len(x) - 1} elements over {x[-1] * 1e3:.6g} mm "
+        f"have nodes at {shown}",
         f"move the {'mass' if '[masses.' in where else 'frame'} to a node, or choose another number of elements",
     )
