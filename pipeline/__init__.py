@@ -63,7 +63,7 @@ def __getattr__(name: str) -> Any:
 def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
     """The scene in a TOML file, with everything that it extends, or in a table of the same keys.
 
-    override: dotted place -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
+    override: dotted path -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
     Raises InputError (exit code 2 of the command) with all mistakes at once.
 
     >>> import flexclear as fc
@@ -77,7 +77,7 @@ def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, ob
 
 
 def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
-    """A copy of a scene with dotted places changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a whole part as a table.
+    """A copy of a scene with dotted paths changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a whole part as a table.
 
     Raises InputError.
 
@@ -123,8 +123,8 @@ def sweep(
 ) -> xr.Dataset:
     """Many points of one scene, as ``flexclear sweep`` makes them; finished points come from the cache.
 
-    vary: place of the scene -> its values (a list), or what else a sweep file says of a parameter.
-    keep: what is kept of each point, e.g. ``["platform.velocity.largest", "A1.peak_force"]``.
+    vary: path in the scene -> its values (a list), or what else a sweep file says of a parameter.
+    keep: what is recorded of each point, e.g. ``["platform.velocity.largest", "A1.peak_force"]``.
     workers: processes of this machine, its cores by default; scheduler: address of a Dask cluster instead.
     more: `set`, `combine`, `sample`, `members` and `error` of a sweep file.
     The result has the parameters as dimensions.  Raises FlexclearError.
@@ -163,7 +163,7 @@ def equilibrium(
     *,
     moving: bool = False,
 ) -> xr.Dataset:
-    """Static equilibrium of a mechanism near its start pose, the drives held (schema EQUILIBRIUM).
+    """Static equilibrium of a mechanism close to its start pose, the drives held (schema EQUILIBRIUM).
 
     time: at which the drives' laws give their positions [s], the scene's start when None.
     drives: positions [m or rad] by drive, instead of the law's.
@@ -201,11 +201,12 @@ def frequencies(
 def compare(
     *scenes: Scene | str | Path, ideal: bool | Literal["both", "clearance", "flexibility", "each"] = False
 ) -> xr.Dataset:
-    """Scenes beside each other, or beside their ideal twins: differences, the error of each run, events and costs.
+    """Scenes next to each other, or next to their ideal mechanisms: differences, the error of each run, events and
+    costs.
 
     ideal: compare each scene with itself without clearance and flexibility (True or "both"), without one of them, or
-    with each of these.  The first run is the reference; its variables are told in `pipeline.post.overview.comparison`.
-    Raises FlexclearError.
+    with each of these.  The first run is the reference; its variables are reported in
+    `pipeline.post.overview.comparison`. Raises FlexclearError.
     """
     without = "both" if ideal is True else ideal or None
     comparison = _stages("compare").bring(

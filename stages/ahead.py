@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.stages.graph import Graph
 
-#: templates that stand for the kinds of parts that most mechanisms have
+#: templates that represent the kinds of parts that most mechanisms have
 USUAL = ("pendulum", "four-bar", "slider-crank", "leg")
 
 

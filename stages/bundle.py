@@ -81,7 +81,7 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
 
 
 def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
-    """Run what a file of `make` holds, in a folder of its own; whether it ended as it did, and what is told of that.
+    """Run what a file of `make` holds, in a folder of its own; whether it ended as it did, and the message about that.
 
     Raises InputError for what is no such file.
     """

@@ -21,7 +21,7 @@ ACTIONS = {
 }
 #: artifacts that nothing shows are kept for so many days: going back to an earlier value costs nothing then
 KEPT = 30.0
-#: faults that `check` tells one by one
+#: faults that `check` lists one by one
 SHOWN = 20
 
 

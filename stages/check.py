@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.scene.schema import Scene
 
-#: what is told of a file: it is wrong, or asks for too much
+#: the message about a file: it is wrong, or asks for too much
 MISTAKES = (InputError, ResourceError)
 
 
@@ -41,14 +41,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> int:
     """Tell all mistakes of all files; exit code 2 where there are some, 4 where a file only asks for too much.
 
-    What is only odd is told, and is no mistake.
+    What is only odd is reported, and is no mistake.
     """
     errors: dict[str, FlexclearError] = {}
     for name in options.scenes:
         mistakes, seen = examined(name)
         errors |= {str(mistake): mistake for mistake in mistakes}
         if not mistakes and not options.json:
-            print(f"{run.find_scene(name)}: {seen.summary}; no mistake found")
+            print(f"{run.find_scene(name)}: {seen.summary}; no error")
             for odd in seen.odd:
                 print(f"flexclear: warning: {lines.located(odd)}", file=sys.stderr)
     if options.json:
@@ -108,7 +108,7 @@ def _of_sweep(path: Path) -> tuple[list[FlexclearError], Seen]:
 
 
 def _of_recipe(path: Path) -> tuple[list[FlexclearError], Seen]:
-    """A recipe is looked at as where a scene names it, with the limits of a scene that says none."""
+    """A recipe is examined as where a scene names it, with the limits of a scene that says none."""
     errors = _collect([lambda: s1_mesh.check_size(path, Limits())])
     if not any(isinstance(error, ResourceError) for error in errors):  # what is too large is not meshed
         errors += _collect([lambda: _recipe(path)])
@@ -161,7 +161,7 @@ def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
 def _assembled(scene: Scene) -> None:
     """Build the mechanism of a scene: poses, axes and loads are then checked against the joints.
 
-    Where the scene begins at a state that is looked for, that is the mechanism whose joints place the bodies there.
+    Where the scene begins at a state that is searched for, that is the mechanism whose joints place the bodies there.
     Of bodies from recipes of beams, which are meshed in no time, mass and frames are known without their modes; of
     flexible ones it is looked whether the joints fit where nothing is deformed.
     """

@@ -1,4 +1,4 @@
-"""``flexclear compare``: scenes beside each other or their ideal twins: differences, and each run's own error."""
+"""``flexclear compare``: scenes next to each other or their ideal mechanisms: differences, and each run's own error."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Comparison:
 
 
 def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None) -> Comparison:
-    """Runs of the scenes, of their ideal twins, and of all at tighter tolerances, compared; and the page of it.
+    """Runs of the scenes, of their ideal mechanisms, and of all at tighter tolerances, compared; and the page of it.
 
     without: one of IDEAL, or None for the scenes alone.  Raises InputError for what cannot be compared.
     """
@@ -89,7 +89,7 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
         raise InputError(
             sides[0].name if sides else "compare",
             "one scene alone is compared with nothing",
-            "name several, or compare it with its ideal twin: --ideal",
+            "name several, or compare it with its ideal mechanism: --ideal",
         )
     graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(_labels(sides), sides, strict=True)}
     check(workplace.bring([graph.simulate for graph in graphs.values()]))
@@ -97,7 +97,7 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
     tight = {label: graph.tight for label, graph in graphs.items() if graph.has_tighter}
     outcome = workplace.bring(list(tight.values()))
     for failure in outcome.failures:
-        workplace.monitor.say(f"no error can be told: {failure.message}")
+        workplace.monitor.say(f"no error can be determined: {failure.message}")
     task = _task(graphs, {label: task for label, task in tight.items() if id(task) in outcome.records})
     done = workplace.bring([task])
     check(done)

@@ -39,7 +39,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     run.scene_arguments(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
     as_json.json_argument(parser)
-    parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn beside ours")
+    parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn next to ours")
     parser.add_argument(
         "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all)"
     )
@@ -120,7 +120,7 @@ def bring(
 def figures_and_tables(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:
     """What a page says of a scene, and the files of its pictures, by path relative to the page.
 
-    study, folder: as `bring` returned them.  pictures: folder for them beside the page.
+    study, folder: as `bring` returned them.  pictures: folder for them next to the page.
     """
     from flexclear.pipeline.post.cost.page import Studied, advice
 
@@ -132,9 +132,9 @@ def figures_and_tables(name: str, study: xr.Dataset, folder: Path, pictures: str
 
 
 def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, options: str = "") -> None:
-    """The page on accuracy, with its pictures in a folder of its name beside it.
+    """The page on accuracy, with its pictures in a folder of its name next to it.
 
-    studies: what `bring` returned, by scene.  options: what else the command was told.
+    studies: what `bring` returned, by scene.  options: the command's other options.
     """
     from flexclear.pipeline.post.cost.page import markdown
 

@@ -83,9 +83,9 @@ def _integration(scene: Scene) -> Iterator[Design]:
 
 
 def _sampling(scene: Scene) -> Iterator[Design]:
-    """The scene as it stands, and with denser output."""
+    """The scene as it is, and with denser output."""
     interval = scene.output.interval
-    yield Design("as it stands", "sampling", {"interval": interval}, edited(scene, PLAIN))
+    yield Design("as it is", "sampling", {"interval": interval}, edited(scene, PLAIN))
     finer = edited(scene, {**PLAIN, "output": {"interval": interval / FINER_OUTPUT}})
     yield Design("denser output", "sampling", {"interval": interval / FINER_OUTPUT}, finer)
 

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.progress import Progress
 
-#: contact events are located to this share of the clearance (flexclear.pipeline.dynamics.integrate.contact_events)
+#: contact events are located to this fraction of the clearance (flexclear.pipeline.dynamics.integrate.contact_events)
 LOCATED = 1e-12
 
 
@@ -72,7 +72,7 @@ def _paper(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any])
 def split_of(
     points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any], ensemble: xr.Dataset | None
 ) -> dict[str, dict[str, float]]:
-    """Relative error of the scene as it stands, by quantity and cause."""
+    """Relative error of the scene as it is, by quantity and cause."""
     from flexclear.pipeline.post.cost.split import causes_of
 
     return {q.name: causes_of(q, points, runs, LOCATED, ensemble) for q in chosen}

@@ -44,7 +44,7 @@ class Graph:
     A scene without flexible bodies has no mesh, modes and bundle; one without an ensemble has no
     such task. Raises InputError for names that no family lists and recipes that cannot be read.
 
-    shown: whether the artifacts take their place below results/runs; an edited copy of a scene
+    shown: whether the artifacts are shown below results/runs; an edited copy of a scene
     must not take that of its original.
     recipe: edits of all mesh recipes: `theory`, and a factor for the number of `elements`.
     """
@@ -230,7 +230,7 @@ class Graph:
 
     @property
     def has_tighter(self) -> bool:
-        """Whether there is a tighter tolerance that tells the error of a run."""
+        """Whether there is a tighter tolerance that gives the error of a run."""
         return self.scene.solver.step is not None or self.scene.solver.rtol > 10.0 * TIGHTEST
 
     @cached_property

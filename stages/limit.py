@@ -18,7 +18,7 @@ def argument(parser: argparse.ArgumentParser) -> None:
 
 
 def deadline(options: argparse.Namespace | None) -> tuple[float, str]:
-    """Seconds from now, and what is told then; InputError for what is no time."""
+    """Seconds from now, and the message printed then; InputError for what is no time."""
     text = getattr(options, "limit", None)
     if text is None:
         return math.inf, ""

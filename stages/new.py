@@ -36,7 +36,7 @@ def command(options: argparse.Namespace) -> None:
         "next:",
         f"  flexclear check {scene}       every mistake at once; nothing is run",
         f"  flexclear render {scene}      film and pictures",
-        f"  flexclear report {scene}      one page with figures, and beside its ideal twin",
+        f"  flexclear report {scene}      one page with figures, and next to its ideal mechanism",
         sep="\n",
     )
 

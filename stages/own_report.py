@@ -1,4 +1,4 @@
-"""The report of one scene: the answer, then film, figures, comparison with its ideal twin, assumptions, doubts."""
+"""The report of one scene: the answer, then film, figures, comparison with its ideal mechanism, assumptions, doubts."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from flexclear.stages.run import Workplace, check, in_file
 if TYPE_CHECKING:
     import xarray as xr
 
-#: general figures, in this order: caption, and what a reader who does not see them is told
+#: general figures, in this order: caption, and what a reader who does not see them reads
 FIGURES = {
     "motion.png": ("Motion", "Displacement, velocity and rotation of the bodies over time"),
     "reactions.png": (
@@ -45,7 +45,7 @@ COST = {
 }
 STABILITY = {
     "switched": "another integrator went on",
-    "stiff_share": "share of the steps that stability made shorter than accuracy would have",
+    "stiff_share": "fraction of the steps that stability made shorter than accuracy would have",
     "redundant_closure_rows": "conditions of closed loops that follow from the others",
     "accuracy_verdict": "accuracy asked for",
 }
@@ -80,7 +80,7 @@ def make(graph: Graph, workplace: Workplace, *, folder: bool = False) -> Path:
 
 
 def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
-    """Write a page as ``<name>.html``, or as ``<name>/index.html`` with its files beside it."""
+    """Write a page as ``<name>.html``, or as ``<name>/index.html`` with its files next to it."""
     if not folder:
         publish(where / f"{name}.html", page)
         return where / f"{name}.html"

@@ -45,7 +45,7 @@ class Scenes:
     def timing(self, family: str) -> Task:
         """Measured times of all scenes that lie directly in a folder below scenes/.
 
-        They are seconds of the processor, and so are measured beside other tasks: alone they would be a third of the
+        They are seconds of the processor, and so are measured while other tasks run: alone they would be a third of the
         whole report's time, with all other cores idle.
         """
         if family not in self.times:
@@ -71,7 +71,8 @@ class Scenes:
 
 
 def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
-    """What only the timing runs on, compiled beside other tasks; kernels of the scenes' own runs are there by then."""
+    """What only the timing runs on, compiled while other tasks run; kernels of the scenes' own runs are there by
+    then."""
     tasks: dict[tuple[str, ...], Task] = {}
     for graph in graphs:
         for scene in (timing.paper_scene(graph.scene), timing.damped_scene(graph.scene, graph.scene.solver.rtol)):

@@ -1,4 +1,5 @@
-"""``flexclear plan``: which effects, modes and tolerance a scene's wanted accuracy calls for, and by what evidence."""
+"""``flexclear plan``: which effects, modes and tolerance a scene's requested accuracy calls for, and by what
+evidence."""
 
 from __future__ import annotations
 
@@ -95,9 +96,12 @@ class Planned:
         return self.stored("plan.md").read_text(encoding="utf-8")
 
     def file(self, target: Path) -> bytes:
-        """The planned scene's file as it stands at a place; it extends the full scene's."""
+        """The planned scene's file as it is at a place; it extends the full scene's."""
         assert self.scene.path is not None
-        head = ("written by flexclear plan", "what the accuracy wanted of the full scene does not call for is left out")
+        head = (
+            "written by flexclear plan",
+            "what the requested accuracy of the full scene does not call for is left out",
+        )
         base = load_scene(self.scene.path)
         return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
 
@@ -119,7 +123,7 @@ def _example(scene: Scene) -> str:
 
 
 def bring(scene: Scene, workplace: Workplace) -> Planned:
-    """The plan of a scene, brought up to date; the planned scene's file and the page beside it.
+    """The plan of a scene, brought up to date; the planned scene's file and the page next to it.
 
     Raises InputError for a scene without `[accuracy]` or effects, or whose accuracy nothing meets or everything does,
     and what its runs raise.
@@ -147,7 +151,7 @@ def bring(scene: Scene, workplace: Workplace) -> Planned:
 
 
 def of(scene: Scene, plan: xr.Dataset) -> Scene:
-    """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities told."""
+    """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities set."""
     decided = s8_plan.from_dataset(plan)
     bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
     fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["apart"])
@@ -199,7 +203,7 @@ def page(planned: Planned) -> bytes:
 
 
 def verify(planned: Planned, workplace: Workplace) -> list[str]:
-    """Run the full and the planned scene, print how far they are apart, and return what was missed, in words."""
+    """Run the full and the planned scene, print how much they differ, and return what was missed, in words."""
     from flexclear.pipeline.post.plan import verified
     from flexclear.pipeline.post.plotting.table import as_markdown
 

@@ -92,7 +92,7 @@ def _beside(graphs: list[Graph]) -> Task:
         scene=graphs[-1].scene.name,
         part="modes of all",
         run="flexclear.stages.s6_render:run",
-        params={"what": "modes", "format": "html", "title": "Mode sets beside each other"},
+        params={"what": "modes", "format": "html", "title": "Mode sets next to each other"},
         inputs=bundles,
         folder=f"compare/{run.joined([graph.scene.name for graph in graphs])}",
     )
@@ -101,7 +101,7 @@ def _beside(graphs: list[Graph]) -> Task:
 def _tell(workplace: Workplace, folder: str, files: list[str]) -> None:
     shown = [name for name in sorted(files) if not name.endswith(".vtp")]
     rest = len(files) - len(shown)
-    print(f"{near(workplace.store.root / folder)}: {', '.join(shown)}{f' and {rest} files beside' if rest else ''}")
+    print(f"{near(workplace.store.root / folder)}: {', '.join(shown)}{f' and {rest} files next to' if rest else ''}")
 
 
 def rendered(scene: Scene, workplace: Workplace | None = None) -> Path:

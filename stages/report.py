@@ -37,7 +37,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def make(workplace: Workplace, *, folder: bool = False) -> Path:
-    """Bring everything that the report shows up to date; returns the page; with `folder` one with files beside it.
+    """Bring everything that the report shows up to date; returns the page; with `folder` one with files next to it.
 
     What fails is left out of the page and raised (FailedTasksError) after the page is written.
     """

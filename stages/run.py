@@ -46,7 +46,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write the run here: .nc or .mat; .csv, .parquet, .xlsx",
     )
-    parser.add_argument("--planned", action="store_true", help="plan first, and run what the wanted accuracy calls for")
+    parser.add_argument(
+        "--planned", action="store_true", help="plan first, and run what the requested accuracy calls for"
+    )
     parser.add_argument("--verify", action="store_true", help="with --planned: run the full scene, tell the true error")
 
 
@@ -58,7 +60,7 @@ def command(options: argparse.Namespace) -> None:
         export.check_format(options.out)
         check_target(options.out)
     if options.verify and not options.planned:
-        raise InputError("--verify", "tells the true error of a plan, and no plan is asked for", "add --planned")
+        raise InputError("--verify", "reports the true error of a plan, and no plan is requested", "add --planned")
     requested = graphs(options.scenes, options.set)
     workplace = open_workplace(options)
     plans = import_module("flexclear.stages.plan").planned_scenes(requested, workplace) if options.planned else []
@@ -123,7 +125,7 @@ def _known(name: str) -> str:
 def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
     """Dataset of the simulate stage, brought up to date; titled and named as the scene is.
 
-    An edited scene (`override`) is cached like any other but does not take the place of its file's
+    An edited scene (`override`) is cached like any other but does not replace its file's
     results under results/runs.  Raises FlexclearError.
     """
     require_names(scene)
@@ -139,7 +141,7 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
 
 
 def graph(scene: Scene) -> Graph:
-    """The tasks of a scene; an edited one does not take the place of its file's results under results/runs."""
+    """The tasks of a scene; an edited one does not replace its file's results under results/runs."""
     require_names(scene)
     return Graph(scene, shown=scene.path is None or as_in_its_file(scene))
 
@@ -251,7 +253,7 @@ def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, pl
 
 
 def as_in_its_file(scene: Scene) -> bool:
-    """Whether a scene is what its file says, so that its results take their place below results/runs."""
+    """Whether a scene is what its file says, so that its results are shown below results/runs."""
     return scene.path is not None and load_scene(scene.path) == scene
 
 
@@ -272,7 +274,7 @@ def overrides(settings: Sequence[str]) -> dict[str, object]:
 
 
 def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
-    """The scene called `name` with `settings` changed; its own name then tells them, and so do its results."""
+    """The scene called `name` with `settings` changed; its own name then contains them, and so do its results."""
     scene = load_scene(find_scene(name), overrides(settings))
     if settings:
         scene._name = f"{scene.name},{_edits(settings)}"
@@ -286,7 +288,8 @@ def _edits(settings: Sequence[str]) -> str:
 
 
 def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
-    """Graphs of the scenes, each once, with `settings` (KEY=VALUE) changed; the mistakes of all are told together."""
+    """Graphs of the scenes, each once, with `settings` (KEY=VALUE) changed; the mistakes of all are reported
+    together."""
     by_scene: dict[Path | str, Graph] = {}
     wrong: list[InputError] = []
     for name in names:
@@ -328,7 +331,7 @@ def require_names(scene: Scene) -> None:
 
 
 def recipe_frames(mesh: str) -> list[str] | None:
-    """Names of the frames in a mesh recipe; None where it cannot be read, which is told elsewhere."""
+    """Names of the frames in a mesh recipe; None where it cannot be read, which is reported elsewhere."""
     try:
         frames = read_toml(Path(mesh)).get("frames")
     except InputError:
@@ -351,7 +354,7 @@ def check_target(target: Path, option: str = "--out") -> None:
             raise InputError(where, "its folder does not exist", f"mkdir -p {target.parent}")
         if target.is_dir():
             raise InputError(where, "is a folder", "name a file in it")
-        if target.exists() and not target.is_file():  # a new file would take the place of a device
+        if target.exists() and not target.is_file():  # a new file would replace a device
             raise InputError(where, "is no ordinary file", "name a file, and look at it when it is there")
     except OSError as error:
         raise InputError(where, f"can be no file: {error.strerror}", "name another one") from None

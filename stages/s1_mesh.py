@@ -27,10 +27,10 @@ FILES = ("file", "stiffness", "mass", "unknowns")
 
 
 def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The recipe's content; its name and folder do not matter, nor do its sources, which `sources` tells.
+    """The recipe's content; its name and folder do not matter, nor do its sources, which `sources` returns.
 
     Raises InputError when it cannot be read, or a source is no text.
-    edits: values that take the place of the recipe's; of `elements` a factor, which recipes without them go without.
+    edits: values that replace the recipe's; of `elements` a factor, which recipes without them go without.
     """
     table = read_toml(recipe)
     require_kind(table, recipe, RECIPE)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
 
-#: limits of a scene that is made again without being told its own: what it asks for was judged when it was read
+#: limits of a scene that is made again without its own: what it asks for was judged when it was read
 JUDGED = {"rows": sys.maxsize, "members": sys.maxsize}
 
 
@@ -51,7 +51,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is told, and kept."""
+    """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is reported, and
+    kept."""
     from flexclear.pipeline import dynamics
 
     scene, reduced = rebuild(params, inputs), bundles(inputs)
@@ -96,7 +97,7 @@ def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 
 def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None = None) -> Scene:
-    """The scene again, from what `params` kept of it; its title is its name, where that is told.
+    """The scene again, from what `params` kept of it; its title is its name, where that is reported.
 
     inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
     """

@@ -1,4 +1,4 @@
-"""Beside stage 4: a variant of a scene -> what is watched of it, over members where it has contacts."""
+"""Next to stage 4: a variant of a scene -> what is watched of it, over members where it has contacts."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int) -> Point:
-    """The run of a scene, in this process; `members` as told by the caller, none where there is no contact."""
+    """The run of a scene, in this process; `members` as given by the caller, none where there is no contact."""
     from flexclear.pipeline.core.effect_size import members_apart, recorded
     from flexclear.pipeline.dynamics.record.point import Runner
 

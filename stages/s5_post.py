@@ -26,7 +26,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, LabelledArrays], progres
 
 
 def params(scene: Scene) -> dict[str, Any]:
-    """Attributes that no run depends on: `sources` and `assumptions`, place in the scene -> text, as JSON."""
+    """Attributes that no run depends on: `sources` and `assumptions`, path in the scene -> text, as JSON."""
     return {"attributes": origins(scene)}
 
 

@@ -1,4 +1,4 @@
-"""Beside stage 4: a scene with `[accuracy]` -> which of its effects that calls for."""
+"""Next to stage 4: a scene with `[accuracy]` -> which of its effects that calls for."""
 
 from __future__ import annotations
 

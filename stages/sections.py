@@ -67,7 +67,7 @@ def with_sections(scene: Scene, asked: Mapping[str, object]) -> Scene:
 def write_page(
     verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], pictures: Mapping[str, bytes], page: Path
 ) -> None:
-    """The verdicts as a page, with the figures (PNG) and a table (CSV) in a folder of its name beside it."""
+    """The verdicts as a page, with the figures (PNG) and a table (CSV) in a folder of its name next to it."""
     from flexclear.pipeline.post.verdict_page import csv_text, markdown
 
     folder = page.parent / page.stem

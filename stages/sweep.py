@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 NAME = "sweep"
 #: what a sweep without a file is called
 UNNAMED = "sweep"
-#: finished points are stored after so many seconds, later after that share of the time so far
+#: finished points are stored after so many seconds, later after that fraction of the time so far
 OFTEN, FRACTION = 2.0, 0.01
 
 
@@ -80,7 +80,7 @@ def width(asked: int | None) -> int:
 
 
 def read(path: Path) -> tuple[Sweep, Scene]:
-    """A sweep file and its scene, which is looked for beside the file, then below scenes/."""
+    """A sweep file and its scene, which is searched for next to the file, then below scenes/."""
     sweep = load_sweep(path)
     beside = path.parent / sweep.scene
     try:
@@ -103,7 +103,7 @@ def of_scene(
 
 @dataclass
 class _Desk:
-    """Where finished points arrive: they are stored now and then, and told."""
+    """Where finished points arrive: they are stored now and then, and reported."""
 
     plan: sweep_plan.Plan
     workplace: Workplace
@@ -208,7 +208,7 @@ def _publish(result: xr.Dataset, folder: Path) -> None:
 
 
 def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | None) -> None:
-    """Figures beside the dataset, and a summary on the screen."""
+    """Figures next to the dataset, and a summary on the screen."""
     from flexclear.pipeline.core.artifacts.store import publish
     from flexclear.pipeline.post.sweep import figures
 

@@ -20,9 +20,10 @@ from flexclear.stages.sweep_points import source_digest, work
 
 #: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
 BATCH_SECONDS, MOST, QUEUED = 0.5, 1000, 2
-#: towards the end less is handed out, a share of what is left, so that all workers finish together; least seconds of it
+#: towards the end less is handed out, a fraction of what is left, so that all workers finish together; least seconds of
+#: it
 LEAST = 0.02
-#: evaluations of a point from which on it is run beside others, and of all that wait, for which code is made
+#: evaluations of a point from which on it is run together with others, and of all that wait, for which code is made
 WORTH, WORTH_CODE = 5_000, 5_000_000
 #: so many, where each worker has as many, and seconds of work of several times as many: fewer wait for their last ones
 ABREAST, BATCH_SECONDS_TOGETHER = 8, 5.0
@@ -40,7 +41,7 @@ LOSSES = 3
 
 @dataclass(frozen=True)
 class Job:
-    """A point to be run. family: its key; point: place of the scene -> value; journal: where it keeps its work."""
+    """A point to be run. family: its key; point: path in the scene -> value; journal: where it keeps its work."""
 
     key: str
     family: str
@@ -67,7 +68,7 @@ class Engine:
     renew: Callable[[], None] = lambda: None
 
     def run(self, jobs: Sequence[Job], families: dict[str, bytes], done: Done) -> None:
-        """Run points; `done` is told finished ones and their processor time [s], in any order of the batches.
+        """Run points; `done` receives finished ones and their processor time [s], in any order of the batches.
 
         families: what `stages.sweep_points.work` is given of each.  Raises ResourceError when workers keep dying,
         StoppedError when all is to stop.

@@ -1,4 +1,4 @@
-"""What a sweep comes to: its points checked, told apart by the flexible bodies they need, and named by content."""
+"""What a sweep comes to: its points checked, distinguished by the flexible bodies they need, and named by content."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ if TYPE_CHECKING:
 
 #: numeric values of a parameter that are all checked beforehand; of more, the least and the largest
 CHECKED = 200
-#: what a place of the scene decides that cannot be in one series
+#: what a path in the scene decides that cannot be in one series
 TIMES = ("time.start", "time.end", "output.interval")
 #: and what decides how many sections there are
 COUNTS = ("sections.periods",)
-#: stands for what is varied in the facts of a family
+#: represents what is varied in the facts of a family
 VARIED = "varied"
 
 
@@ -174,9 +174,9 @@ def _placed(where: str, error: InputError) -> InputError:
 
 
 def _check_values(base: Scene, made: Design, where: str) -> None:
-    """InputError for a value that the scene does not take; of many points of a sample the extreme ones are looked at.
+    """InputError for a value that the scene does not take; of many points of a sample the extreme ones are examined.
 
-    In a grid each value stands beside the first ones of the others: what some combinations mean for the mechanism is
+    In a grid each value is next to the first ones of the others: what some combinations mean for the mechanism is
     found when they are run.
     """
     points = made.points()

@@ -66,7 +66,7 @@ def work(
 ) -> tuple[list[Point], float]:
     """Points of a family, and the processor time that they took [s].
 
-    packed: the pickled `Family`.  points: place of the scene -> value.  alone: whether no other worker is busy.
+    packed: the pickled `Family`.  points: path in the scene -> value.  alone: whether no other worker is busy.
     journals: of each point, where it keeps its unfinished work (`folder/key`), if it does; none by default.
     abreast: whether they are worth to be run side by side; no point depends on it.
     sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as

@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
 
-#: equal error: of the velocity of the body with most joints, relative, over this first share of the run, where
+#: equal error: of the velocity of the body with most joints, relative, over this first fraction of the run, where
 #: all scenes can still be predicted point by point
 EQUAL_ERROR, FRACTION = 1e-6, 0.05
-#: this share of a run, unmeasured, fetches its code
+#: this fraction of a run, unmeasured, fetches its code
 WARM = 0.01
 #: Wang & Wang (2019), sec. 5: predictor-corrector with this step [s]; which one, they do not say
 PAPER: Mapping[str, Any] = {"integrator": "adams-bashforth-moulton", "step": 1e-5}
 #: their Table 6 prints a tolerance of the integration, too [m], as variable steps have; a method that damps what it
-#: does not resolve then takes few of them where a rod rings. Of what it is a share they do not say: the stroke of
+#: does not resolve then takes few of them where a rod rings. Of what it is a fraction they do not say: the stroke of
 #: eq. (35) [m], or the mechanism's size
 TOLERANCE, DAMPED, STROKE = 4e-6, "radau", 0.06
 #: the three ways, as variables are called
@@ -34,8 +34,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """CPU time [s] of integration and of recording of warm runs, evaluations, steps, largest error of the energy.
 
     Variables begin with the way: ``equal_*`` at equal error, ``step_*`` at equal steps, ``tolerance_*`` by a damped
-    method at the paper's tolerance as a share of the stroke, whatever becomes of the energy, ``size_*`` the same as a
-    share of the mechanism's size.
+    method at the paper's tolerance as a fraction of the stroke, whatever becomes of the energy, ``size_*`` the same as
+    a fraction of the mechanism's size.
 
     params: one entry of `params` per scene.  inputs: bundles as ``<scene>:bundle/<body>``; kernels, which are only
     waited for.  A scene that a way cannot integrate has NaN there, and the reason in the attribute `refused`; repeats
@@ -119,7 +119,7 @@ def _at_equal_error(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[fl
 
 
 def equal_tolerance(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> float:
-    """The tolerance at which a scene has the common error over the first share of its run."""
+    """The tolerance at which a scene has the common error over the first fraction of its run."""
     from flexclear.pipeline import dynamics
 
     velocity = next(q.name for q in scene.requested() if q.kind == "velocity")
@@ -128,7 +128,7 @@ def equal_tolerance(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> float:
 
 
 def _share(scene: Scene, fraction: float) -> float:
-    """The end of the first share of a run [s]."""
+    """The end of the first fraction of a run [s]."""
     return scene.time.start + fraction * (scene.time.end - scene.time.start)
 
 

@@ -1,4 +1,5 @@
-"""Where commands work: arguments that all of them take, the store, the sources, who is told; bringing tasks up to date.
+"""Where commands work: arguments that all of them take, the store, the sources, whom it reports to; bringing tasks up
+to date.
 
 No scene is read here, so that a command that finds all of its results as they were does not import what reads them.
 """
@@ -52,9 +53,9 @@ def near(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Workplace:
-    """Where artifacts are kept, where the source lies, and who is told about progress.
+    """Where artifacts are kept, where the source lies, and the monitor of progress.
 
-    end: when the command is to stop, by the monotonic clock [s], and what is told then.
+    end: when the command is to stop, by the monotonic clock [s], and the message printed then.
     """
 
     store: Store
@@ -75,7 +76,7 @@ class Workplace:
 
 
 class FailedTasksError(FlexclearError):
-    """Some tasks failed; each is told, and the first decides the exit code."""
+    """Some tasks failed; each is reported, and the first decides the exit code."""
 
     def __init__(self, failures: tuple[Failure, ...]) -> None:
         super().__init__("\n".join(failure.message for failure in failures))

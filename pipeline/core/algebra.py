@@ -166,7 +166,7 @@ def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Angle of the rotation that takes pose a to pose b [rad], shape (...,), in [0, pi].
 
     a, b: unit quaternions, shape (..., 4).  Accurate for small angles too: the angle is taken from
-    the vector part, not from an arc cosine near 1.
+    the vector part, not from an arc cosine close to 1.
     """
     relative = quaternion_product(quaternion_conjugate(a), b)
     return 2.0 * np.arctan2(np.linalg.norm(relative[..., 1:], axis=-1), np.abs(relative[..., 0]))

@@ -32,9 +32,10 @@ class Decision:
 
 @dataclass(frozen=True)
 class Mesh:
-    """The finite elements of a body. given: how many it has.  called_for: how many what is wanted calls for.
+    """The finite elements of a body. given: how many it has.  called_for: how many what is requested calls for.
 
-    frequency, compliance: largest errors of its mesh, as shares, of its kept frequencies and of its frames' compliance.
+    frequency, compliance: largest errors of its mesh, as fractions, of its kept frequencies and of its frames'
+    compliance.
     error: estimated error that the mesh makes in each quantity, at most [SI].
     """
 
@@ -47,7 +48,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Plan:
-    """All decisions. wanted: by quantity [SI].  integrator, rtol: of the planned run.
+    """All decisions. requested: by quantity [SI].  integrator, rtol: of the planned run.
 
     modes: elastic coordinates of kept flexible bodies that need fewer than they have.
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that

@@ -28,12 +28,12 @@ from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 
 #: a difference of means that chance alone makes less often than this counts: of hundred independent looks one in ten
 RARE = 1e-3
-#: share of a series over which the spread of members is pooled
+#: fraction of a series over which the spread of members is pooled
 POOLED = 0.05
-#: by how much members start apart: a share of the clearance, and the least [m]
+#: by how much members start apart: a fraction of the clearance, and the least [m]
 FRACTION, LEAST = 1e-3, 1e-8
-#: what is kept of a quantity to compare it by: the series, and of what impacts make large its extreme, which is read
-#: where it is and not at an output
+#: what is recorded of a quantity to compare it by: the series, and of what impacts make large its extreme, which is
+#: read where it is and not at an output
 OF_KIND = {
     "position": ("series",),
     "orientation": ("series",),
@@ -46,7 +46,7 @@ OTHERS = ("series", "largest")
 
 @dataclass(frozen=True, slots=True)
 class Influence:
-    """How far two variants are apart, in the quantity's SI unit, and what of it may be chance.
+    """How much two variants differ, in the quantity's SI unit, and what of it may be chance.
 
     difference: infinite when one of them lacks the quantity, or the numbers of impacts differ.
     """
@@ -79,7 +79,7 @@ def members_apart(scene: Scene) -> Scene:
 
 
 def recorded(owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
-    """What is kept of a run to compare it by; quantities that its scene does not have are left out.
+    """Recorded values of a run to compare it by; quantities that its scene does not have are left out.
 
     owners: of the scene, by what they are.
     """
@@ -88,7 +88,7 @@ def recorded(owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) ->
 
 
 def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
-    """How far two variants are apart in a quantity.
+    """How much two variants differ in a quantity.
 
     members: starts of each that were run; a point without deviations counts as one that is known.
     """

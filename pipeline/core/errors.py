@@ -12,7 +12,7 @@ INTERRUPTED = 130
 
 def shown(text: str, longest: int = LONGEST) -> str:
     """Text as it may stand on a terminal: control characters spelt out, the middle of what is long left out."""
-    if len(text) > longest:  # first, since what is left is looked at character by character
+    if len(text) > longest:  # first, since what is left is examined character by character
         text = _short(text, longest)
     text = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
     return _short(text, longest) if len(text.encode(errors="replace")) > longest else text

@@ -9,7 +9,7 @@ from flexclear.pipeline.core.system import free_space, memory
 
 __all__ = ["disk", "memory", "require_disk", "require_memory", "size"]
 
-#: share of what is left that one piece of work may take
+#: fraction of what is left that one piece of work may take
 FRACTION = 0.8
 
 

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.output import Output
     from flexclear.pipeline.core.scene.schema import TimeSpan
 
-#: two output times are the same when they differ by less than this share of the latest: rounding of sums and products
-#: only. Times of events are outputs, too, and those of two accurate runs are so near that a coarser measure would take
-#: them for one, and the motion in between for an error
+#: two output times are the same when they differ by less than this fraction of the latest: rounding of sums and
+#: products only. Times of events are outputs, too, and those of two accurate runs are so near that a coarser measure
+#: would take them for one, and the motion in between for an error
 SAME_TIME = 1e-13
 #: closings with an approach above this count as impacts [m/s]
 IMPACT = 1e-4
@@ -170,7 +170,7 @@ def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
 
 
 def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
-    """What is kept of a series (`pipeline.core.scene.output_quantities`); shape () or (components,).
+    """Recorded values of a series (`pipeline.core.scene.output_quantities`); shape () or (components,).
 
     time: shape (n,), increasing; its steps are the weights of means.  values: shape (n, components).
     """

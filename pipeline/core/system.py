@@ -25,7 +25,7 @@ PR_SET_PDEATHSIG = 1
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, KEPT = -1, -3, 64 << 20
 #: where Windows keeps whether paths may be long, and characters of a path when they may and when not
 FILE_SYSTEM, LONG_PATH, SHORT_PATH = r"SYSTEM\CurrentControlSet\Control\FileSystem", 32767, 259
-#: how long a file is waited for that another program has open, and between two attempts [s]
+#: how long a file is awaited that another program has open, and between two attempts [s]
 PATIENCE, PAUSE = 2.0, 0.05
 #: access to a process of Windows that allows to ask whether it runs, and what it answers then (winbase.h, minwinbase.h)
 QUERY_LIMITED, STILL_ACTIVE, ACCESS_DENIED = 0x1000, 259, 5
@@ -191,7 +191,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def longest_path() -> int:
-    """Characters of a path that files can have: few on a Windows that was not told otherwise."""
+    """Characters of a path that files can have: few on a Windows without long paths enabled."""
     registry = _module("winreg")
     if registry is None:
         return sys.maxsize
@@ -254,8 +254,8 @@ def end_with_parent() -> None:
 def is_parent(process: int) -> bool:
     """Whether a process that has started this one still runs.
 
-    On Windows the parent's number says nothing: it is told of one that is gone, too, and in a virtual environment it is
-    that of a launcher that stands between the two.
+    On Windows the parent's number says nothing: it also names a parent that is gone, and in a virtual environment
+    it is that of a launcher that is between the two.
     """
     return os.getppid() == process if _windows() is None else alive(process)
 

@@ -105,7 +105,7 @@ UNITS: dict[str, tuple[float, str]] = {
 
 #: largest number, and one over the least: squares of products such as m l^2 must stay within floating point
 LARGEST = 1e50
-#: exponents of kg, m, s and rad in what an SI unit measures; products of units (`unit`) are told apart by them
+#: exponents of kg, m, s and rad in what an SI unit measures; products of units (`unit`) are distinguished by them
 _EXPONENTS: dict[str, Exponents] = {
     "number": (0, 0, 0, 0),
     "length": (0, 1, 0, 0),

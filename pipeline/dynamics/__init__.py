@@ -99,7 +99,7 @@ def equilibrium(
     drives: Mapping[str, float] | None = None,
     moving: bool = False,
 ) -> xr.Dataset:
-    """Static equilibrium near the scene's start pose, its drives held (schema EQUILIBRIUM).
+    """Static equilibrium close to the scene's start pose, its drives held (schema EQUILIBRIUM).
 
     time: at which the drives' laws give their positions [s]; the start when None.  drives: positions [m or rad] by
     name instead.  moving: the drives keep the speed of that moment, and the pose is one of steady motion.

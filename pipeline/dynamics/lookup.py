@@ -1,4 +1,4 @@
-"""Looking up a table in h, as code that stands where it is called.
+"""Looking up a table in h, as code that is where it is called.
 
 An evaluation looks up some seventy different fields. Compiled as functions, each of the length of a line, they took a
 sixth of the compilation.
@@ -13,7 +13,7 @@ from numba.core.typing.templates import make_intrinsic_template
 
 
 class Lookup:
-    """h[place] + size i, or what stands in h by `field` beyond that; h: a pointer to integers, or an array of them."""
+    """h[place] + size i, or what is in h by `field` beyond that; h: a pointer to integers, or an array of them."""
 
     def __init__(self, name: str, place: int, size: int, field: int | None) -> None:
         def typed(typing_context: Any, h: Any, i: Any) -> Any:

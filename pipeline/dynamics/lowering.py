@@ -82,7 +82,7 @@ class Part(JITCodeLibrary):
 
     @property
     def codegen(self) -> Part:
-        """Who is told where the function's environment is: this, which has nowhere to put it (`set_env`)."""
+        """Receives the function's environment: this, which has nowhere to put it (`set_env`)."""
         return self
 
     def set_env(self, env_name: str, env: Any) -> None:
@@ -156,7 +156,7 @@ class Flow(untyped.IRProcessing):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class Rewrites(untyped.GenericRewrites):
-    """Indices, powers and the like that are written out are told apart from those that are computed."""
+    """Indices, powers and the like that are written out are distinguished from those that are computed."""
 
     _name = "rewrites"
 

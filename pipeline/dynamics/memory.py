@@ -1,7 +1,7 @@
 """The memory through which scene and compiled kernels speak: every place, row and field is declared here, once.
 
 A kernel's code depends only on the kinds of parts present. Everything else, how many there
-are, what is joined to what, every number, stands in four flat arrays that every kernel takes:
+are, what is joined to what, every number, is in four flat arrays that every kernel takes:
 
 - ``h`` (integers): a header with sizes and offsets, then the wiring tables;
 - ``f`` (floats): the numbers of the scene;
@@ -267,7 +267,7 @@ JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _named(
 #: each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
 INDEPENDENCE, COLLOCATION = _named(STRETCHES, "independence collocation")
 COLLOCATION_ROWS = 13
-#: smallest pivot of J M^-1 J^T as share of its row's largest diagonal entry (1: rows at right angles, 0:
+#: smallest pivot of J M^-1 J^T as fraction of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
 LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)
 #: what a contact does now; bent: what the bristles store
@@ -321,8 +321,8 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # of the equations that a step met;
 # then what `singular_step` keeps: independence of the closure rows at the end of the step, time of its start, time of
 # the next singular pose, how far before it the stepper stops, the most that this may be (0: it does not stop), length
-# of the polynomial that lies ready (0: none), the share of it that the present step is, the least share that a row has
-# left of the most that it had, steps in a row that ended blindly near a pose;
+# of the polynomial that lies ready (0: none), the fraction of it that the present step is, the least fraction that a
+# row has left of the most that it had, steps in a row that ended blindly close to a pose;
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
 # what the last first step with a contact closed could have been, whether the next accepted step is the first one of a
 # segment
@@ -372,7 +372,7 @@ STEEPLY = 1e300
 
 
 def _record_columns(contacts: int) -> tuple[int, int, int]:
-    """Where a row of the record has the contacts' modes, their impact rates and the state; its time stands first."""
+    """Where a row of the record has the contacts' modes, their impact rates and the state; its time is first."""
     return 1, 1 + contacts, 1 + 2 * contacts
 
 

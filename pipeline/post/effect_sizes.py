@@ -19,7 +19,7 @@ from flexclear.pipeline.post.overview.curves import measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table
 
 Names = frozenset[str]
-#: stands for a variant that nobody asked for
+#: represents a variant that nobody asked for
 UNKNOWN = Point({}, {}, {}, 0, "not run")
 #: ranges below this have ticks between the powers of ten
 FEW = 30.0
@@ -60,7 +60,7 @@ def assemble(
 ) -> xr.Dataset:
     """Influences over (effect, other, quantity) in the quantities' SI units, each with an `_uncertainty`.
 
-    On the diagonal of (effect, other) stands what one effect does alone.  points: by the effects that a variant lacks.
+    On the diagonal of (effect, other) is what one effect does alone.  points: by the effects that a variant lacks.
     units: of the chosen quantities.  nan where a variant was refused; infinite where the quantity goes with the effect.
     """
     every, n = frozenset(effect.name for effect in effects), len(effects)
@@ -173,7 +173,7 @@ def written(value: float, uncertainty: float, unit: str) -> str:
 
 
 def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, float] | None = None) -> dict[str, bytes]:
-    """Bars of what each effect does alone, a panel for each quantity; a line where an accuracy is wanted.
+    """Bars of what each effect does alone, a panel for each quantity; a line where an accuracy is requested.
 
     Uses `dropped` and, where there is one, `added`, of single effects.
     """
@@ -208,7 +208,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")
             if requested and np.isfinite(requested.get(chosen[k], np.nan)):
-                panel.axvline(requested[chosen[k]], color="#D55E00", lw=1.3, label="wanted accuracy")
+                panel.axvline(requested[chosen[k]], color="#D55E00", lw=1.3, label="requested accuracy")
             low, high = panel.get_xlim()
             if high < FEW * low:
                 style.plain(panel.xaxis)

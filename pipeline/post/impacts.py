@@ -44,7 +44,7 @@ def impacts(run: xr.Dataset | LabelledArrays) -> dict[str, tuple[tuple[str, ...]
     }
 
 
-#: what the run's ledger books of contacts, by the name that an impact's share of it has
+#: what the run's ledger books of contacts, by the name that an impact's fraction of it has
 BOOKS = {
     "impact_impulse": "contact_impulse",
     "impact_damping_loss": "contact_damping_loss",

@@ -1,4 +1,4 @@
-"""The page about the paper: what holds of it first, then all that stands behind; one file with all inside."""
+"""The page about the paper: what holds of it first, then all that is behind; one file with all inside."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def _answer(content: Content) -> str:
             lines.append(
                 f"<li><i>{html.escape(text)}</i> ({html.escape(section)}): {_word(word)}; {html.escape(numbers)}.</li>"
             )
-    where = "<a href='#verdicts'>All verdicts</a>, <a href='#tables'>tables beside the paper's</a>"
+    where = "<a href='#verdicts'>All verdicts</a>, <a href='#tables'>tables next to the paper's</a>"
     return f"<ul>{''.join(lines)}</ul><p>{where}.</p>"
 
 

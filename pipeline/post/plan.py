@@ -14,7 +14,7 @@ from flexclear.pipeline.post.plotting.table import Table
 
 
 def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
-    """Influences over (effect, quantity), decisions and evidence over effects, what is wanted over quantities; SI.
+    """Influences over (effect, quantity), decisions and evidence over effects, what is requested over quantities; SI.
 
     units: of the quantities, by name.  nan where nothing was estimated, infinite where nothing bounds it or the events
     differ.
@@ -78,9 +78,9 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         "wanted": "accuracy that the scene asks for",
         "integration": "estimated error of the planned run's integration, and of the modes that it leaves out",
         "elements": "finite elements of the body",
-        "elements_called_for": "finite elements that the wanted accuracy calls for",
-        "mesh_frequency_error": "largest error of a kept frequency due to the mesh, as a share",
-        "mesh_compliance_error": "largest error of the frames' compliance due to the mesh, as a share",
+        "elements_called_for": "finite elements that the requested accuracy calls for",
+        "mesh_frequency_error": "largest error of a kept frequency due to the mesh, as a fraction",
+        "mesh_compliance_error": "largest error of the frames' compliance due to the mesh, as a fraction",
         "mesh_error": "estimated error of the quantity due to the body's mesh, at most, in the quantity's unit",
     }
     for name, text in meanings.items():
@@ -126,7 +126,7 @@ def table(planned: xr.Dataset) -> Table:
         f"The plan rests on {planned.attrs['runs']} short runs, {planned.attrs['evaluations']:,} evaluations."
     )
     return Table(
-        "What the wanted accuracy calls for",
+        "What the requested accuracy calls for",
         ("effect", "decision", *names, "evidence", "why"),
         tuple(rows),
         tuple(notes),
@@ -147,10 +147,10 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
         f"{compliance:.2g} % in compliance"
     )
     if not errors:
-        return f"{head}; what that does to what is asked for cannot be told."
+        return f"{head}; what that does to what is asked for cannot be determined."
     text = f"{head}, and so change {listed(errors)}"
     if called > given:
-        return f"{text}: the accuracy wanted calls for {called}."
+        return f"{text}: the requested accuracy calls for {called}."
     return f"{text}: enough; {called} would do. Elements cost no time in a run, so the recipe stays as it is."
 
 
@@ -160,10 +160,10 @@ def words(planned: xr.Dataset) -> str:
     gone = [str(w) for w, k in zip(planned["words"].values, planned["kept"].values, strict=True) if not k]
     asked = " and ".join(str(name) for name in planned["quantity"].values)
     if not remaining:
-        return f"For {asked} as wanted nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
+        return f"For {asked} as requested nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
     if not gone:
-        return f"For {asked} as wanted all effects are needed: {listed(remaining)}."
-    return f"For {asked} as wanted {listed(remaining)} must be kept; {listed(gone)} may be left out."
+        return f"For {asked} as requested all effects are needed: {listed(remaining)}."
+    return f"For {asked} as requested {listed(remaining)} must be kept; {listed(gone)} may be left out."
 
 
 def listed(names: list[str]) -> str:
@@ -172,7 +172,7 @@ def listed(names: list[str]) -> str:
 
 
 def verified(planned: xr.Dataset) -> Table:
-    """The true distance of the planned run from the full one, beside what is wanted."""
+    """The true distance of the planned run from the full one, next to what is requested."""
     rows = []
     for k, name in enumerate(planned["quantity"].values):
         unit = str(planned["unit"].values[k])
@@ -188,7 +188,7 @@ def verified(planned: xr.Dataset) -> Table:
         "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
     return Table(
-        "The plan beside the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)
+        "The plan next to the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)
     )
 
 

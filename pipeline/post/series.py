@@ -106,7 +106,7 @@ def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Variable
 
 
 def contacts(run: xr.Dataset | LabelledArrays) -> Variables:
-    """Eccentricity, clearance and share of time in contact, per contact."""
+    """Eccentricity, clearance and fraction of time in contact, per contact."""
     if "contact_offset" not in run:
         return {}
     distance = np.linalg.norm(run["contact_offset"].values, axis=-1)
@@ -120,7 +120,7 @@ def contacts(run: xr.Dataset | LabelledArrays) -> Variables:
 
 
 def _time_share(run: xr.Dataset | LabelledArrays) -> np.ndarray:
-    """Share of the run that each contact is closed, from its located begins and ends."""
+    """Fraction of the run that each contact is closed, from its located begins and ends."""
     time, fraction, names = run["time"].values, np.zeros(run.sizes["contact"]), list(run["contact"].values)
     closings = of_kind(run, "closing")
     begun, lasted = run["event_time"].values[closings], run["event_duration"].values[closings]

@@ -22,7 +22,7 @@ DECADE = 8.0
 #: factors that make the numbers of an axis handy
 HANDY = {"m": (1e3, "mm"), "N": (1.0, "N"), "s": (1e3, "ms")}
 NAME = "sweep"
-#: share of the largest component of a vector below which another one is zero but for rounding
+#: fraction of the largest component of a vector below which another one is zero but for rounding
 ZERO = 1e-9
 
 

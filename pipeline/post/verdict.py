@@ -9,7 +9,8 @@ One rule for all:
 - *undecided* otherwise.
 
 A freedom on which nothing depends, such as the spin of a leg with balls at both ends, lets neighbours part in
-proportion to time: in n periods its exponent is seen as ln(n) / n per period, and no smaller one can be told from it.
+proportion to time: in n periods its exponent is seen as ln(n) / n per period, and no smaller one can be determined from
+it.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from flexclear.pipeline.post import chaos
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
 #: K of the 0-1 test below which a motion is regular, and above which chaotic; in between a finite series cannot tell
 REGULAR, CHAOTIC = 0.2, 0.8
-#: share of the variance that few lines hold in the spectrum of a motion with few frequencies
+#: fraction of the variance that few lines hold in the spectrum of a motion with few frequencies
 DISCRETE = 0.95
 #: states below which the 0-1 test and the spectrum tell nothing
 ENOUGH = 200
@@ -40,11 +41,11 @@ VERDICT: Schema = {
     "least_exponent": _V((), "s-1", "exponent that so many periods cannot tell from zero"),
     "zero_one": _V((), "1", "K of the 0-1 test, of the component that decides least for regular motion", optional=True),
     "returns_after": _V((), "1", "periods after which the states come back; 0 where they do not"),
-    "return_distance": _V((), "1", "largest distance of a return, as a share of the motion's size"),
+    "return_distance": _V((), "1", "largest distance of a return, as a fraction of the motion's size"),
     "contraction": _V((), "1", "factor per period by which successive returns come closer", optional=True),
-    "few_lines": _V((), "1", "share of the variance in the sixteen largest lines of the spectrum", optional=True),
+    "few_lines": _V((), "1", "fraction of the variance in the sixteen largest lines of the spectrum", optional=True),
     "principal": _V(("section", "component"), "1", "states along their directions of largest variance"),
-    "power": _V(("frequency", "component"), "1", "share of the variance at each frequency"),
+    "power": _V(("frequency", "component"), "1", "fraction of the variance at each frequency"),
     "impact_correlation": _V(
         ("lag", "contact"), "1", "correlation of the first impact's phase with that of later periods", optional=True
     ),

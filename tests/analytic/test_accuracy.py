@@ -53,7 +53,7 @@ def test_several_quantities_are_met_together(reference):
 def test_what_cannot_be_had_is_said_with_the_best_there_is(reference):
     scene = load_scene(CSJ, {"accuracy": {"platform.velocity": {"relative": 1e-15}}})
     run = dynamics.simulate(scene, {}, quiet)
-    assert "times what is wanted" in run.attrs["accuracy_verdict"]
+    assert "times what is requested" in run.attrs["accuracy_verdict"]
     velocity = parse("platform.velocity", scene.owners())
     assert quantities.error(run, reference, velocity) < 1e-8 * quantities.scale(reference, velocity)
 
@@ -63,7 +63,7 @@ def test_of_a_chaotic_run_it_is_said_how_long_it_can_be_had():
     """With an undamped flexible rod beside the clearance, motions part so fast that no tolerance holds to the end."""
     scene = load_scene(FULL, {"accuracy": {"platform.velocity": {"relative": 1e-8}}})
     verdict = dynamics.simulate(scene, bundles(scene), quiet).attrs["accuracy_verdict"]
-    assert "times what is wanted" in verdict
+    assert "times what is requested" in verdict
     assert "tighter tolerances do not help (it holds until t = " in verdict
     assert "chaotic or rounding decides" in verdict
 

@@ -84,7 +84,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         RECIPE | {"pose": {"rotation_vector": [0, 0, 1], "quaternion": [1, 0, 0, 0]}},
         r"\[pose\].*orientation is given once",
     ),
-    "section beside segments": (segmented((0.0, 0.24)) | {"section": CIRCLE}, r"\[section\]: unknown key"),
+    "section next to segments": (segmented((0.0, 0.24)) | {"section": CIRCLE}, r"\[section\]: unknown key"),
 }
 
 

@@ -119,12 +119,12 @@ def close(found: np.ndarray, expected: np.ndarray) -> None:
 def test_rigid_integrals_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
     data, points = body
     assert float(data["mass"]) == pytest.approx(points.mass.sum(), rel=1e-13)
-    close(data["first_moment"].values, points.mass @ points.position)
-    close(data["second_moment"].values, np.einsum("p,pk,pl->kl", points.mass, points.position, points.position))
+    close(data["first_moment"].values, points.mass @ points.place)
+    close(data["second_moment"].values, np.einsum("p,pk,pl->kl", points.mass, points.place, points.place))
 
 
 def test_modal_integrals_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
-    data, (m, X, S) = body[0], (body[1].mass, body[1].position, body[1].shape)
+    data, (m, X, S) = body[0], (body[1].mass, body[1].place, body[1].shape)
     close(data["modal_first_moment"].values, np.einsum("p,pkj->kj", m, S))
     close(data["position_mode_moment"].values, np.einsum("p,pk,plj->klj", m, X, S))
     close(data["mode_mode_moment"].values, np.einsum("p,pki,plj->klij", m, S, S, optimize=True))

@@ -194,7 +194,7 @@ def _quiet(fraction: float) -> None:
         ("constrained", {"held": ("topp.x",)}, r"no frame called 'topp'\n.*'top'"),
         ("constrained", {"held": ("top.w",)}, "names no direction"),
         ("pinned-pinned", {"interfaces": ("top",)}, "two interfaces"),
-        ("pinned-pinned", {"interfaces": ("top", "top")}, "at one place"),
+        ("pinned-pinned", {"interfaces": ("top", "top")}, "coincide"),
         ("cantilever", {"interfaces": ()}, "clamped at an interface"),
         ("craig-chang", {"interfaces": ()}, "need an interface"),
         ("craig-chang", {"count": 11}, r"12 .*modes"),

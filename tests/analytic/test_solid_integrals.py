@@ -67,7 +67,7 @@ def close(found: np.ndarray, expected: np.ndarray, scale: float) -> None:
 
 def test_invariants_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
     data, points = body
-    mass, X, S = points.mass, points.position, points.shape
+    mass, X, S = points.mass, points.place, points.shape
     weighted = S * mass[:, None]
     total = float(mass.sum())
     # Cauchy-Schwarz: a mass-normalised shape has int rho S <= sqrt(m), int rho X S <= sqrt(int rho X^2)
@@ -87,7 +87,7 @@ def test_kinetic_energy_of_any_motion_is_that_of_the_cloud(body: tuple[xr.Datase
     for _ in range(5):
         v, omega = random.normal(size=3), 10.0 * random.normal(size=3)
         q, rate = 1e-3 * random.normal(size=n), random.normal(size=n)
-        r = points.position + points.shape @ q
+        r = points.place + points.shape @ q
         velocity = v[:, None] + np.cross(omega, r, axisb=0, axisc=0) + points.shape @ rate
         expected = 0.5 * float(points.mass @ (velocity**2).sum(axis=0))
         assert kinetic(data, v, omega, q, rate) == pytest.approx(expected, rel=1e-10)

@@ -285,7 +285,7 @@ def test_scenes_that_differ_in_capitals_only_are_not_run_together(tmp_path: Path
         path.parent.mkdir()
         shutil.copy(root / "scenes" / "checks" / "pendulum.toml", path)
         scenes.append(fc.load_scene(path))
-    with pytest.raises(InputError, match="take each other's place"):
+    with pytest.raises(InputError, match="replace each other"):
         owner.refuse_namesakes(scenes)
 
 

@@ -179,8 +179,8 @@ def test_what_cannot_be_had_is_explained():
 
 def test_a_scene_that_is_refused_as_it_stands_has_no_causes():
     _, points, runs = study()
-    points.append(Point("as it stands", "sampling", {"interval": 0.1}))
-    runs["as it stands"] = xr.Dataset(attrs={"refused": "no"})
+    points.append(Point("as it is", "sampling", {"interval": 0.1}))
+    runs["as it is"] = xr.Dataset(attrs={"refused": "no"})
     found = split.causes_of(POSITION, points, runs, located=1e-12)
     assert np.isnan(found["time integration"])
     assert causes.dominant(found) == "–"
@@ -211,10 +211,10 @@ def test_the_pareto_front_holds_what_nothing_beats():
 def test_causes_come_from_pairs_that_differ_in_one_thing():
     _, points, runs = study()
     points += [
-        Point("as it stands", "sampling", {"interval": 0.1}),
+        Point("as it is", "sampling", {"interval": 0.1}),
         Point("denser output", "sampling", {"interval": 0.01}),
     ]
-    runs |= {"as it stands": run(1e-5), "denser output": run(1e-5)}
+    runs |= {"as it is": run(1e-5), "denser output": run(1e-5)}
     own = {"theory": "rayleigh", "mode_set": "craig-bampton", "modes": 1e3, "elements": 12, "own": True}
     variants = {
         "own": own,

@@ -57,7 +57,7 @@ def files(tmp_path: Path) -> list[Path]:
 def _two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever machine this is."""
     monkeypatch.setattr(cores, "cores", lambda: 2)
-    monkeypatch.setattr(cores, "_told", None)
+    monkeypatch.setattr(cores, "_others_idle", None)
 
 
 def nothing(path: Path) -> None:

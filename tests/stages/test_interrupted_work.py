@@ -42,7 +42,7 @@ def often(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work is looked at often, and its state is written each time."""
     monkeypatch.setattr(trajectory, "SLICE", SLICE)
     monkeypatch.setattr(journal, "EVERY", -1.0)
-    monkeypatch.setattr(journal, "SHARE", np.inf)
+    monkeypatch.setattr(journal, "FRACTION", np.inf)
     monkeypatch.setattr(os, "fsync", lambda file: None)  # a busy disk takes its time
 
 
@@ -194,7 +194,7 @@ def test_a_killed_ensemble_goes_on_to_the_same_bits(
     monkeypatch.setattr(cores, "cores", lambda: 1)
     whole = dynamics.ensemble(scene, {}, silent)
     monkeypatch.setattr(cores, "cores", lambda: threads)
-    monkeypatch.setattr(cores, "_told", True)
+    monkeypatch.setattr(cores, "_others_idle", True)
     found, kills = interrupted(lambda: dynamics.ensemble(scene, {}, silent), tmp_path, monkeypatch)
     assert kills >= 3
     assert found.identical(whole)
@@ -283,7 +283,7 @@ def test_what_a_part_of_the_work_leaves_is_not_taken_for_what_there_is_of_it(
     failed = schedule.attempt(task, {}, Store(tmp_path), Sources(tmp_path), silent)
     assert isinstance(failed, schedule.Failure)
     assert failed.exit_code == 4
-    assert failed.message == "bounce ensemble: the time is over; run it again, and it goes on from there"
+    assert failed.message == "bounce ensemble: the time is over; run it again, and it continues from there"
     assert not list(tmp_path.iterdir())
 
 

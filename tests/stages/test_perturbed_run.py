@@ -45,7 +45,7 @@ def parting(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def processors(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
     monkeypatch.setattr(cores, "cores", lambda: count)
-    monkeypatch.setattr(cores, "_told", True)
+    monkeypatch.setattr(cores, "_others_idle", True)
 
 
 def check(root: Path, name: str, **changes: Any) -> Scene:

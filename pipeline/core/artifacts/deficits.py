@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-#: a share of the static compliance below this is worth a warning
+#: a fraction of the static compliance below this is worth a warning
 ENOUGH = 0.9
 #: references whose shapes answer static loads at the interfaces exactly
 STATIC = ("craig-bampton", "craig-chang", "residual-flexibility")

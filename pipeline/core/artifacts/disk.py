@@ -158,7 +158,7 @@ def is_copy(source: Path, target: Path) -> bool:
 
 @contextlib.contextmanager
 def temporary(path: Path) -> Iterator[Path]:
-    """A name beside `path` that no other process uses; gone afterwards, however it ends."""
+    """A name next to `path` that no other process uses; gone afterwards, however it ends."""
     stem = path.name.lstrip(".").partition(".")[0]
     made = path.with_name(f".{stem}.{_host()}-{os.getpid()}.{os.urandom(4).hex()}.tmp")
     try:

@@ -71,7 +71,7 @@ class LabelledArrays:
         return replace(self, attrs={**self.attrs, **text})
 
     def assign_coords(self, coordinates: Mapping[str, LabelledArray]) -> LabelledArrays:
-        """The same with these coordinates last, in place of others of their names."""
+        """The same with these coordinates last, instead of others of their names."""
         remaining = {name: array for name, array in self.variables.items() if name not in coordinates}
         return replace(self, variables=remaining | dict(coordinates), coords=self.coords | coordinates.keys())
 

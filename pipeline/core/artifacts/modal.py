@@ -29,7 +29,7 @@ class Modal:
         """The dataset with its first `count` modes only, in every variable that counts modes.
 
         The modes of a bundle are eigenvectors of its reduced matrices, so that the first of them are a basis of their
-        own. Shares of compliance are computed again; the error bound and the resolved frequency are dropped.
+        own. Fractions of compliance are computed again; the error bound and the resolved frequency are dropped.
         Raises InputError for a count that is not there, or that cuts a pair of equal frequencies.
         """
         self._check(count)

@@ -1,6 +1,6 @@
 """NetCDF-4 files of labelled arrays, with all that xarray writes into them: the one writer and the one reader.
 
-What xarray keeps beside NetCDF's own types is here, too: coordinates are listed in attributes `coordinates`, truth is
+What xarray keeps next to NetCDF's own types is here, too: coordinates are listed in attributes `coordinates`, truth is
 kept as bytes with the attribute `dtype`, and floats have NaN for what was never written.
 """
 
@@ -20,7 +20,7 @@ from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledAr
 
 #: bytes of a dataset from which on room on the disk counts for more than time
 COMPRESSED = 1 << 26
-#: bytes of values from which on the library is told not to keep what it has read: that would cost more than it takes
+#: bytes of values from which on the library is given not to keep what it has read: that would cost more than it takes
 _LARGE = 1 << 16
 #: how the library takes values of a kind, where otherwise than they are
 _TAKEN = {"U": np.dtype("O"), "b": np.dtype("i1")}

@@ -19,8 +19,8 @@ Values = dict[str, np.ndarray]
 #: what became of a point
 STATUS = ("done", "refused", "not_run")
 DONE, REFUSED, NOT_RUN = range(3)
-#: what is kept of each quantity: its value, and where asked for the difference from a run at a tighter tolerance, or
-#: the standard deviation over members
+#: what is recorded of each quantity: its value, and where asked for the difference from a run at a tighter tolerance,
+#: or the standard deviation over members
 STATISTICS = ("values", "error", "deviation")
 
 
@@ -129,7 +129,7 @@ def dataset(
 
 
 def dimensions(time: np.ndarray, sections: int) -> dict[str, int]:
-    """Lengths of the dimensions that what is kept of a point may have."""
+    """Lengths of the dimensions that what is recorded of a point may have."""
     return {"axis": len(AXES), "quat": len(QUATERNION), "time": len(time), "section": sections}
 
 

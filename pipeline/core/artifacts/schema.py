@@ -253,7 +253,7 @@ ENSEMBLE: Schema = {
     "peak_acceleration": _V(
         ("member", "body", "axis"), "m s-2", "largest magnitude of each component, of outputs and events"
     ),
-    "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),
+    "contact_time_share": _V(("member", "contact"), "1", "fraction of the run spent in contact"),
 }
 
 _OF_SECTION = {
@@ -309,8 +309,8 @@ LINEAR: Schema = EQUILIBRIUM | {
     "undamped_frequency": _V(("vibration",), "Hz", "magnitude of the eigenvalue over 2 pi"),
     "decay_rate": _V(("vibration",), "s-1", "rate at which the vibration decays; negative when it grows"),
     "damping_ratio": _V(("vibration",), "1", "decay rate over the magnitude of the eigenvalue"),
-    "dominant": _V(("vibration",), "", "body with the largest share of the kinetic energy"),
-    "energy_share": _V(("vibration", "moving_body"), "1", "share of the body in the kinetic energy"),
+    "dominant": _V(("vibration",), "", "body with the largest fraction of the kinetic energy"),
+    "energy_share": _V(("vibration", "moving_body"), "1", "fraction of the body in the kinetic energy"),
     "frame_translation": _V(("vibration", "part", "frame", "axis"), "1", "displacement of the named frame, world axes"),
     "frame_rotation": _V(
         ("vibration", "part", "frame", "axis"), "rad m-1", "rotation vector of the named frame, world axes"
@@ -391,5 +391,5 @@ def require_complete(run: xr.Dataset | LabelledArrays, what: str = "the run") ->
             what,
             f"it is not complete: it was stopped at t = {run.attrs.get('stopped_at', float('nan')):.6g} s "
             f"({run.attrs.get('stopped_by', 'nobody knows why')})",
-            "run the scene again, which goes on from there",
+            "run the scene again, which continues from there",
         )

@@ -46,11 +46,11 @@ if TYPE_CHECKING:
 _PART = re.compile(r"[^./\\\0][^/\\\0]{0,200}")
 #: the file of an artifact that other stages read
 MAIN = "nc"
-#: stands for the key of all artifacts of a stage, such as the batches of a sweep's points
+#: represents the key of all artifacts of a stage, such as the batches of a sweep's points
 FAMILY = "family"
-#: attributes of the main file that a command tells, without opening the file
+#: attributes of the main file that a command reports, without opening the file
 REPORTED = ("warnings", "accuracy_verdict")
-#: lies beside what is shown and is not of the scene as it is now
+#: lies next to what is shown and is not of the scene as it is now
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
 PARTIAL = ".partial"
@@ -63,7 +63,7 @@ OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not 
 class Record:
     """What is known of a stored artifact: sha256 of each file by its name, and the facts of its key.
 
-    said: those of the main file's attributes that a command tells its user (`TOLD`).
+    said: those of the main file's attributes that a command shows its user (`REPORTED`).
     """
 
     stage: str
@@ -85,7 +85,7 @@ class Record:
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """Artifacts below `root` (the results folder). `say` is told, in one line, what was found broken."""
+    """Artifacts below `root` (the results folder). `say` prints one line about damaged files."""
 
     root: Path
     say: Callable[[str], None] = lambda text: None
@@ -161,7 +161,8 @@ class Store:
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
         """Make the current artifact visible: read-only copies in `folder`, and its facts in ``folder/.facts``.
 
-        An empty `folder` shows nothing.  A shown file that somebody has edited is kept under another name, and told.
+        An empty `folder` shows nothing.  A shown file that somebody has edited is kept under another name, and
+        reported.
         """
         if not folder:
             return
@@ -190,7 +191,7 @@ class Store:
             self.say(f"{self._shown(target)} was edited; the edit is kept as {aside.name}, and the result shown again")
 
     def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:
-        """Put what is left of work that was stopped beside what is shown; its path, where anything is shown.
+        """Put what is left of work that was stopped next to what is shown; its path, where anything is shown.
 
         It is no artifact, and `show` takes it away.
         """
@@ -203,7 +204,7 @@ class Store:
         return path
 
     def outdated(self, folder: str, label: str, why: str) -> None:
-        """Note beside what is shown that it is of an earlier state, and why; `show` takes the note away."""
+        """Note next to what is shown that it is of an earlier state, and why; `show` takes the note away."""
         if not folder:
             return
         with disk_limits(self.root / folder):
@@ -301,7 +302,7 @@ def _texts(table: Mapping[object, object]) -> dict[str, str]:
 
 
 def _partial(shown: Path) -> Path:
-    """Where what is left of a stopped run stands, beside the shown file of a whole one."""
+    """Where what is left of a stopped run is, next to the shown file of a whole one."""
     return shown.with_name(f"{shown.stem}{PARTIAL}{shown.suffix}")
 
 
@@ -329,7 +330,7 @@ def _written(path: Path, data: LabelledArrays) -> str:
         try:
             netcdf.write(made, data)
         except (OSError, RuntimeError) as error:
-            # the HDF5 library tells that it cannot write, but not that the disk is full; plain bytes get the reason
+            # the HDF5 library reports that it cannot write, but not that the disk is full; plain bytes get the reason
             made.write_bytes(bytes(data.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
         return settle(made, path)
@@ -352,6 +353,6 @@ def _store(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
 
 
 def _identity(path: Path) -> tuple[int, ...]:
-    """What tells a file from others, and from itself after somebody wrote into it."""
+    """What distinguishes a file from others, and from itself after somebody wrote into it."""
     status = path.stat()
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns

@@ -11,7 +11,7 @@ from pathlib import Path
 from flexclear.pipeline.core.artifacts.disk import digest_of, read_checked
 from flexclear.pipeline.core.artifacts.store import FAMILY, Record, Store, read_record
 
-#: what stands beside artifacts and is none of their files
+#: what is next to artifacts and is none of their files
 BESIDE = (".json", ".lock", ".names", ".part", ".tmp")
 DAY = 86400.0
 #: a file of an artifact may be so long without its record [s]
@@ -106,7 +106,7 @@ def _same(path: Path, other: Path) -> bool:
 def _records(store: Store) -> list[Path]:
     """Of all stages; those of a sweep's points have a folder for each family.
 
-    A memo of a whole command lies beside the stages, and a file of an artifact may be called ``<key>.index.json``.
+    A memo of a whole command lies next to the stages, and a file of an artifact may be called ``<key>.index.json``.
     """
     cache = store.root / "cache"
     return sorted(path for path in cache.rglob("*.json") if path.parent != cache and "." not in path.stem)

@@ -15,7 +15,7 @@ COPIES = 5.0
 #: points of a structured grid, which a header of a hundred bytes may promise without end
 MOST_POINTS = 2_000_000
 _GRID = re.compile(rb"^DATASET\s+(?:STRUCTURED|RECTILINEAR)\w*\s+DIMENSIONS((?:\s+\d{1,12}){3})\s", re.MULTILINE)
-#: bytes of the header of a VTK file that are looked at
+#: bytes of the header of a VTK file that are examined
 HEADER = 2000
 
 

@@ -1,4 +1,4 @@
-"""The points of a sweep: values of all its parameters, and the places of the scene that take them."""
+"""The points of a sweep: values of all its parameters, and the paths in the scene that take them."""
 
 from __future__ import annotations
 

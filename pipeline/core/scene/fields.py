@@ -174,7 +174,7 @@ Source = str | dict[str, str]
 class Part(BaseModel):
     """Base of everything a scene may say: frozen, and no unknown keys.
 
-    Modules of parts evaluate their annotations as they stand: as texts each would be compiled by each command.
+    Modules of parts evaluate their annotations as they are: as texts each would be compiled by each command.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
@@ -185,7 +185,7 @@ class Part(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The schema, with the meanings of keys that the docstring tells."""
+        """The schema, with the meanings of keys from the docstring."""
         from flexclear.pipeline.core.scene.key_descriptions import meanings  # reads docstrings, which only schemas need
 
         schema = handler(core)

@@ -1,4 +1,4 @@
-"""The ideal twin of a scene: clearance or flexibility taken away, everything else as it is."""
+"""The ideal mechanism of a scene: clearance or flexibility taken away, everything else as it is."""
 
 from __future__ import annotations
 

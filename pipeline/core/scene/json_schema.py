@@ -1,7 +1,7 @@
 """JSON schemas of scene files, for editors that complete and check while one types.
 
 A file may say less than a whole scene: with `extends` it only says what differs, and under `set` parts may be given in
-part.  What stands in a file may be text with a unit wherever a number is meant; the loader knows which unit fits.
+part.  What is in a file may be text with a unit wherever a number is meant; the loader knows which unit fits.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from flexclear.pipeline.core.scene.load import FAMILIES, SETTINGS
 from flexclear.pipeline.core.scene.schema import Scene
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-#: definitions of parts of which only some keys are given, beside those of whole parts
+#: definitions of parts of which only some keys are given, next to those of whole parts
 PARTIAL = "Partial"
 
 
@@ -26,7 +26,7 @@ def scene_schema() -> dict[str, Any]:
     for name in list(definitions):
         definitions[PARTIAL + name] = _partial(definitions[name])
     properties["extends"] = {"type": "string", "description": "scene file that this one edits, relative to it"}
-    properties["replace"] = _edit("parts put in the place of others; nothing of the old ones stays", properties)
+    properties["replace"] = _edit("parts put instead of others; nothing of the old ones stays", properties)
     properties["set"] = _edit("keys that change in parts and settings; the others stay", properties, SETTINGS)
     properties["set"]["properties"] = {k: _partial(p) for k, p in properties["set"]["properties"].items()}
     properties["remove"] = {
@@ -69,7 +69,7 @@ def _partial(node: Any) -> Any:
     for key, value in node.items():
         if key in ("required", "discriminator", "minProperties"):
             continue
-        if key == "oneOf":  # without what tells them apart, several may fit
+        if key == "oneOf":  # without what distinguishes them, several may fit
             key = "anyOf"
         result[key] = value.replace("#/$defs/", f"#/$defs/{PARTIAL}") if key == "$ref" else _partial(value)
     return result

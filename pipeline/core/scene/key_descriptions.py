@@ -8,7 +8,7 @@ from collections.abc import Collection
 
 
 def meanings(part: type, keys: Collection[str]) -> dict[str, str]:
-    """Meaning of each of the keys that a class, or one that it is made from, tells of in its docstring.
+    """Meaning of each of the keys that a class, or one that it is made from, describes in its docstring.
 
     >>> class Pin:
     ...     '''A pin.  radius: outer one.  from, to: its ends [m], of which

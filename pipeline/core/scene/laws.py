@@ -1,6 +1,6 @@
 """Laws of time: what a prescribed coordinate, or the size of a load, does. One language for drives and loads.
 
-The values of a law are lengths, angles, forces or torques, as the place where it stands demands;
+The values of a law are lengths, angles, forces or torques, as the place where it is demands;
 a bare number is in SI units. How a law of type 'step' goes is in `pipeline.dynamics.drives.step`.
 """
 
@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, mo
 from flexclear.pipeline.core.scene.fields import Angle, Part, Rate, Time
 from flexclear.pipeline.core.units import UNITS, any_quantity, quantity, unit
 
-_TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits where the law stands"}
+_TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits where the law is"}
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]
 
 
@@ -32,7 +32,7 @@ Times: TypeAlias = Annotated[tuple[Time, ...], _LIST]
 LARGEST_TABLE = 16 << 20
 #: most coefficients of a polynomial law
 COEFFICIENTS = 8
-#: most steps of one law, and pieces of laws that are made of others: each is looked at beside all others
+#: most steps of one law, and pieces of laws that are made of others: each is examined next to all others
 MOST_STEPS, MOST_PIECES = 5_000, 200_000
 #: most pieces of a sum times its laws, each of which is evaluated at the start of each piece
 MOST_SUMMED = 1_000_000
@@ -81,7 +81,7 @@ class Step(Part):
 
 
 def _coefficient(value: Any) -> Any:
-    """A number, or text with a unit; which one belongs there is known where the law stands."""
+    """A number, or text with a unit; which one belongs there is known where the law is."""
     if isinstance(value, str) and not any(character.isalpha() for character in value):
         return quantity(value, "number")
     return value if isinstance(value, str) else quantity(value, "number")
@@ -150,7 +150,7 @@ class Spline(Part):
 
 
 class Column(Part):
-    """A column of a table: its header, or its number from 1, and the unit of what stands there.
+    """A column of a table: its header, or its number from 1, and the unit of what is there.
 
     column: header, or number from 1.  unit: of the numbers in the column.
     """
@@ -167,7 +167,7 @@ class Column(Part):
 
 
 class Table(Part):
-    """A spline through the rows of a CSV file, looked for beside the scene and in the folders above it.
+    """A spline through the rows of a CSV file, searched for next to the scene and in the folders above it.
 
     The file is read with the scene: `points` are its numbers, time in seconds, values in their column's unit.
     file: name of the CSV file.  time, value: columns of the times and of the values.  degree: of the spline, 3 or 5.

@@ -48,7 +48,7 @@ class Limits(Part):
 
     @property
     def time_words(self) -> str:
-        """What is told when the time is over."""
+        """The message when the time is over."""
         return f"it has taken the {self.time or 0.0:.6g} s that limits.time allows"
 
     def written(self) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """Where in a TOML file a place like ``body.rod.mesh`` is written: errors then name the line.
 
-The reader of the standard library tells no lines, so that keys are looked for in the text.
+The reader of the standard library gives no line numbers, so that keys are searched for in the text.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ def _found(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[
 
 @lru_cache(maxsize=16)
 def _read(text: str) -> tuple[object, dict[tuple[str, ...], int]]:
-    """What a text extends, and its lines; many mistakes are looked for in one text."""
+    """What a text extends, and its lines; many mistakes are searched for in one text."""
     return tomllib.loads(text).get("extends"), written(text)
 
 

@@ -32,7 +32,7 @@ _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
 DEEP = re.compile(rf"(?<![\w\\-])(?:{_PART}[ \t]*+\.[ \t]*+){{50}}")
 #: scenes that extend each other in a row; each is read, and what it extends is copied
 LONGEST_CHAIN = 50
-#: keys of parts that name files, which are looked for where the scene is
+#: keys of parts that name files, which are searched for where the scene is
 FILES = ("mesh", "file")
 EDITS = ("extends", "replace", "set", "remove")
 
@@ -40,7 +40,7 @@ EDITS = ("extends", "replace", "set", "remove")
 def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
     """The scene in a TOML file, with everything that it extends.
 
-    override: dotted place -> value, e.g. ``{"joint.A1.clearance": "0.2 mm"}``; the place's parent
+    override: dotted path -> value, e.g. ``{"joint.A1.clearance": "0.2 mm"}``; the place's parent
     must be there.  Raises InputError (all mistakes at once).
     """
     path = Path(path)
@@ -77,7 +77,7 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
 
 
 def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
-    """A copy of a scene with dotted places changed, as in `load_scene`; None takes a setting, a part or a key away.
+    """A copy of a scene with dotted paths changed, as in `load_scene`; None takes a setting, a part or a key away.
 
     Raises InputError for a part or key that is not there; a setting may be missing already.
     """
@@ -97,7 +97,8 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
 
 
 def _read(table: dict[str, Any], where: Path) -> Scene:
-    """The scene that a table says; mistakes, and what asks for more than `[limits]` allows, are told of this place."""
+    """The scene that a table says; mistakes, and what asks for more than `[limits]` allows, are reported of this
+    place."""
     try:
         return Scene.model_validate(table)
     except ValidationError as error:
@@ -133,7 +134,7 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
             result = result.model_copy(update={family: whole})
             result.check()
         except (ValidationError, InputError, ResourceError, ValueError):
-            return edited(scene, override)  # which tells what is wrong, with its place
+            return edited(scene, override)  # which reports what is wrong, and where
     return result
 
 
@@ -372,7 +373,7 @@ def _put(table: dict[str, Any], path: str, value: object, where: str) -> None:
 
 
 def _absolute_files(table: dict[str, Any], path: Path) -> None:
-    """Recipes, tables and shapes are looked for beside the scene, then in each folder above it."""
+    """Recipes, tables and shapes are searched for next to the scene, then in each folder above it."""
 
     def absolute(name: str) -> str:
         return str(next((p for p in (folder / name for folder in path.parents) if is_file(p)), path.parent / name))

@@ -13,7 +13,7 @@ LONGEST = 300
 _LINE = re.compile(r"\(at line (\d+)")
 _PLACE = re.compile(r" \(at (?:line \d+, column \d+|end of document)\)$")
 _OTHER = "names with other characters than letters A to z, digits, - and _ stand in quotation marks"
-#: text in quotation marks, or a comment, both left alone; or a number and what stands after it like a unit
+#: text in quotation marks, or a comment, both left alone; or a number and what is after it like a unit
 _PARTS = re.compile(
     r"""("[^"]*"|'[^']*'|\#.*)"""
     r"""|(?<![\w.])([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)[ \t]*"""
@@ -66,7 +66,7 @@ def _said(message: str, line: str) -> tuple[str, str | None]:
     if text == "Cannot overwrite a value":
         return f"a key is given twice: {line.strip()}", "take one of the two away"
     if "key part" in text and line.strip().endswith("{"):
-        return f"{text}: {line.strip()}", "a table in { } stands on one line; longer ones have a [heading] of their own"
+        return f"{text}: {line.strip()}", "a table in { } is on one line; longer ones have a [heading] of their own"
     if "Unclosed" in text or "Expected ']'" in text:
         hint = _OTHER if _odd_name(line) else "close each bracket, with commas between entries"
         return f"{text}: {line.strip()}", hint

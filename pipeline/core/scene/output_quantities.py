@@ -33,7 +33,7 @@ OF_CONTACTS = {
 }
 #: reductions that need the quantity at all output times, and those whose value has no direction
 THROUGHOUT, MAGNITUDES = ("largest", "rms", "mean", "series"), ("largest", "rms")
-#: quantities that are looked at once in each period: a contact that happens to be open then tells nothing by its force
+#: quantities that are examined once in each period: a contact that happens to be open then says nothing by its force
 OF_SECTIONS = ("position", "orientation", "velocity", "angular_velocity")
 #: quantities with one component
 SCALARS = ("drive_force",)
@@ -83,7 +83,7 @@ def reductions(kind: str) -> dict[str, str]:
 def parse_recorded(text: str, owners: Mapping[str, Collection[str]]) -> Recorded:
     """What is called `text`; the reduction may be left out where a quantity has one only.
 
-    owners: as of `wanted.parse`.  Raises ValueError that names what could have been meant.
+    owners: as of `requested.parse`.  Raises ValueError that names what could have been meant.
     """
     head, _, last = text.rpartition(".")
     if last in KINDS:

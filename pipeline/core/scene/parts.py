@@ -72,8 +72,8 @@ class Modes(Part):
     count: number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete
     basis; 0 makes a rigid body with the recipe's mass and inertia.
     up_to: highest frequency of the normal modes that are kept, e.g. "5000 Hz".
-    compliance: least share of the static compliance between the interfaces, in each of the six directions.
-    mass: least share of the body's mass that moves with the basis, in each direction.
+    compliance: least fraction of the static compliance between the interfaces, in each of the six directions.
+    mass: least fraction of the body's mass that moves with the basis, in each direction.
     interfaces: the recipe's frames that a basis is built for; default: the recipe's own list.
     held: motions held by the reference "constrained", as "top.rz": frame and x, y, z, rx, ry or rz in its axes.
     of: the reference whose shapes "mean-axis" is based on.

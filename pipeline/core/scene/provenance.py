@@ -1,4 +1,4 @@
-"""Where values come from: what scenes and recipes say of that in `source`, told by place, or left out."""
+"""Where values come from: what scenes and recipes say of that in `source`, reported by place, or left out."""
 
 from __future__ import annotations
 

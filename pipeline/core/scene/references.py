@@ -11,7 +11,7 @@ from typing import Any
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import suggestion
 
-#: names of the frames in the mesh recipe of this path; None where that cannot be told
+#: names of the frames in the mesh recipe of this path; None where that cannot be determined
 Recipe = Callable[[str], Collection[str] | None]
 
 
@@ -39,7 +39,7 @@ def _tables(family: object) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _frames(body: Mapping[str, Any], recipe: Recipe) -> Collection[str] | None:
-    """Names of a body's frames; None where they cannot be told, which is another mistake than this module's."""
+    """Names of a body's frames; None where they cannot be determined, which is another mistake than this module's."""
     if isinstance(body.get("mesh"), str):
         return recipe(body["mesh"])
     frames = body.get("frames", {})

@@ -36,7 +36,7 @@ from flexclear.pipeline.core.scene.stops import Stop
 from flexclear.pipeline.core.units import quantity
 
 Positive = Field(gt=0.0)
-#: types of joints with one freedom: driving it tells the whole relative motion
+#: types of joints with one freedom: driving it determines the whole relative motion
 SINGLE = ("revolute", "prismatic")
 #: samples of a controller; at each of them a step ends
 MOST_SAMPLES = 1e6
@@ -75,8 +75,8 @@ class Sections(Part):
     """A motion that its laws repeat, looked at once in each period: see ``flexclear sections``.
 
     period: of the laws of drives and loads, from the run's start on; without it the run is one period.
-    phase: when in the period the motion is looked at [s].  transient: periods that are not kept, before the `periods`
-    that are.  exponent_periods: how many of these are followed by a neighbour too, which tells the rate at which
+    phase: when in the period the motion is examined [s].  transient: periods that are not kept, before the `periods`
+    that are.  exponent_periods: how many of these are followed by a neighbour too, which gives the rate at which
     motions part.  bodies: whose motion is kept; default: as of an ensemble, or all without clearance.
     periods: that are kept.
     """
@@ -90,9 +90,9 @@ class Sections(Part):
 
 
 class Request(Part):
-    """A wanted accuracy: absolute in SI, or relative to the quantity's own size.
+    """A requested accuracy: absolute in SI, or relative to the quantity's own size.
 
-    absolute: in the SI unit of the quantity.  relative: share of the largest change of the quantity.
+    absolute: in the SI unit of the quantity.  relative: fraction of the largest change of the quantity.
     """
 
     absolute: Annotated[Number, Field(gt=0.0)] | None = None
@@ -100,13 +100,13 @@ class Request(Part):
 
 
 class Accuracy(Part):
-    """Wanted accuracy of the time integration per quantity, e.g. ``platform.position = "1 um"``.
+    """Requested accuracy of the time integration per quantity, e.g. ``platform.position = "1 um"``.
 
-    The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
+    The value is an absolute one with a unit (or bare, in SI), or a fraction like ``"0.1 %"`` or
     ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities:
     `pipeline.core.scene.requested_accuracy`.
     quantities: a file writes them without this key.
-    allow_missed: what is missed is told either way, and the run kept; without this the command ends with an error.
+    allow_missed: what is missed is reported either way, and the run kept; without this the command ends with an error.
     by_need: whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step.
     """
 
@@ -126,7 +126,7 @@ class Accuracy(Part):
 
 
 class View(Part):
-    """What is looked at; no effect on the motion.
+    """What is examined; no effect on the motion.
 
     watch: quantities that comparisons, error tables and films show, as ``platform.position`` or ``A1.peak_force``;
     default: those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts.
@@ -180,7 +180,7 @@ def _requested(name: str, value: Any) -> Any:
         return {"relative": quantity(value, "number")}
     kind = KINDS.get(name.rpartition(".")[2])
     if kind is None:
-        return {"absolute": 1.0}  # the scene, which knows its parts, tells what could have been meant
+        return {"absolute": 1.0}  # the scene, which knows its parts, names what could have been meant
     problems = []
     for dimension in kind.dimensions:
         try:
@@ -198,8 +198,8 @@ class Scene(Part):
     name.  stop: ends of joint coordinates by name.  gear: coupled joint coordinates by name.  time: begin and end of
     the run.  start: how the run begins, beyond poses and velocities of bodies.  solver: integrator and tolerance.
     output: what is recorded.  ensemble: runs from nearby starts.  sections: repeated motion, looked at once in each
-    period.  accuracy: wanted accuracy by quantity.  limits: what the work may take of the machine.  view: what pictures
-    and comparisons look at.
+    period.  accuracy: requested accuracy by quantity.  limits: what the work may take of the machine.  view: what
+    pictures and comparisons look at.
     """
 
     title: str
@@ -263,7 +263,7 @@ class Scene(Part):
             if other != name:
                 raise ValueError(
                     f"body.{name}: is called as '{other}' but for capitals or accents, which names of files on Windows "
-                    "and macOS do not tell apart: give it another"
+                    "and macOS do not distinguish: give it another"
                 )
 
     @model_validator(mode="before")
@@ -333,7 +333,7 @@ class Scene(Part):
         return known_bodies - known
 
     def watched(self) -> list[Quantity]:
-        """The quantities that are looked at: those that `[view]` names, else as `wanted`."""
+        """The quantities that are examined: those that `[view]` names, else as `requested`."""
         if self.view is not None and self.view.watch is not None:
             return [parse(name, self.owners()) for name in self.view.watch]
         return self.requested()

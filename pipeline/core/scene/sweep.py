@@ -1,4 +1,4 @@
-"""A sweep: one scene, what is varied in it, and what is kept of every point. See docs/sweeps.md."""
+"""A sweep: one scene, what is varied in it, and what is recorded of every point. See docs/sweeps.md."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Parameter(Part):
 
     values: one by one.  from, to: a range, of `count` points in a grid; in samples a uniform distribution.
     spacing: of a range; `log` needs ends of one sign.  mean, deviation: of a normal distribution, in samples.
-    places: the places of the scene that all take the value; default: the parameter's name.
+    places: the paths in the scene that all take the value; default: the parameter's name.
     count: points of a range in a grid.
     """
 
@@ -119,9 +119,9 @@ class Sweep(Part):
     """Everything that a sweep file says.
 
     scene: a scene file, or the name of one below scenes/.  set: changes of the scene that hold at all points.
-    vary: parameters by name; the name is a place of the scene unless `places` says which ones.
+    vary: parameters by name; the name is a path in the scene unless `places` says which ones.
     combine: every value with every other (grid), or the first values, the second ones and so on (list).
-    keep: what is kept of each point, see `pipeline.core.scene.output_quantities`.
+    keep: what is recorded of each point, see `pipeline.core.scene.output_quantities`.
     members: starts of each point that differ by a hair (`[ensemble]` of the scene); mean and deviation are kept.
     error: run each point at a hundredth of its tolerance as well, and keep the differences.
     title: what it is, in a line.  description: more words.  sample: points spread over all parameters, instead of a
@@ -193,7 +193,7 @@ class Sweep(Part):
                 raise ValueError(f"vary.{name}: in a [sample] write from and to without count, or mean and deviation")
 
     def places(self, name: str) -> tuple[str, ...]:
-        """The places of the scene that a parameter sets."""
+        """The paths in the scene that a parameter sets."""
         return self.vary[name].places or (name,)
 
     def length(self, name: str) -> int:

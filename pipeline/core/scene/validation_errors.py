@@ -66,7 +66,7 @@ def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel
 
 
 def _nearest(there: list[tuple[str, InputError]]) -> list[InputError]:
-    """What to tell of one place: where there are alternatives, only what is wrong with those of the value's kind."""
+    """What to describe one place: where there are alternatives, only what is wrong with those of the value's kind."""
     fitting = [candidate for kind, candidate in there if kind not in OTHER_KIND]
     others = {candidate.problem: candidate for kind, candidate in there if kind in OTHER_KIND}
     if fitting or len(others) < 2:
@@ -99,7 +99,7 @@ def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputE
 
 
 def _choosing(context: dict[str, Any]) -> str:
-    """The key by which pydantic looks for the right model; chosen by several keys, a part is told by its type."""
+    """The key by which pydantic searches for the right model; chosen by several keys, a part is given by its type."""
     key = str(context.get("discriminator", "")).strip("'")
     return key if key in CHOOSING else "type"
 
@@ -114,7 +114,7 @@ def _reworded(error: Any) -> str:
 
 
 def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], list[str], list[str]]:
-    """Keys of a place as the file has them, the keys that are known beside its last one, and the types it may have.
+    """Keys of a place as the file has them, the keys that are known next to its last one, and the types it may have.
 
     pydantic puts the type by which it chose a part's model into the place; the file has no such key.
     """

@@ -23,7 +23,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 
 #: loads that are effects of the world on a mechanism, not what moves it
 OF_THE_WORLD = ("gravity", "joint-friction")
-#: kinds of effects, as they are told
+#: kinds of effects, as they are reported
 CLEARANCE, FLEXIBILITY = "clearance", "flexibility"
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -118,7 +118,7 @@ def _left(gone: Collection[Effect]) -> frozenset[str]:
 
 
 def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
-    """Place -> what stands there instead, or None for what is removed."""
+    """Place -> what is there instead, or None for what is removed."""
     changes: dict[str, Any] = {}
     places = {effect.name for effect in gone}
     for effect in gone:
@@ -153,7 +153,7 @@ def with_modes(scene: Scene, counts: Mapping[str, int]) -> Scene:
 def text(scene: Scene, planned: Scene, extends: str, comments: Iterable[str] = ()) -> str:
     """The file of a variant: it extends the scene's, and says of parts and settings only what differs.
 
-    Parts are replaced or removed; of a setting that differs the whole table stands.  comments: lines at its head.
+    Parts are replaced or removed; of a setting that differs the whole table is.  comments: lines at its head.
     """
     lines = [f"# {line}" for line in comments]
     lines += [f"extends = {json.dumps(extends)}", f"title = {json.dumps(planned.title, ensure_ascii=False)}"]

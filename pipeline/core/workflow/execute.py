@@ -16,7 +16,7 @@ from flexclear.pipeline.core.workflow.task import ARRAYS, Task, facts, in_order,
 
 @dataclass(frozen=True)
 class State:
-    """Where a task stands. record: its artifact, when it is fresh. why: else the reasons, in words."""
+    """Where a task is. record: its artifact, when it is fresh. why: else the reasons, in words."""
 
     task: Task
     record: Record | None
@@ -44,7 +44,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
     known = _facts(task, inputs, sources)
     plain = key(known)
     with store.lock(task.stage, plain, lambda: progress(None, "waiting for another process that makes the same")):
-        # whoever asked for the task has told its faults
+        # whoever requested the task has reported its faults
         record = Store(store.root).find(task.stage, _with_files(task, known, store)[1])
         if record is None:
             module, _, function = task.run.partition(":")

@@ -182,9 +182,9 @@ def sources_of(root: Path, memo: Path | None = None) -> Sources:
 def source_file(root: Path, name: str) -> Path | None:
     """The file of the module called `name` in the source tree under `root`, or None when there is none."""
     first, _, rest = name.partition(".")
-    # in a checkout whose links are not followed the packages below `flexclear` stand beside it
+    # in a checkout whose links are not followed the packages below `flexclear` are next to it
     places = [name, *([rest] if first == "flexclear" and rest else [])]
-    # hundreds of modules are looked for by every command: paths as texts take a fifth of the time
+    # hundreds of modules are searched for by every command: paths as texts take a fifth of the time
     bases = [f"{root}{os.sep}{place.replace('.', os.sep)}" for place in places]
     files = (path for base in bases for path in (f"{base}.py", f"{base}{os.sep}__init__.py"))
     return next((Path(path) for path in files if os.path.isfile(path)), None)
@@ -331,6 +331,6 @@ def _metadata(package: str) -> str | None:
         installed = distribution(DISTRIBUTIONS.get(package, package))
     except PackageNotFoundError:
         return None
-    # in a checkout that is on the path itself, the program's own stands under its older name
+    # in a checkout that is on the path itself, the program's own is under its older name
     text = installed.read_text("METADATA") or installed.read_text("PKG-INFO") or ""
     return text.partition("\n\n")[0]  # the rest describes the library

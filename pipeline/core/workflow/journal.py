@@ -2,7 +2,8 @@
 
 A task does its work in pieces, one integration each. A piece is named by all that decides it, so that a later
 attempt at the same task asks for the same pieces, in the same order; what it finds, it need not do again. Pieces lie
-beside the artifact that shall come of them, ``cache/<stage>/<key>.<piece>.part``, each with a digest that only its user
+next to the artifact that shall come of them, ``cache/<stage>/<key>.<piece>.part``, each with a digest that only its
+user
 can make, and hold numbers only: arrays and JSON, no code. They go when the artifact is there.
 """
 
@@ -22,7 +23,7 @@ from typing import Any
 from flexclear.pipeline.core.artifacts.disk import publish, read_whole
 from flexclear.pipeline.core.artifacts.seal import same, sealed
 
-#: how often unfinished work is written [s], and the share of the time that writing may take where it is slow
+#: how often unfinished work is written [s], and the fraction of the time that writing may take where it is slow
 EVERY, FRACTION = 20.0, 0.05
 #: what a file of a piece begins with is a digest of so many characters, and a line's end
 DIGEST = 64
@@ -92,7 +93,7 @@ class Journal:
         return State(arrays, notes["notes"], np.concatenate(rows), float(notes["seconds"]))
 
     def due(self, name: str = "") -> bool:
-        """Whether it is time to write; a piece of that name, whenever others were written, as threads do beside it."""
+        """Whether it is time to write; a piece of that name, whenever others were written, as threads do next to it."""
         return self.clock() - self._saved.get(name, self._written) > max(EVERY, self._took / FRACTION)
 
     def finish(self, name: str, state: State) -> None:

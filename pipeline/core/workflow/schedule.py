@@ -24,9 +24,9 @@ from flexclear.pipeline.core.workflow.task import Task, in_order
 if TYPE_CHECKING:
     from concurrent.futures import Future, ProcessPoolExecutor
 
-#: noted beside what is shown until it has been brought up to date
+#: noted next to what is shown until it has been brought up to date
 UNFINISHED = "making it again was begun and not finished"
-#: how often the progress of workers is looked at [s]
+#: how often the progress of workers is examined [s]
 TICK = 0.2
 #: workers that are asked to stop have so long for it [s]; a step of 20 000 evaluations, and writing what there is
 GRACE = 60.0
@@ -183,7 +183,7 @@ def _end_in_good_order(
 
 
 def _leave_waiting(plan: _Plan, why: str) -> None:
-    """All that is not done is left, when all is to stop; that is told once."""
+    """Abandon all unfinished tasks when the command must stop; that is reported once."""
     if plan.waiting:
         code = StoppedError(why, interrupted=why == stopping.INTERRUPTED).exit_code
         rest = Failure(plan.waiting[0], code, f"{len(plan.waiting)} of {len(plan.tasks)} tasks are left undone: {why}")
@@ -281,7 +281,7 @@ def _work(
 def attempt(
     task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources, progress: Progress
 ) -> Record | Failure:
-    """The record, or the failure with what the user is told. A mistake of this program is told with
+    """The record, or the failure with what the user sees. A mistake of this program is reported with
     its traceback, since only that helps then."""
     try:
         return execute(task, inputs, store, sources, progress)
@@ -297,8 +297,8 @@ def attempt(
 
 
 def _left(task: Task, stopped: StoppedError, store: Store) -> str:
-    """What is told of a task that was stopped: what there is of it, and that it can go on."""
-    text = f"{stopped}; run it again, and it goes on from there"
+    """Message about a task that was stopped: what there is of it, and that it can go on."""
+    text = f"{stopped}; run it again, and it continues from there"
     time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
     if time is not None:  # else it is of a part of the work, such as a member of an ensemble, and no dataset
         path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))

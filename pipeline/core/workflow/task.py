@@ -37,13 +37,13 @@ class Task:
     stage: name of the stage and of its folder in the cache.
     part: the body (or figure) it is about; empty when the stage has one artifact per scene.
     run: ``"module:function"``, called as ``run(params, inputs, progress)``; see `execute`.
-    params: all that its result may depend on, as JSON, beside `inputs` and the files that it opens.
-    context: what the function is told as well, and its result must not show: where files lie, names for messages.
+    params: all that its result may depend on, as JSON, next to `inputs` and the files that it opens.
+    context: what the function is given as well, and its result must not show: where files lie, names for messages.
     inputs: tasks whose artifact ``nc`` it is given, by name.
-    modules: modules that it reaches by a name in `params`, beside those it imports.
+    modules: modules that it reaches by a name in `params`, next to those it imports.
     folder: where its files are shown, below the results folder; empty: nowhere.
     names: file of the artifact -> name shown there; a file that is not listed keeps its name.
-    exclusive: whether nothing else may run beside it (measurements of time).
+    exclusive: whether nothing else may run next to it (measurements of time).
     """
 
     stage: str
@@ -60,7 +60,7 @@ class Task:
 
     @property
     def base(self) -> Path:
-        """What the files that it opens are told relative to."""
+        """Folder to which the paths of opened files are relative."""
         return Path(self.context.get("folder", TREE))
 
     @property
@@ -102,7 +102,7 @@ def key(task_facts: Mapping[str, str]) -> str:
 
 
 def flatten(node: Any, where: str = "") -> list[tuple[str, str]]:
-    """Dotted place -> canonical text of every leaf of a JSON tree; floats by repr.
+    """Dotted path -> canonical text of every leaf of a JSON tree; floats by repr.
 
     Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
     date or a nan that somebody wrote into a recipe) is kept as text; the stage will refuse it.

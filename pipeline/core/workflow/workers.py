@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Bell:
-    """How workers are told to stop, and why. deaf: how many have a task that cannot leave anything in good order."""
+    """How workers are asked to stop, and why. deaf: how many have a task that cannot leave anything in good order."""
 
     rung: Any
     why: Any

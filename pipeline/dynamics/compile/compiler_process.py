@@ -1,4 +1,4 @@
-"""A second process that compiles beside this one, into the same folder.
+"""A second process that compiles next to this one, into the same folder.
 
 It is no worker: it takes files that nobody is compiling, and leaves their code on disk. Whatever becomes of it, this
 process compiles what is not there, and reports what cannot be compiled.

@@ -99,7 +99,8 @@ def _digests(path: Path) -> dict[str, str]:
 
 
 def claimed(path: Path, *, wait: bool) -> AbstractContextManager[bool]:
-    """Whether this process has the lock beside a file, which ends with it; of two the second waits, or goes without."""
+    """Whether this process has the lock next to a file, which ends with it; of two the second waits, or goes
+    without."""
     return locked(path.with_suffix(".lock"), wait=wait)
 
 

@@ -53,7 +53,7 @@ def refuse_shared(folder: Path) -> None:
 
 @cache
 def processor() -> str:
-    """A name for what code is compiled for: processor, its features and what the compiler is told of them."""
+    """A name for what code is compiled for: processor, its features and the compiler's settings for them."""
     import llvmlite.binding as llvm
 
     settings = [os.environ.get(f"NUMBA_{name}", "") for name in ("CPU_NAME", "CPU_FEATURES", "OPT")]

@@ -52,7 +52,7 @@ ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
 ORDER = ("advance", "project", "retract", "observe", "evaluate", SPECIALISED)
 #: what is called first when a run has come to its end: not waited for where the second process is at it
 LATE = "observe"
-#: where the code of kernels stands, and what they number by
+#: where the code of kernels is, and what they number by
 CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.artifacts.event_kinds")
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 _PLACE, _INTEGER, _FLOAT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double

@@ -164,7 +164,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
 
 
 def _events(imports: Imports, parts: Parts, scheme: Scheme) -> str:
-    """What the stepper looks for in each step; nothing for the default, which is nothing."""
+    """What the stepper searches for in each step; nothing for the default, which is nothing."""
     touching, chosen = parts.surfaces or parts.stops, not scheme.fixed
     if touching and not scheme.located:
         return _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")

@@ -25,9 +25,9 @@ from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.run import begun, driven
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT
 
-#: drives reach the wanted pose in strides of this share of the mechanism's size, or this angle
+#: drives reach the requested pose in strides of this fraction of the mechanism's size, or this angle
 STRIDE = 0.05
-#: shortest stride, as a share of the whole way, before the pose counts as out of reach
+#: shortest stride, as a fraction of the whole way, before the pose counts as out of reach
 SHORTEST = 1e-4
 
 
@@ -160,7 +160,7 @@ def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarra
 
 
 def rows(bench: Bench, states: np.ndarray) -> np.ndarray:
-    """Rows of the record for states; contacts act as they stand."""
+    """Rows of the record for states; contacts act as they are."""
     contacts = len(bench.model.contacts)
     made = m.empty_record(len(states), contacts, bench.model.ny)
     record = m.record(made, contacts)

@@ -39,10 +39,10 @@ from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
 
-#: the motion is looked at so often
+#: the motion is examined so often
 LOOKS = 32
-#: squared singular values of the joints' rates far below this share of the largest are zero, and what is shown may be
-#: free by this: where a pose comes within some 3e-4 of a singular one there is no bound
+#: squared singular values of the joints' rates far below this fraction of the largest are zero, and what is shown may
+#: be free by this: where a pose comes within some 3e-4 of a singular one there is no bound
 RANK, FREE = 1e-13, 1e-6
 #: the force that presses a joint with clearance together is at least so many times the ideal one when it has been open
 KNOCK = 10.0
@@ -62,7 +62,7 @@ class Bounds:
 
 
 def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Bounds:
-    """Bounds for the clearances of a scene from the run of its ideal twin.
+    """Bounds for the clearances of a scene from the run of its ideal mechanism.
 
     Of `chosen` those that the pose decides are bounded.
     """
@@ -110,7 +110,7 @@ class Lever:
 
     gradient: rates of all joints' residuals, (rows, 6 (links - 1)).  normal: of the least-squares solution, factored.
     joints: of each joint, where its demands begin.  axes: wrenches of each joint's demands and driven coordinates.
-    length: by which openings are told as shares.
+    length: by which openings are reported as fractions.
     """
 
     gradient: sparse.csc_array
@@ -126,7 +126,7 @@ class Lever:
         return Adjoint(-rows.T, float(np.abs(shown - (self.gradient.T @ rows).T).max(initial=0.0)))
 
     def clearance(self, name: str, rows: np.ndarray) -> float:
-        """Largest motion of what an adjoint solution tells of, per metre that the places of a joint part."""
+        """Largest motion of what an adjoint solution describes, per metre that the places of a joint part."""
         constraint, mine = self.joints[name]
         count = 2 if constraint.edge.kind == "revolute" else 3
         first = rows[:, mine][:, :count] / self.length

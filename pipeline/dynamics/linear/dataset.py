@@ -82,7 +82,7 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
 
 
 def _motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Motion of every named frame in each vibration, and the share of every body in its kinetic energy.
+    """Motion of every named frame in each vibration, and the fraction of every body in its kinetic energy.
 
     Translations and rotations: world axes, complex, shape (n, frame, 3).
     """

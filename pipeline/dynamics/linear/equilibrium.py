@@ -28,19 +28,19 @@ from flexclear.pipeline.dynamics.run.singular import built_rows
 
 #: iterations before giving up
 MOST = 200
-#: longest step, as a share of the mechanism's size or of a radian
+#: longest step, as a fraction of the mechanism's size or of a radian
 LONGEST = 0.2
-#: balanced: unbalanced force below this share of those in balance (or of the weight), or a step too short to matter
+#: balanced: unbalanced force below this fraction of those in balance (or of the weight), or a step too short to matter
 BALANCED, SHORT = 1e-12, 1e-14
 #: what rounding may leave when iterations no longer gain
 ROUNDING = 1e-8
-#: eigenvalues of the stiffness below this share of the largest hold nothing
+#: eigenvalues of the stiffness below this fraction of the largest hold nothing
 LIMP = 1e-12
-#: a step may end with this share of the starting power turned against it
+#: a step may end with this fraction of the starting power turned against it
 OVERSHOOT = 0.5
 #: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
 STEADY = 1e-9
-#: how far the drives are moved to see whether the forces stay the same, in radians or shares of the mechanism's size
+#: how far the drives are moved to see whether the forces stay the same, in radians or fractions of the mechanism's size
 PROBE = 0.1
 
 

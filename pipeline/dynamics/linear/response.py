@@ -10,7 +10,7 @@ along. Its vibrations are the assembled mechanism's; from rest each coordinate o
 vibration about it, whose amplitude is the spectrum of the ideal motion's loads at that frequency (Duhamel's integral,
 undamped). Rates are the vibrations' own; forces of joints hold the accelerations, by the adjoint solution of the joint.
 
-The pose is held where it is, so that several of the motion are looked at. What is told is the sum of all amplitudes,
+The pose is held where it is, so that several of the motion are examined. The result is the sum of all amplitudes,
 which is at least what the vibrations do.
 
 Source: Craig and Kurdila, *Fundamentals of Structural Dynamics*, ch. 5 and 11.
@@ -35,15 +35,16 @@ from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
 
-#: poses at which the vibrations are looked at
+#: poses at which the vibrations are examined
 LOOKS = 8
 #: kinds of quantities by what of the elastic coordinates makes them
 PLACES, RATES, FORCES = ("position", "orientation"), ("velocity", "angular_velocity"), ("force",)
 TURNS = ("orientation", "angular_velocity")
-#: singular values below this share of the largest are none; squared frequencies below this share are of free motions
+#: singular values below this fraction of the largest are none; squared frequencies below this fraction are of free
+#: motions
 FOLLOWED, LIMP = 1e-9, 1e-12
-#: share of the largest force that loads of their size could have on a vibration, from which on they excite it; of loads
-#: along a rod 2e-14 are left across it
+#: fraction of the largest force that loads of their size could have on a vibration, from which on they excite it; of
+#: loads along a rod 2e-14 are left across it
 FELT = 1e-10
 
 
@@ -52,7 +53,7 @@ class Response:
     """Of all flexible bodies together. first: lowest frequency of the assembled mechanism [Hz].
 
     excited: lowest frequency of a vibration that the motion's loads excite [Hz], nan where they excite none.
-    amplification: largest share of its quasi-static value that the coordinate of this vibration reaches.
+    amplification: largest fraction of its quasi-static value that the coordinate of this vibration reaches.
     influence: of each quantity, at most [SI]; infinite where it is not known.
     """
 
@@ -105,8 +106,8 @@ class _Assembled:
     """The elastic mechanism in a pose, its small motions in motions of the links and elastic coordinates, (x, q).
 
     omega: frequencies, ascending [rad/s].  modes: (x, q) of each, M-orthonormal, shape (6 (links - 1) + n, modes).
-    free: motions without stiffness, likewise.  own: what bodies move beside their link, per q.  momenta: of all bodies,
-    as wrenches on the links, per (x, q).
+    free: motions without stiffness, likewise.  own: what bodies move next to their link, per q.  momenta: of all
+    bodies, as wrenches on the links, per (x, q).
     """
 
     model: Model
@@ -234,8 +235,8 @@ def first_excited(forces: np.ndarray, shapes: np.ndarray) -> int | None:
 
     forces: (rows, n).  shapes: (n, vibrations).  A vibration's force is a sum of n products; of one at right angles to
     all forces, as bending across the plane of a planar mechanism is, their rounding is left, and that of the loads: no
-    share of it tells anything.  By Schwarz' inequality the sum is at most the product of both lengths, so that what is
-    below `FELT` of that, over all rows, is nothing.
+    fraction of it tells anything.  By Schwarz' inequality the sum is at most the product of both lengths, so that what
+    is below `FELT` of that, over all rows, is nothing.
     """
     size = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
     most = np.abs(forces @ shapes).max(axis=0, initial=0.0)

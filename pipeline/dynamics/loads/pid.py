@@ -21,7 +21,7 @@ from flexclear.pipeline.dynamics.loads.fields import act, law, law_rate, measure
 from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.vectors import scale
 
-#: stands for a limit that is not there
+#: represents a limit that is not there
 UNLIMITED = 1e300
 #: what gains multiply: (whether the force is a torque, whether the measured coordinate is an angle) -> dimensions of
 #: proportional, integral and derivative gain

@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.placing import assemblies, chosen
 from flexclear.pipeline.dynamics.model.start_table import Given, given_coordinates
 
-#: joints that miss each other by less than this share of the mechanism's size are meant to fit
+#: joints that miss each other by less than this fraction of the mechanism's size are meant to fit
 SLIGHT = 1e-4
 
 
@@ -176,7 +176,7 @@ def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Plac
     slight = misfit(mechanism, joints, poses).worst < SLIGHT
     return InputError(
         f"[joint.{worst}.between]",
-        f"the mechanism cannot be assembled near the poses given; residuals there (m, or sines of angles): {listed}"
+        f"the mechanism cannot be assembled close to the poses given; residuals there (m, or sines of angles): {listed}"
         + ("; several joints ask for nearly, but not exactly, the same" if slight else ""),
         "write lengths, frames and poses with more digits, or replace a joint by one that leaves more motion"
         if slight

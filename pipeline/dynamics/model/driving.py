@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A prescribed coordinate: its name in records, its law, what the law's values measure, where it stands."""
+    """A prescribed coordinate: its name in records, its law, what the law's values measure, where it is."""
 
     name: str
     law: Any

@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics.model.start_table import given_coordinates, giv
 
 @dataclass(frozen=True)
 class Rate:
-    """A rate that is given: `wanted` [m/s or rad/s], where the scene says so, and what counts as much.
+    """A rate that is given: `requested` [m/s or rad/s], where the scene says so, and what counts as much.
 
     speed, sign: of which free coordinate it is the speed, times the sign; of a joint that closes a loop none.
     sites: of the two frames of such a joint, `coordinate` which of its motions.

@@ -1,4 +1,4 @@
-"""What a scene says of its start, against what its drives and joints make of it: refused, or mended and told."""
+"""What a scene says of its start, against what its drives and joints make of it: refused, or mended and reported."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
 from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
-#: a start further from its drive's law than this, as share of the mechanism's size or in rad, is a contradiction
+#: a start further from its drive's law than this, as fraction of the mechanism's size or in rad, is a contradiction
 FAR, FAR_ANGLE = 0.05, 0.1
-#: what is moved by less than this, as share of the mechanism's size or in rad, was given as well as it was written
+#: what is moved by less than this, as fraction of the mechanism's size or in rad, was given as well as it was written
 WRITTEN = 1e-6
-#: most bodies of which a mend is told one by one
+#: most bodies of which a mend is reported one by one
 MOST = 8
 
 
@@ -133,7 +133,7 @@ def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str,
 def refuse_far(mechanism: Mechanism, far: Sequence[Miss]) -> None:
     """InputError for poses given that contradict a joint's drive by more than a mend may move them.
 
-    What a path leads is put where the path begins, however far that is, and told: the path says where the body is.
+    What a path leads is put where the path begins, however far that is, and reported: the path says where the body is.
     """
     for miss in far:
         if miss.of_path:

@@ -25,15 +25,15 @@ from flexclear.pipeline.dynamics.model.model import Model
 #: open, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
-#: misses below this share of the speeds asked for are rounding
+#: misses below this fraction of the speeds asked for are rounding
 RIGID = 1e-9
-#: given velocities that are missed by less than this share of the speeds were given as well as they were written
+#: given velocities that are missed by less than this fraction of the speeds were given as well as they were written
 WRITTEN = 1e-6
-#: given velocities that are missed by more than this share of the largest one are a mistake, not a rough start
+#: given velocities that are missed by more than this fraction of the largest one are a mistake, not a rough start
 WRONG = 0.05
-#: combinations of speeds that change rates by less than this share of the largest change nothing: redundant closures
+#: combinations of speeds that change rates by less than this fraction of the largest change nothing: redundant closures
 REDUNDANT = 1e-9
-#: a spring shorter than this share of the mechanism's size has no direction
+#: a spring shorter than this fraction of the mechanism's size has no direction
 SHORTEST = 1e-9
 
 
@@ -63,7 +63,7 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
 class Velocities:
     """Linear equations matrix @ speeds = target of the speeds at the start, all in natural units; (rows, nv), (rows,).
 
-    asked: velocities that the target stands for, before those of the drives are taken off, (rows,).
+    asked: velocities that the target represents, before those of the drives are taken off, (rows,).
     given: places of the velocities that the first `n_given` rows set; the other rows keep the loops closed.
     fastest: size of all these velocities, those of a slow motion at least.
     """

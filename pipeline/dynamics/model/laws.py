@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, covers, jump, pieces_of
 from flexclear.pipeline.dynamics.model.driving import prescribed
 
-#: no laws in the place of the scene's
+#: no laws instead of the scene's
 NONE: Mapping[str, Pieces] = MappingProxyType({})
 
 

@@ -33,7 +33,7 @@ from flexclear.pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, sp
 if TYPE_CHECKING:
     import xarray as xr
 
-#: share of the largest radius of gyration below which the distances of a scene are no size of it
+#: fraction of the largest radius of gyration below which the distances of a scene are no size of it
 NOTHING = 1e-9
 
 
@@ -135,12 +135,12 @@ class Link:
 
     @property
     def massless(self) -> bool:
-        """Whether it only stands between two freedoms of a joint, or is the ground."""
+        """Whether it only connects two freedoms of a joint, or is the ground."""
         return self.inertia is None and self.bundle is None
 
     @property
     def on_path(self) -> bool:
-        """Whether a prescribed pose in the world takes the place of its joint."""
+        """Whether a prescribed pose in the world replaces its joint."""
         return self.branch.edge is not None and self.branch.edge.kind == PATH
 
 
@@ -148,7 +148,8 @@ class Link:
 class Mechanism:
     """Links in tree order, closures and contacts of a scene; lengths in the world's axes.
 
-    origin: point of the world that the kernels use as theirs, near the mechanism.  length: size of the mechanism [m].
+    origin: point of the world that the kernels use as theirs, close to the mechanism.  length: size of the mechanism
+    [m].
     start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
     placed: frames of all links as the scene gives them, before joints and drives are made to fit.
     choice: which of several ways it was assembled in, in words; empty where there is one, or the scene chooses.
@@ -245,7 +246,7 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
 
 
 def _centre(starts: list[Placement]) -> np.ndarray:
-    """A point near the mechanism: moments about it lose no digits, wherever the scene stands."""
+    """A point close to the mechanism: moments about it lose no digits, wherever the scene is."""
     moving = [s.p for s in starts[1:]]
     return np.mean(moving, axis=0) if moving else np.zeros(3)
 

@@ -160,7 +160,7 @@ def _flexible(scene: Scene, body: str) -> bool:
 
 
 def rigid_inertia(scene: Scene, places: Mapping[str, Placement]) -> RigidInertia:
-    """Of rigid bodies that move as one, at these places in the frame in which it is wanted."""
+    """Of rigid bodies that move as one, at these places in the frame in which it is requested."""
     mass, first = 0.0, np.zeros(3)
     parts = []
     for name, here in places.items():

@@ -24,18 +24,19 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, row_unit, sites, unit_wrench
 
-#: displacements, in radians and shares of the mechanism's size, of the poses nearby; how many are looked for, and
-#: how many are enough; share of the displacement that such a pose must keep when its loops are closed
+#: displacements, in radians and fractions of the mechanism's size, of the poses nearby; how many are searched for, and
+#: how many are enough; fraction of the displacement that such a pose must keep when its loops are closed
 NEARBY, TRIES, ENOUGH, LEFT = (0.03, 0.01), 24, 2, 0.1
-#: share of a self-stress that a joint must carry for its reaction to count as undetermined
+#: fraction of a self-stress that a joint must carry for its reaction to count as undetermined
 CARRIES = 1e-6
-#: condition numbers are not told apart from infinity above this
+#: condition numbers are not distinguished from infinity above this
 INFINITE = 1e15
 #: rows of a locked mechanism that are smaller than this may be no more than misaligned joints
 SLIGHT = 1e-3
-#: a motion has no mass when it has this share of what it would have if every body resisted turning about all axes alike
+#: a motion has no mass when it has this fraction of what it would have if every body resisted turning about all axes
+#: alike
 WEIGHTLESS = 1e-14
-#: share of the largest by which a link takes part in such a motion
+#: fraction of the largest by which a link takes part in such a motion
 TAKES_PART = 1e-3
 
 
@@ -103,7 +104,7 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
     """Poses nearby in which the closures have a higher rank than at the start, if there are any.
 
     Of a redundant mechanism all poses nearby have the rank of the start.  From a singular pose a random way need not
-    lead onto a branch of the motion: it may not close, or close back to where it began, which tells nothing.
+    lead onto a branch of the motion: it may not close, or close back to where it began, which says nothing.
     """
     if here.rank == model.nv or model.mechanism.has_paths or not model.mechanism.all_rigid:
         return None
@@ -128,7 +129,7 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
 
 
 def _distance(one: Sequence[Placement], other: Sequence[Placement], length: float) -> float:
-    """How far the farthest link has gone, in shares of the mechanism's size, or turned [rad]."""
+    """How far the farthest link has gone, in fractions of the mechanism's size, or turned [rad]."""
     ways = [np.linalg.norm(a.p - b.p) / length + np.linalg.norm(a.R - b.R) for a, b in zip(one, other, strict=True)]
     return float(max(ways))
 

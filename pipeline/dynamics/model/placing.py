@@ -20,15 +20,15 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
 
-#: guesses from which assemblies are looked for; the first has nothing at random
+#: guesses from which assemblies are searched for; the first has nothing at random
 GUESSES = 16
-#: size of random slides, as a share of the mechanism's size
+#: size of random slides, as a fraction of the mechanism's size
 SLIDE = 0.3
-#: assemblies are one if no coordinate differs by more than this, in radians or shares of the mechanism's size
+#: assemblies are one if no coordinate differs by more than this, in radians or fractions of the mechanism's size
 SAME = 1e-4
-#: a mechanism that can move, and is so near to all hints, is looked for no further
+#: a mechanism that can move, and is so near to all hints, is searched for no further
 NEAR = 0.5
-#: singular values of naturally sized rows below this share of the largest leave a motion free
+#: singular values of naturally sized rows below this fraction of the largest leave a motion free
 LOOSE = 1e-6
 
 Hints = Mapping[tuple[str, int], float]
@@ -65,7 +65,7 @@ def assemblies(
         if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME for other in distinct):
             distinct.append(made)
         if not _isolated(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < NEAR:
-            break  # a mechanism that can move is assembled where it was first looked for
+            break  # a mechanism that can move is assembled where it was first searched for
     return sorted(
         distinct,
         key=lambda one: (
@@ -153,7 +153,7 @@ def _coordinates(joints: Sequence[Constraint], poses: Sequence[Placement]) -> di
 
 
 def _distance(mechanism: Mechanism, joints: Sequence[Constraint], one: Hints, other: Hints) -> float:
-    """Largest difference of coordinates that both have, in radians or shares of the mechanism's size."""
+    """Largest difference of coordinates that both have, in radians or fractions of the mechanism's size."""
     turning = {(j.name, k): c.turning for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
     apart = [0.0]
     for key in one.keys() & other.keys():

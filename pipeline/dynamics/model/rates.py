@@ -1,4 +1,4 @@
-r"""Rates at which closures open when the tree moves, each beside the size that such a rate may have.
+r"""Rates at which closures open when the tree moves, each next to the size that such a rate may have.
 
 Which rows of the closures' Jacobian are independent is a question of size: an entry is zero when it is nothing but
 rounding. Rounding is proportional to the terms whose sum an entry is, not to the sum: a hinge's axis that
@@ -33,10 +33,10 @@ from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
 #: a turn counts as having at least this arm, in units of the mechanism's size: places are no more exact for being near
 LEAST_ARM = 1e-3
-#: singular values of naturally sized rows below this are zero.  It stands above what is left of a zero: an entry is a
+#: singular values of naturally sized rows below this are zero.  It is above what is left of a zero: an entry is a
 #: sum of some ten products whose factors, frames along a chain, are right to some ten roundings of 1e-16, in all
 #: 1e-14; poses are closed to 1e-13, at worst 1e-11, of the mechanism's size, which is 1e-8 of the least arm.  And it
-#: stands below the root of `closures.SINGULAR_PIVOT`, 3e-7, where the kernels no longer solve for a row.
+#: is below the root of `closures.SINGULAR_PIVOT`, 3e-7, where the kernels no longer solve for a row.
 ZERO = 1e-7
 #: rounds of scaling; each halves the exponents by which rows and columns differ
 ROUNDS = 12

@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism, size_of
 from flexclear.pipeline.dynamics.model.merge import rigid_inertia
 from flexclear.pipeline.dynamics.model.model import Model, filled
 
-#: least principal moment as share of the largest with which no motion of a link can be without inertia
+#: least principal moment as fraction of the largest with which no motion of a link can be without inertia
 SLENDER = 1e-6
 
 
@@ -119,7 +119,7 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
 
 
 def _held(joint: Any) -> tuple[str, tuple[str, str]]:
-    """What a clearance joint holds beside its contact."""
+    """What a clearance joint holds next to its contact."""
     return joint.type, tuple(joint.between)
 
 
@@ -148,7 +148,7 @@ def _same_start(model: Model, scene: Scene) -> bool:
     try:
         return all(_at_start(was, scene) == _at_start(new, scene) for was, new in changed)
     except ValueError:
-        return False  # a law that cannot be had, as is told when the model is made from scratch
+        return False  # a law that cannot be had, as is reported when the model is made from scratch
 
 
 def _at_start(one: Prescribed, scene: Scene) -> float:

@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics.model.arrays import envelope_size
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.wiring import closure_envelope, threes
 
-#: a row below this share of its natural length is rounding: the square root of what rounding leaves of a cancelling
+#: a row below this fraction of its natural length is rounding: the square root of what rounding leaves of a cancelling
 #: sum, 1e-13 at worst, with some digits to spare
 NOTHING = 1e-6
 
@@ -27,7 +27,7 @@ def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray
     spread: J L^-T, shape (rows, nv), a row each in the metric of the mass, M = L L^T.  scale: what a row's
     length is compared with, so that one that has shrunk to nothing is not mistaken for a good one; a row of the scale 0
     moves nothing.  QR decomposition with column pivoting (Golub & Van Loan, *Matrix Computations*, sec. 5.4.2): each
-    row kept is the one that stands out most from those before.  Of rows that are no numbers the first ones are kept,
+    row kept is the one that is out most from those before.  Of rows that are no numbers the first ones are kept,
     with the pivot 0.
     """
     from scipy.linalg import qr  # slow to import, and most mechanisms have nothing to choose
@@ -47,7 +47,7 @@ def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray
 def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndarray:
     """Length of the longest row of the same closure and kind (along, turning), per row of all; shape (rows,).
 
-    Not less than a small share of the row's natural length: rows that are nothing but rounding must stay small.
+    Not less than a small fraction of the row's natural length: rows that are nothing but rounding must stay small.
     """
     kinds, scales = model.arrays.table(m.CLOSURE_ROWS)["kind"], np.ones(len(spread))
     lengths = np.linalg.norm(spread, axis=1)

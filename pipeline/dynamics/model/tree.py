@@ -58,7 +58,7 @@ class Branch:
 
 
 def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
-    """Joints between different groups, and paths. Of a clearance joint, what it holds beside its contact."""
+    """Joints between different groups, and paths. Of a clearance joint, what it holds next to its contact."""
     driven = joint_drives(scene)
     result = []
     contacts = scene.contacts()

@@ -1,4 +1,4 @@
-"""The budget of a plan: the error that is wanted, what dropped effects have spent of it, and what was decided."""
+"""The budget of a plan: the error that is requested, what dropped effects have spent of it, and what was decided."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE
 from flexclear.pipeline.dynamics.plan.screening_runs import Pilots
 
-#: share of what is wanted that dropped effects may use up together; the rest is for what is not estimated
+#: fraction of the requested accuracy that dropped effects may use up together; the rest is for what is not estimated
 BUDGET = 0.75
-#: what flexible bodies may change of what impacts of rigid ones do to rates and forces, as a share of that
+#: what flexible bodies may change of what impacts of rigid ones do to rates and forces, as a fraction of that
 OF_IMPACTS = 0.5
-#: what an influence measured with pilots' tolerance may be wrong by, as a share of it
+#: what an influence measured with pilots' tolerance may be wrong by, as a fraction of it
 OF_PILOT = 0.15
-#: what the rest of the time may add to what a run over a part of it shows, as a share
+#: what the rest of the time may add to what a run over a part of it shows, as a fraction
 WHOLE = 1.0
 
 
@@ -41,7 +41,7 @@ class Chosen:
 
 @dataclass
 class Search:
-    """The state of the decisions. used: of the budget, by quantity, as shares of what is wanted."""
+    """The state of the decisions. used: of the budget, by quantity, as fractions of the requested accuracy."""
 
     pilots: Pilots
     requested: dict[str, float]
@@ -103,7 +103,7 @@ class Search:
 
 
 def with_doubt(search: Search, apart: Mapping[str, Influence], soft: bool, more: float = 0.0) -> dict[str, Influence]:
-    """With what pilots may be wrong by, what flexible bodies may change of the impacts, and a share `more`."""
+    """With what pilots may be wrong by, what flexible bodies may change of the impacts, and a fraction `more`."""
     kinds = {q.name: q.kind for q in search.pilots.chosen}
     doubled = {}
     for name, i in apart.items():
@@ -116,5 +116,5 @@ def too_much(most: Mapping[str, float], requested: Mapping[str, float]) -> str:
     """Why an effect is kept: what it may change most, in words."""
     name = max(requested, key=lambda n: most[n] / requested[n])
     if not np.isfinite(most[name]):
-        return f"without it {name} cannot be told, or has other events"
-    return f"without it {name} may be off by {most[name] / requested[name]:.2g} times what is wanted"
+        return f"without it {name} cannot be determined, or has other events"
+    return f"without it {name} may be off by {most[name] / requested[name]:.2g} times what is requested"

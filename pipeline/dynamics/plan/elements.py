@@ -18,7 +18,7 @@ from flexclear.pipeline.core.decisions import Mesh
 
 #: twice as many elements are compared with; errors fall with this power of their length
 TWICE, ORDER = 2, 4
-#: share of what is wanted that the mesh may err by
+#: fraction of the requested accuracy that the mesh may err by
 FRACTION = 0.1
 #: vibrations whose phase has gone wrong by more than this differ by twice their amplitude [rad]
 TURNED = 2.0
@@ -48,7 +48,7 @@ def mesh(
 
 
 def _frequencies(bundle: xr.Dataset, finer: xr.Dataset, duration: float) -> tuple[float, float]:
-    """Largest change of a frequency, as a share, and phase by which the lowest vibration is off in the end [rad]."""
+    """Largest change of a frequency, as a fraction, and phase by which the lowest vibration is off in the end [rad]."""
     one, two = (np.sort(b["frequency"].values) for b in (bundle, finer))
     there = min(len(one), len(two))
     one, two = one[:there], two[:there]
@@ -60,7 +60,7 @@ def _frequencies(bundle: xr.Dataset, finer: xr.Dataset, duration: float) -> tupl
 
 
 def _compliance(bundle: xr.Dataset, finer: xr.Dataset) -> float:
-    """Largest change of an entry of the frames' compliance, as a share of those of its two directions."""
+    """Largest change of an entry of the frames' compliance, as a fraction of those of its two directions."""
     one, two = (_matrix(b) for b in (bundle, finer))
     scale = np.sqrt(np.abs(np.outer(np.diag(two), np.diag(two))))
     least = np.finfo(float).eps * scale.max(initial=0.0)

@@ -21,14 +21,14 @@ from flexclear.pipeline.dynamics.run.ledger import CHOSEN
 
 #: where members part, fewer modes are only trusted that were seen over this part of the time
 LEAST_SEEN = 0.5
-#: what is tried: beside impacts steps are short whatever the order, so the method of order 5, at a tolerance that is
+#: what is tried: next to impacts steps are short whatever the order, so the method of order 5, at a tolerance that is
 #: looser than that of the pilots where these are tight
 QUICK, QUICK_RTOL = "dopri5", 1e-4
-#: of the largest energy error of a run, what one over a part of the time may have, as a share of that part
+#: of the largest energy error of a run, what one over a part of the time may have, as a fraction of that part
 OF_LEDGER = 0.25
 #: energy error that the planned run may have then: what it does to what is asked for has been looked at
 LEDGER = 5e-3
-#: levels of modes that leave more than this share of the variables save too little to be tried
+#: levels of modes that leave more than this fraction of the variables save too little to be tried
 WORTH = 0.85
 #: differences beyond so many budgets are not of the tolerance
 NEAR = 10.0
@@ -88,7 +88,7 @@ def _by_modes(search: Search, most: Mapping[str, float], apart: Mapping[str, Inf
 
 
 def _more(fraction: float) -> float:
-    """What the rest of the time may add, as a share."""
+    """What the rest of the time may add, as a fraction."""
     return 0.0 if fraction == 1.0 else WHOLE
 
 
@@ -128,7 +128,7 @@ def _tell(search: Search, level: int, apart: dict[str, Influence]) -> None:
         why = f"{count} of its modes do the same as all"
         if beyond:
             why = (
-                f"{' and '.join(beyond)} parts by more than is wanted when {loose or 'a contact'} starts a hair "
+                f"{' and '.join(beyond)} parts by more than requested when {loose or 'a contact'} starts a hair "
                 f"elsewhere, and with {count} of its modes it differs by no more than that"
             )
         search.decisions[decision.effect.name] = replace(decision, reason=f"{decision.reason}; {why}")

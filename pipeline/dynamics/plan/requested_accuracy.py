@@ -10,15 +10,15 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
 from flexclear.pipeline.core.scene.schema import Scene
 
-#: peaks of forces between flexible bodies are at least this share of those between rigid ones
+#: peaks of forces between flexible bodies are at least this fraction of those between rigid ones
 SOFTER = 0.5
 
 
 def requested_in(
     scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point]
 ) -> dict[str, float]:
-    """What is wanted by quantity [SI]; relative to the size that it has in the ideal mechanism, of contacts with rigid
-    bodies, half of it where bodies are flexible.
+    """What is requested by quantity [SI]; relative to the size that it has in the ideal mechanism, of contacts with
+    rigid bodies, half of it where bodies are flexible.
 
     rigid: runs the scene with clearance and rigid bodies.
     Raises InputError where a quantity never changes, or everything asked for is above what the quantities do;

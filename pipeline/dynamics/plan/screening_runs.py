@@ -27,8 +27,8 @@ MEMBERS = 3
 #: rigid pilots without contact are integrated to this tolerance; flexible ones by the method for stiff motions to the
 #: second
 RTOL, SMOOTH_RTOL, SMOOTH = 1e-7, 1e-5, "radau"
-#: tolerance of pilots with contacts: this share of the least clearance over the mechanism's size, between two limits
-#: (errors of places are the tolerance times that size, and must stay small beside the clearance)
+#: tolerance of pilots with contacts: this fraction of the least clearance over the mechanism's size, between two limits
+#: (errors of places are the tolerance times that size, and must stay small next to the clearance)
 OF_CLEARANCE, TIGHTEST, LOOSEST = 0.05, 1e-7, 1e-5
 #: evaluations times variables that pilots of one variant with contacts may take, all members together: measured, some
 #: 0.2 s on one core.  What takes longer is run over a part of the time, at least so much of it
@@ -61,7 +61,7 @@ class Pilots:
     """Variants of a scene that have been run.
 
     bundles: reduced flexible bodies.  fewer: the same of fewer modes, where there are such, levels with the fewest
-    first.  filled: fills in what recipes tell of rigid bodies.  points: by what was run.  evaluations: of all.
+    first.  filled: fills in what recipes describe rigid bodies.  points: by what was run.  evaluations: of all.
     work: these times the variables of each.  refused_loose: whether the loose tolerance was refused.
     """
 
@@ -122,7 +122,7 @@ class Pilots:
         members: int = MEMBERS,
         **solver: object,
     ) -> Point:
-        """What is watched of a variant over a share of its time; a refusal of the solver is in the point.
+        """What is watched of a variant over a fraction of its time; a refusal of the solver is in the point.
 
         level: with so few modes of those bodies that have a choice; None: with all.  members: starts, where there are
             contacts.
@@ -168,7 +168,7 @@ class Pilots:
             self.refused_loose = True
             point = self.point(gone, fraction=fraction, members=members, rtol=RTOL)
         if point.refused and TAKES_LONG not in point.refused:
-            raise SolverError(f"{self.scene.name}: the scene cannot be run as it stands: {point.refused}")
+            raise SolverError(f"{self.scene.name}: the scene cannot be run as it is: {point.refused}")
         return point
 
     def between(self, a: Point, b: Point) -> dict[str, Influence]:

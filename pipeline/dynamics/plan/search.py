@@ -1,4 +1,4 @@
-"""The decisions of a plan: the error that is wanted is a budget, and what is dropped spends it.
+"""The decisions of a plan: the error that is requested is a budget, and what is dropped spends it.
 
 Order of the evidence: bounds and first-order responses along the ideal motion (`dynamics.linear.clearance_response`),
 which cost one run of the ideal mechanism; then runs of variants, rigid ones with clearance and flexible ones without,
@@ -34,9 +34,9 @@ from flexclear.pipeline.dynamics.run.run import Run, integrate
 #: what bounds of clearances, which hold whatever happens, may use up of the budget
 BY_BOUND = 0.9
 #: by how much the first-order response of flexible bodies counts for more: it leaves out that the pose turns meanwhile,
-#: and that loads follow the vibration; beside runs it is 0.7 to 10 times what is true
+#: and that loads follow the vibration; next to runs it is 0.7 to 10 times what is true
 OF_RESPONSE = 2.0
-#: effects that cost nothing to keep are dropped below this share of what is wanted
+#: effects that cost nothing to keep are dropped below this fraction of the requested accuracy
 FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
 #: why parts go that the motion asked for never feels
 UNCOUPLED = "nothing couples it to what is asked for"
@@ -55,8 +55,8 @@ def plan(
     bundles: reduced flexible bodies.  fewer: the same of fewer modes, of those that have a choice, levels with the
     fewest first.  meshes: numbers of elements, and the bodies as reduced from twice as many.  filled: a variant
     with the rigid bodies that recipes describe filled in.
-    Raises InputError where nothing is wanted, or the motion itself is below it; SolverError where the scene, or what is
-    left of it, cannot be run.
+    Raises InputError where nothing is requested, or the motion itself is below it; SolverError where the scene, or what
+    is left of it, cannot be run.
     """
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
@@ -229,7 +229,7 @@ def _vibrating(estimated: Response) -> str:
 
 
 def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
-    """Clearances that go beside bodies that stay flexible: one run of all tells whether they do as was estimated.
+    """Clearances that go next to bodies that stay flexible: one run of all tells whether they do as was estimated.
 
     Bounds hold along the motion of rigid bodies, and flexible ones may go elsewhere.
     """

@@ -1,5 +1,5 @@
-"""The integrator and the tolerance of a planned run: the loosest whose error is a small share of what is wanted, and no
-dearer ones than the scene names itself."""
+"""The integrator and the tolerance of a planned run: the loosest whose error is a small fraction of the requested
+accuracy, and no dearer ones than the scene names itself."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
 from flexclear.pipeline.dynamics.plan.screening_runs import MEMBERS, RTOL, SMOOTH, SMOOTH_RTOL, Pilots
 
-#: share of what is wanted that the integration may err by
+#: fraction of the requested accuracy that the integration may err by
 FRACTION = 0.15
 #: tolerances that are tried, loosest first, down to that of the reference
 TRIED = (1e-4, 1e-5, 1e-6)
@@ -88,7 +88,7 @@ def _loosest(
     reference: float,
     level: int | None,
 ) -> Chosen:
-    """The loosest of the tolerances that is good enough beside the reference, which stands for itself."""
+    """The loosest of the tolerances that is good enough next to the reference, which represents itself."""
     there = pilots.point(gone, level=level, integrator=integrator, rtol=reference)
     error = dict.fromkeys(requested, np.nan)
     tried = [rtol for rtol in tried if rtol > reference]

@@ -99,7 +99,7 @@ def subject(scene: Scene) -> str:
 
 
 def references(scene: Scene) -> str:
-    """Publications of the methods that the scene's parts stand for, one a line."""
+    """Publications of the methods that the scene's parts represent, one a line."""
     sources = list[str]()
     for name in sorted({part.module for part in named(scene)}):
         module = import_module(name)
@@ -112,7 +112,7 @@ def references(scene: Scene) -> str:
 def attributes(scene: Scene) -> dict[str, str]:
     """What the run was made from: parameters, references, versions; no times, no file names.
 
-    Where values come from stands in what is derived from the run: a sentence about a value runs nothing again.
+    Where values come from is in what is derived from the run: a sentence about a value runs nothing again.
     """
     parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
     for body in scene.flexible():

@@ -124,7 +124,7 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
 
 
 def _contact_statistics(engine: Engine, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Largest force [N], impacts, and share of the time in contact, per contact."""
+    """Largest force [N], impacts, and fraction of the time in contact, per contact."""
     closings = trajectory.events[trajectory.events["kind"] == CLOSING]
     peak, count, fraction = [], [], []
     for c in range(trajectory.contacts):

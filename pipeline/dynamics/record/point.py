@@ -38,7 +38,7 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
-#: where nothing is kept of the way, the ledger of energy is looked at so often
+#: where nothing is kept of the way, the ledger of energy is examined so often
 LOOKS = 50
 #: how much tighter the tolerance of the run is by which the error is estimated
 TIGHTER = 1e-2
@@ -64,10 +64,10 @@ class Runner:
     _looking: Lock = field(default_factory=Lock)
 
     def run(self, scene: Scene, lane: Place | None = None, alive: Progress = silent) -> Point:
-        """One point; what physics or the input of this point refuses is told in the point, not raised.
+        """One point; what physics or the input of this point refuses is reported in the point, not raised.
 
-        place: where its steps may be taken beside those of other points, which changes no bit of it.  alive: called now
-        and then; what it raises ends the work.
+        place: where its steps may be taken next to those of other points, which changes no bit of it.  alive: called
+        now and then; what it raises ends the work.
         """
         scene = thinned(scene, self.recorded)
         try:
@@ -145,7 +145,7 @@ def in_sections(recorded: Sequence[Recorded]) -> bool:
 def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
     """The scene with no more regular outputs than what is kept needs."""
     if in_sections(recorded):
-        # only the states between the stretches of a period are looked at
+        # only the states between the stretches of a period are examined
         return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": section_period(scene)})})
     if any(one.throughout for one in recorded):
         return scene
@@ -225,7 +225,7 @@ def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Rec
 
 
 def _regular(engine: Engine, time: np.ndarray) -> np.ndarray:
-    """Rows at the regular output times; a break that takes the place of one is the same but for rounding."""
+    """Rows at the regular output times; a break that replaces one is the same but for rounding."""
     requested = regular_times(engine.model.scene.time, engine.model.scene.output)
     after = np.clip(np.searchsorted(time, requested), 1, len(time) - 1)
     nearer = np.where(np.abs(time[after - 1] - requested) < np.abs(time[after] - requested), after - 1, after)

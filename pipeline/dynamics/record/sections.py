@@ -48,7 +48,7 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
                 "use a continuous 'pid' here",
             )
     period = section_period(scene)
-    # between waypoints only their states are wanted
+    # between waypoints only their states are requested
     engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
     names = kept_bodies(engine.model, requested.bodies, "[sections.bodies]")
     start = consistent_start(engine)

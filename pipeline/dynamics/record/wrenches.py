@@ -34,7 +34,7 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
     model, seen = motions.model, motions.seen
     known = _tree(model, seen) | _closures(model, seen)
     for c, contact in enumerate(model.contacts[: model.arrays.size(m.N_SURFACES)]):
-        moment, force = known.get(contact.name, (0.0, 0.0))  # what a clearance joint holds beside its contact
+        moment, force = known.get(contact.name, (0.0, 0.0))  # what a clearance joint holds next to its contact
         push = seen.touch["force"][:, c]
         known[contact.name] = (moment + cross(seen.touch["point"][:, c], push), force + push)
     if any(name not in known for name in names):

@@ -30,26 +30,26 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.method_selection import Suit
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
-#: the estimate compares with a run at this share of the tolerance
+#: the estimate compares with a run at this fraction of the tolerance
 FINER = 1e-2
 #: tolerances that are tried lie between these; below, rounding decides
 TIGHTEST, LOOSEST = 1e-14, 1e-2
-#: a run is accepted when its error is between these shares of what is wanted: enough, and not wasteful
+#: a run is accepted when its error is between these fractions of the requested accuracy: enough, and not wasteful
 ENOUGH, WASTEFUL = 1.0, 1.0 / 3.0
 #: what the next try aims at, between the two
 AIM = 0.6
 TRIES = 12
 #: of the evaluations of a run that is accurate enough, what a looser tolerance must be foreseen to save
 SAVED = 0.25
-#: a run that is refused at a looser tolerance than this is tried again at a share of it
+#: a run that is refused at a looser tolerance than this is tried again at a fraction of it
 REFUSED_FOR_GOOD, TIGHTER = 1e-9, 0.1
-#: an error that does not fall below this share when the tolerance falls by FINER has another cause than the steps
+#: an error that does not fall below this fraction when the tolerance falls by FINER has another cause than the steps
 STUCK = 0.3
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """A run at one tolerance: estimated errors by quantity, and the largest as a share of what is wanted."""
+    """A run at one tolerance: estimated errors by quantity, and the largest as a fraction of the requested accuracy."""
 
     rtol: float
     run: xr.Dataset
@@ -59,7 +59,7 @@ class Attempt:
 
 @dataclass
 class Search:
-    """Runs made so far by tolerance, and what is wanted of them."""
+    """Runs made so far by tolerance, and what is requested of them."""
 
     scene: Scene
     once: Callable[[Scene, Judges | None], xr.Dataset]
@@ -95,7 +95,7 @@ class Search:
     def cheapest(self, attempt: Attempt) -> Attempt:
         """The attempt, or the run that told its error, where another method made that for less.
 
-        How far the two are apart is the error of either at most, unless both err alike; runs that are tighter than both
+        How much the two differ is the error of either at most, unless both err alike; runs that are tighter than both
         are asked as well.
         """
         finer = attempt.rtol * FINER
@@ -125,7 +125,7 @@ class Search:
         return (rtol / looser) ** max(growth, 0.0) < 1.0 - SAVED
 
     def requested(self, run: xr.Dataset) -> dict[Quantity, float]:
-        """Wanted accuracy in SI by quantity; relative ones by the size that the quantity has in `run`."""
+        """Requested accuracy in SI by quantity; relative ones by the size that the quantity has in `run`."""
         accuracy = self.scene.accuracy
         assert accuracy is not None
         requested = {}
@@ -150,7 +150,8 @@ def deliver(
     """The cheapest run found whose estimated errors are what the scene wants; or the best, and a word on it.
 
     once: makes the run of a scene, under judges of its integrators.  suit: by what its integrator is chosen; None where
-    the scene names one.  The dataset's attributes say what was wanted, estimated and met, and why by which integrator.
+    the scene names one.  The dataset's attributes say what was requested, estimated and met, and why by which
+    integrator.
     """
     search = Search(scene, once, suit)
     best = search.cheapest(_search(search, progress))
@@ -186,7 +187,7 @@ def _search(search: Search, progress: Progress) -> Attempt:
             too_loose = min(too_loose, rtol)
             rtol = _next(rtol, 1.0 / TIGHTER, enough, too_loose)
             continue
-        progress(None, f"tolerance {rtol:.1e}: error {now.fraction:.2g} of what is wanted")
+        progress(None, f"tolerance {rtol:.1e}: error {now.fraction:.2g} of the requested accuracy")
         if nearest is None or now.fraction < nearest.fraction:
             nearest = now
         if now.fraction <= ENOUGH:
@@ -223,7 +224,9 @@ def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float
 def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:
     """By how much, and why no tolerance helps."""
     name = max(requested, key=lambda n: best.errors[n] / requested[n])
-    text = f"{name} is good to {best.errors[name]:.2g}, {best.errors[name] / requested[name]:.2g} times what is wanted"
+    text = (
+        f"{name} is good to {best.errors[name]:.2g}, {best.errors[name] / requested[name]:.2g} times what is requested"
+    )
     looser = min((r for r in search.runs if r > best.rtol), default=None)
     if looser is None:
         return text

@@ -1,9 +1,9 @@
 """Engines that take their steps side by side in one thread, so that their evaluations are made at once.
 
-Each engine's own thread asks for steps as ever (`run.trajectory`), and is told when its stepper has come back: paused,
-at the end of a segment, or with an error. Meanwhile the crew's thread lets up to `lanes` steppers run, each on a stack
-of its own (`compile.stacks`), and evaluates for all of them together (`compile.lanes`). What a stepper does depends on
-nothing but its own engine, so neither the number of crews nor who else is in one changes a bit of it.
+Each engine's own thread asks for steps as ever (`run.trajectory`), and is notified when its stepper has come back:
+paused, at the end of a segment, or with an error. Meanwhile the crew's thread lets up to `lanes` steppers run, each on
+a stack of its own (`compile.stacks`), and evaluates for all of them together (`compile.lanes`). What a stepper does
+depends on nothing but its own engine, so neither the number of crews nor who else is in one changes a bit of it.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class Crew:
         busy: list[_Steps | None] = [None] * self.lanes
         try:
             self._let_run(busy)
-        except BaseException as error:  # for instance no memory: whoever waits is told, instead of waiting for ever
+        except BaseException as error:  # for instance no memory: whoever waits is notified, instead of waiting for ever
             with self._news:
                 self._failed = error
                 for steps in [*self._waiting, *filter(None, busy)]:
@@ -106,7 +106,7 @@ class Crew:
                     steps.back.set()
 
     def _take(self, busy: list[_Steps | None]) -> bool:
-        """Give the steps that are waited for to free lanes, waiting for some where all are free; False: no more."""
+        """Give the steps that are awaited to free lanes, waiting for some where all are free; False: no more."""
         with self._news:
             while not self._waiting and not any(busy):
                 if self._closed:
@@ -157,7 +157,7 @@ class Crews:
 
 @dataclass(frozen=True)
 class Place:
-    """Where an engine may step beside others: of those in a thread the crew that evaluates as it does."""
+    """Where an engine may step together with others: of those in a thread the crew that evaluates as it does."""
 
     crews: Crews
     thread: int

@@ -19,13 +19,13 @@ from flexclear.pipeline.dynamics.run.collocation import Sampler
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.start import start_motions
 
-#: way off, in units of the coordinates, and singular values below this share of the largest, which are zero
+#: way off, in units of the coordinates, and singular values below this fraction of the largest, which are zero
 WAY, ZERO = 1e-2, 1e-6
-#: directions in which nothing of second order is said, to this share, are not those of a branch
+#: directions in which nothing of second order is said, to this fraction, are not those of a branch
 SILENT = 1e-3
-#: most directions among which branches are looked for, starts of the search for each, its steps, and what is the same
+#: most directions among which branches are searched for, starts of the search for each, its steps, and what is the same
 MOST, STARTS, STEPS, SAME = 6, 60, 40, 1e-3
-#: share of the time since the start over which a rate is taken
+#: fraction of the time since the start over which a rate is taken
 A_LITTLE = 1e-4
 #: halvings of the time in which the drives go the way
 HALVINGS = 60

@@ -1,6 +1,6 @@
 """The motion over a singular pose, or out of one: a polynomial with the slopes of the equations at closed states.
 
-In the pose the equations have no unique solution, and beside it what a method errs is blown up, so that no method's
+In the pose the equations have no unique solution, and next to it what a method errs is blown up, so that no method's
 stages can be there. The motion itself is smooth, on its branch. So it is a polynomial through a state at which all is
 well, with the slopes of the equations at points each of which is closed first (collocation, by Picard's iteration);
 points too near to the pose are left out. What is closed on both sides and smooth between them is the motion that keeps
@@ -26,24 +26,24 @@ from flexclear.pipeline.dynamics.run.observation import observe_with
 #: points of the polynomial; the end is one of them, the start is not
 POINTS = m.COLLOCATION_ROWS - 1
 NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, POINTS + 1) / POINTS))
-#: points where a closure row has less than this share of the independence that it has at the best one are left out; or
-#: less than the second where the first would leave out more than MANY: a slow motion is long near the pose
+#: points where a closure row has less than this fraction of the independence that it has at the best one are left out;
+#: or less than the second where the first would leave out more than MANY: a slow motion is long close to the pose
 LEAST, SLOW_LEAST, MANY = 0.05, 0.005, 2
 #: so many must be left
 FEWEST = 6
 #: out of a singular pose slopes of so many points lead on; so often the speeds there are made those of the branch
 LED, TURNS = 2, 4
-#: iterations, each of which leaves a share of the error; below ROUNDING they end, below NOISE when they do not help
+#: iterations, each of which leaves a fraction of the error; below ROUNDING they end, below NOISE when they do not help
 ROUNDS, HELPS, ROUNDING, NOISE = 40, 0.3, 1e-13, 1e-10
 #: iterations are given up when one is so much worse than the last, and, after so many, when what the points leave
 #: unresolved does not fall
 WORSE, EARLY = 10.0, 6
-#: what the polynomial may be off, in units of the coordinates and in shares of the mechanism's size; and how much its
-#: end may change without one of the points, which is at least ten times what it is off
+#: what the polynomial may be off, in units of the coordinates and in fractions of the mechanism's size; and how much
+#: its end may change without one of the points, which is at least ten times what it is off
 EXACT, SENSITIVE = 1e-10, 1e-9
-#: all of that may be so much more out of a pose in which the motion begins at rest: it is long near the pose then
+#: all of that may be so much more out of a pose in which the motion begins at rest: it is long close to the pose then
 SLOWLY = 100.0
-#: and where the polynomial is so short that a row has less than this share left at its ends, by the square of that
+#: and where the polynomial is so short that a row has less than this fraction left at its ends, by the square of that
 NEAR = 0.03
 
 
@@ -74,7 +74,7 @@ class Collocation:
 class Lead:
     """What leads out of a singular pose. state: by time [s], roughly.
 
-    turn: by what share of the fastest the speeds at the start may become those of the branch; 0 leaves them alone.
+    turn: by what fraction of the fastest the speeds at the start may become those of the branch; 0 leaves them alone.
     """
 
     state: Callable[[float], np.ndarray]
@@ -281,7 +281,7 @@ def _sensitivity(nodes: np.ndarray, slopes: np.ndarray, span: float, size: np.nd
 
 
 def _open(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> float:
-    """Largest violation of a closure between the points, in shares of the mechanism's size or as sines."""
+    """Largest violation of a closure between the points, in fractions of the mechanism's size or as sines."""
     model = sampler.engine.model
     along = model.arrays.table(m.CLOSURE_ROWS, sampler.engine.h)["kind"] == 0
     scale, worst = np.where(along, model.length, 1.0), 0.0

@@ -26,7 +26,7 @@ from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.batched_evaluation import Crew, Place
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 
-#: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
+#: two breaks nearer than this fraction of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12
 
 
@@ -34,9 +34,9 @@ SHORTEST_SEGMENT = 1e-12
 class Straight:
     """Code for one wiring (`run.specialised`), shared by the engines of one work space.
 
-    wanted: whether all integrations shall use it.  used: whether the present one does.
+    requested: whether all integrations shall use it.  used: whether the present one does.
     exact: whether it is to give the same bits for one state as for several at once.
-    place: where it may step beside others; by default each engine takes its own steps.
+    place: where it may step together with others; by default each engine takes its own steps.
     crew: who takes the steps there, for the closure rows that it is for.
     addresses: where it is, by the closure rows that it solves for; 0: nowhere.
     rows: those for which the present integration uses it.  They are its own, since what other integrations of this

@@ -179,7 +179,7 @@ class Pair:
         return lasting(self.times[: len(separation)], separation > SEPARATED, LASTING * self._span)
 
     def _judged(self, k: int) -> float:
-        """Time [s] up to which a separation that begins at comparison k is looked at."""
+        """Time [s] up to which a separation that begins at comparison k is examined."""
         return min(float(self.times[k]) + LASTING * self._span, float(self.times[-1]))
 
     @property

@@ -43,7 +43,7 @@ from flexclear.pipeline.dynamics.run.observation import observe
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
-#: singular values below this share of the largest are zero
+#: singular values below this fraction of the largest are zero
 RANK = 1e-8
 
 

@@ -72,7 +72,7 @@ def series(model: Model, seen: Observed) -> Variables:
 
 
 def usual(solver: Solver) -> float:
-    """Energy error, as a share of what is turned over, beyond which a run is refused when the scene does not say."""
+    """Energy error, as a fraction of what is turned over, beyond which a run is refused when the scene does not say."""
     if solver.step is not None:
         return FIXED
     if INTEGRATORS[solver.integrator].dissipative:

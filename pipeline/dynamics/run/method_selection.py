@@ -33,8 +33,8 @@ from flexclear.pipeline.dynamics.run.start import consistent_start
 STAGES, REACH = 12.0, 5.0
 #: an evaluation with the algebra that its method needs, in evaluations of the default method
 DEARER = {DEFAULT: 1.0, VIBRATING: 1.4, STIFF: 2.0}
-#: of a scene with contacts, evaluations of the default method where the modes limit it, as a share of what it needs to
-#: be stable: it begins again at each contact, and steps more strictly there (measured: 1.45 and more)
+#: of a scene with contacts, evaluations of the default method where the modes limit it, as a fraction of what it needs
+#: to be stable: it begins again at each contact, and steps more strictly there (measured: 1.45 and more)
 TOUCHING = 1.5
 #: least and largest power of the tolerance with which evaluations grow, as two runs tell
 LEAST_POWER, LARGEST_POWER = 0.02, 0.4
@@ -48,12 +48,12 @@ UNKNOWN, AT = 20_000.0, 1e-4
 #: how many times dearer than another one a method must be to be given up, as pace and foresight are rough; and where it
 #: is only tried
 CLEARLY, TRIED = 3.0, 1.5
-#: where a method has used this share of what the other one is foreseen to take, it must be twice as many times dearer,
-#: earlier still more: starts may be hasty
+#: where a method has used this fraction of what the other one is foreseen to take, it must be twice as many times
+#: dearer, earlier still more: starts may be hasty
 EARLY = 0.1
-#: what a method takes for the rest of a motion tells of it where that is more than half
+#: what a method takes for the rest of a motion characterises it where that is more than half
 ENOUGH = 0.5
-#: evaluations between two looks, as a share of those foreseen, and at least
+#: evaluations between two looks, as a fraction of those foreseen, and at least
 LOOK, LEAST_LOOK = 0.02, 200
 #: an integrator that is too dear at a tolerance is taken again at one that is so many times looser
 AGAIN = 10.0
@@ -75,7 +75,7 @@ class Suit:
 
     span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  missed: by integrator, the
     loosest tolerance at which a run with it has been handed on.  told: by integrator, what the present run was foreseen
-    to take when it was handed on from it.  left: evaluations and share of the motion when that happened last.
+    to take when it was handed on from it.  left: evaluations and fraction of the motion when that happened last.
     touching: whether there are contacts.
     """
 
@@ -184,7 +184,7 @@ class Suit:
         if VIBRATING in self.missed:
             return f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed on"
         if not self.rates.all:
-            return f"{DEFAULT}: it is tried first, as nothing at the start tells of a fast rate"
+            return f"{DEFAULT}: it is tried first, as nothing at the start shows a fast rate"
         return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, takes no more than {most}"
 
     def judges(self, rtol: float) -> Judges:

@@ -16,13 +16,13 @@ from flexclear.pipeline.dynamics.run.engine import Engine
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.collocation import Collocation
 
-#: no row is projected to less than this share of the mechanism's size
+#: no row is projected to less than this fraction of the mechanism's size
 ROUNDING = 1e-14
 #: pivot ratios of the closures at which the equations hold eight digits of accelerations where loops are closed to
 #: 1e-14, and six, with which a row must do in whose own pose they hold nothing
 CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
-#: first distance in time from a singular pose, as share of the polynomial over it, its factor from try to try, and how
-#: many tries there are
+#: first distance in time from a singular pose, as fraction of the polynomial over it, its factor from try to try, and
+#: how many tries there are
 NEAREST, WIDER, TRIES = 1e-4, 2.0, 11
 #: where it is looked, in units of the distance, and the weights there of the limit between: exact for quintics
 SIDES, WEIGHTS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([1.0, -6.0, 15.0, 15.0, -6.0, 1.0]) / 20.0
@@ -52,7 +52,7 @@ def frames(engine: Engine, rows: np.ndarray) -> Frames:
 
 
 def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, fraction: float) -> Blocks:
-    """The same with given pieces of the laws, (rows, laws), projected to a share of the mechanism's size."""
+    """The same with given pieces of the laws, (rows, laws), projected to a fraction of the mechanism's size."""
     whole, blocks = observation.room(len(rows), engine.model.arrays.size)
     _observe(engine, rows, pieces, fraction * engine.model.length, whole)
     return blocks

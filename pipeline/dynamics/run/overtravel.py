@@ -18,12 +18,12 @@ from flexclear.pipeline.dynamics.contact.validity import SHALLOW
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.start import project, rates_at_speeds
 
-#: times ahead at which the least depth is looked for
+#: times ahead at which the least depth is searched for
 AHEAD = 60
-#: steps of a search; longest one, as share of the mechanism's size or in rad; how often one is halved
+#: steps of a search; longest one, as fraction of the mechanism's size or in rad; how often one is halved
 STEPS, LONGEST, HALVINGS = 60, 0.1, 12
-#: a depth is the least when a step would take off less than this share of it; share of what its slope promises that a
-#: step must take off (Armijo)
+#: a depth is the least when a step would take off less than this fraction of it; fraction of what its slope promises
+#: that a step must take off (Armijo)
 LEAST, ENOUGH = 1e-3, 1e-4
 
 

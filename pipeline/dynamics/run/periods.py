@@ -32,9 +32,9 @@ from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, inte
 WAYPOINTS = 16
 #: the neighbour's distance in units of the relative tolerance: what steps differ by is then a thousandth of it
 SEPARATION = 1e3
-#: a neighbour that went this many times as far between two waypoints was beyond what is linear; that is told
+#: a neighbour that went this many times as far between two waypoints was beyond what is linear; that is reported
 FAR = 1e4
-#: laws repeat when they end a period as they began it, but for this share
+#: laws repeat when they end a period as they began it, but for this fraction
 SAME = 1e-6
 
 
@@ -55,7 +55,7 @@ class Moment:
 
 @dataclass(frozen=True)
 class Cursor:
-    """Where a motion stands between two periods: number of the next one, the motion itself, and its neighbour."""
+    """Where a motion is between two periods: number of the next one, the motion itself, and its neighbour."""
 
     number: int = 0
     here: Moment | None = None

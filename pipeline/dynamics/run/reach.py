@@ -11,10 +11,10 @@ from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.engine import Engine
 
-#: least singular value of the closures, as share of the largest, above which a pose is not yet at the end of reach; and
-#: above which it is not singular
+#: least singular value of the closures, as fraction of the largest, above which a pose is not yet at the end of reach;
+#: and above which it is not singular
 NEAR, SINGULAR = 0.1, 1e-3
-#: a rest: share of a row in what depends, and speeds as share of the largest before
+#: a rest: fraction of a row in what depends, and speeds as fraction of the largest before
 FRACTION, DYING = 0.1, 0.1
 #: at the end of reach speeds grow beyond bounds: so much faster than the drives' a loop does not move elsewhere
 FASTER = 40.0
@@ -119,7 +119,7 @@ def _too_fast(engine: Engine, t: float, where: str) -> str:
         return ""
     return (
         f"at t = {t:.6g} s: the mechanism passes a singular pose ({where}), where it can go on in several ways, and "
-        f"{' and '.join(causes)} is too fast there for its branch to be told: {', or '.join(remedies)}"
+        f"{' and '.join(causes)} is too fast there for its branch to be reported: {', or '.join(remedies)}"
     )
 
 

@@ -10,7 +10,7 @@ from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 from flexclear.pipeline.dynamics.run.reach import beyond_reach, end_in_pose
 
-#: above this share of steps that stability limits, stiffness is named as the cause of a long run
+#: above this fraction of steps that stability limits, stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
 #: why the stepper stops where loops are pulled further than they reach
 LOOPS = (m.STEP_TOO_SMALL, m.NO_START, m.NO_CONVERGENCE, m.AT_SINGULAR, m.LOST_CLOSURE)

@@ -65,7 +65,7 @@ class Run:
 
 
 def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Engine:
-    """The compiled engine of a scene where its run begins; paths are not looked for."""
+    """The compiled engine of a scene where its run begins; paths are not searched for."""
     return prepare(tabulate(build(begun(scene, bundles, progress)[0], bundles)), progress)
 
 
@@ -116,7 +116,7 @@ def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
         requested = edited(moved, {"solver.integrator": name}) if name else moved
         with making:
             model = tabulate(build(requested, bundles), given)
-            if choice:  # the poses found no longer tell of it
+            if choice:  # the poses found no longer describe it
                 model = replace(model, mechanism=replace(model.mechanism, choice=choice))
             return prepare(model, tell)
 

@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.effects import LOADS
 from flexclear.pipeline.dynamics.model.gauges import values
 from flexclear.pipeline.dynamics.run.engine import Engine
 
-#: a break is a sample when it is off by no more than this share of the period
+#: a break is a sample when it is off by no more than this fraction of the period
 NEAR = 1e-6
 
 

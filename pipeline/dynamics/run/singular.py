@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: length that makes rows and coordinates of the closures comparable in condition numbers [m]
 SCALE = 0.1
-#: a selection is looked at again when its pivot ratio has fallen to this share of what it was, and replaced when
+#: a selection is checked again when its pivot ratio has fallen to this fraction of what it was, and replaced when
 #: another is this much better; or this much, where a singular pose seems ahead that may only be one of the selection
 WORN, BETTER, CLEARLY = 1e-2, 10.0, 4.0
 
@@ -72,7 +72,8 @@ def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
 
 
 def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """Closure Jacobians (..., kept rows, nv) with lengths in units of `SCALE`: what condition numbers are told of."""
+    """Closure Jacobians (..., kept rows, nv) with lengths in units of `SCALE`: what condition numbers are reported
+    of."""
     along = built_rows(model, h) == 0
     return J * np.outer(np.where(along, 1.0 / SCALE, 1.0), coordinate_scales(model.numbering))
 
@@ -119,7 +120,7 @@ def diagnosis(engine: Engine) -> str:
 
 
 def worst_joint(engine: Engine, left: np.ndarray) -> str:
-    """Joint with the largest share of a left singular vector."""
+    """Joint with the largest fraction of a left singular vector."""
     return selection.joints_of_rows(engine.model, engine.h)[int(np.argmax(np.abs(left)))]
 
 

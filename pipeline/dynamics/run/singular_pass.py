@@ -16,26 +16,26 @@ from flexclear.pipeline.dynamics.run.collocation import Collocation, Lead, Sampl
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.reach import beyond_reach, rest
 
-#: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this share of its unit,
-#: then half of that, and so on
+#: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this fraction of its
+#: unit, then half of that, and so on
 REACH, HALVINGS = 0.3, 10
-#: share of its unit that the fastest coordinate goes back for the rate of the rows' independence
+#: fraction of its unit that the fastest coordinate goes back for the rate of the rows' independence
 A_LITTLE = 1e-4
-#: least share of a row with which a polynomial may begin: where other motions are fast it must be short
+#: least fraction of a row with which a polynomial may begin: where other motions are fast it must be short
 NEAREST = 3e-4
-#: speeds in a pose that a polynomial led to may be off by this share of the fastest
+#: speeds in a pose that a polynomial led to may be off by this fraction of the fastest
 TURN = 1e-6
-#: where no polynomial was found and a row has less than this share left, it is asked whether a loop's reach ends
+#: where no polynomial was found and a row has less than this fraction left, it is asked whether a loop's reach ends
 OBVIOUS = 0.02
-#: what is left of a segment after the polynomial, in shares of its length, that belongs to it
+#: what is left of a segment after the polynomial, in fractions of its length, that belongs to it
 REMAINDER = 1e-3
-#: looks at a polynomial for the poses that it passes; singular values below this share of the largest vanish there
+#: looks at a polynomial for the poses that it passes; singular values below this fraction of the largest vanish there
 LOOKS, VANISHED = 32, 1e-6
-#: shares of the polynomial to which a pose is found, and at which it is looked at from both sides
+#: fractions of the polynomial to which a pose is found, and at which it is examined from both sides
 NEAR, NEARLY = 1e-7, 1e-4
-#: two looks that find a pose at times which differ by less than this share of the polynomial have found the same one
+#: two looks that find a pose at times which differ by less than this fraction of the polynomial have found the same one
 SAME = 1e-6
-#: a loop whose speeds in the pose are below this share of those beside it is at rest
+#: a loop whose speeds in the pose are below this fraction of those next to it is at rest
 AT_REST = 1e-5
 
 
@@ -173,7 +173,7 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
 
 
 def _between(least: Callable[[float], float], t: float, aside: float, bracket: tuple[float, float]) -> float:
-    """Where straight lines on both sides meet at zero: in the pose itself nothing can be told."""
+    """Where straight lines on both sides meet at zero: in the pose itself nothing can be determined."""
     before, after = least(t - aside), least(t + aside)
     fraction = before / (before + after) if before + after > 0.0 else 0.5
     return float(np.clip(t - aside + 2.0 * aside * fraction, *bracket))

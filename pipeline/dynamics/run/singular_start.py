@@ -22,14 +22,14 @@ from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, label
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.observation import observe
 
-#: the way is first as long as the fastest coordinate takes for this share of its unit, then half of that, and so on
+#: the way is first as long as the fastest coordinate takes for this fraction of its unit, then half of that, and so on
 FIRST, HALVINGS = 0.3, 9
-#: velocities may differ from those of a branch by this share: they are given with some digits
+#: velocities may differ from those of a branch by this fraction: they are given with some digits
 SAME = 1e-6
-#: directions that were looked for are good to some hundredths
+#: directions that were searched for are good to some hundredths
 ANY = 0.5
-#: changes of a coordinate on two branches, which are known to some hundredths, that differ by less than this share are
-#: alike
+#: changes of a coordinate on two branches, which are known to some hundredths, that differ by less than this fraction
+#: are alike
 ALIKE = 0.05
 
 

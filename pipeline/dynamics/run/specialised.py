@@ -43,7 +43,8 @@ _known: dict[tuple[Parts, Wiring, int], int] = {}
 def settle(engine: Engine, progress: Progress) -> None:
     """Let the steps from here on evaluate with what this integration calls for.
 
-    That is told by the engine and its count of evaluations, so an integration that was interrupted goes on as it would.
+    That is reported by the engine and its count of evaluations, so an integration that was interrupted goes on as it
+    would.
     """
     engine.straight.used = engine.straight.requested or bool(engine.n[m.EVALUATIONS] >= MANY)
     if engine.straight.used:
@@ -74,7 +75,7 @@ def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> I
 
 
 def side_by_side(engine: Engine) -> bool:
-    """Whether its steps can be taken beside those of others here."""
+    """Whether its steps can be taken next to those of others here."""
     return stacks.supported() and suited(engine)
 
 

@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics.run.observation import observe
 
 #: impact rate that a resting contact is given: the hysteresis of an impact long past has no say [m/s]
 NO_IMPACT = 1e300
-#: surfaces that overlap by less than this share of the clearance touch
+#: surfaces that overlap by less than this fraction of the clearance touch
 TOUCHING = 1e-9
 
 

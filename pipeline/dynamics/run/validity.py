@@ -17,11 +17,11 @@ from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.engine import Engine
 
-#: displacement of a point in its body frame, as share of the body's length, above which linear modes are doubted
+#: displacement of a point in its body frame, as fraction of the body's length, above which linear modes are doubted
 BENT = 0.05
 #: rotation of a section in the body frame [rad] above which they are doubted
 TURNED = 0.15
-#: speed of turning, as share of the first frequency, above which a body without stiffening is doubted
+#: speed of turning, as fraction of the first frequency, above which a body without stiffening is doubted
 SPIN = 0.2
 #: rows whose shapes are added up at a time
 ROWS = 16
@@ -127,7 +127,7 @@ def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
         yield (
             f"{body.name}: at t = {time[row]:.6g} s it turns at {speeds[row]:.4g} rad/s, "
             f"{speeds[row] / body.first:.2g} of its first frequency ({body.first:.4g} rad/s), and nothing stiffens it; "
-            f"linear modes hold below {SPIN:g} and diverge near 1: give a beam stiffening = {{}}"
+            f"linear modes hold below {SPIN:g} and diverge close to 1: give a beam stiffening = {{}}"
         )
 
 

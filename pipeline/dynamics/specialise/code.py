@@ -2,7 +2,7 @@
 
 For one state at a time, or for several in the lanes of the processor's vectors. Several states go both ways at a
 branch where some of them do, and each keeps what its own way gives. What they come to must not depend on how many there
-are, nor which: so every operation is then rounded as it stands, and of products and sums those are fused that the tape
+are, nor which: so every operation is then rounded as it is, and of products and sums those are fused that the tape
 says, not those that the compiler likes.
 """
 
@@ -118,8 +118,8 @@ class Emitter:
     """Writes a program into a function under construction.
 
     where: the place of an array's element: where(array, place as a number or a value of the code, lane) -> pointer.
-    lanes: states at once.  exact: every operation is rounded as it stands.
-    number: of several states, what stands at a place of f, of all of them.
+    lanes: states at once.  exact: every operation is rounded as it is.
+    number: of several states, what is at a place of f, of all of them.
     """
 
     def __init__(

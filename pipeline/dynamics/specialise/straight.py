@@ -125,7 +125,7 @@ def _numbers(tape: Program) -> list[int]:
 
 
 def exactly(kernel: Any) -> Any:
-    """A kernel, and those in its closure, with every operation rounded as it stands: equal bits wherever it is used."""
+    """A kernel, and those in its closure, with every operation rounded as it is: equal bits wherever it is used."""
     function = kernel.py_func
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     exact = tuple(CellType(exactly(cell) if isinstance(cell, Kernel) else cell) for cell in cells)

@@ -1,7 +1,7 @@
-"""Kernels run in Python on symbols, so that what they compute for one wiring stands on a tape.
+"""Kernels run in Python on symbols, so that what they compute for one wiring is on a tape.
 
 Sizes, offsets and tables of h are numbers, so loops are counted and places known while the tape is written; w and f
-hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it stands, and
+hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it is, and
 what both ways leave is joined. Kernels that are called before the branch are not run again, but what they did is
 repeated.
 """
@@ -128,7 +128,7 @@ class Trace:
     # Kernels as Python --------------------------------------------------------------------------------------------
 
     def plain(self, value: Any) -> Any:
-        """What a kernel refers to, with kernels that run on symbols in the place of compiled ones."""
+        """What a kernel refers to, with kernels that run on symbols instead of compiled ones."""
         if id(value) not in self._plain:
             self._alive.append(value)
             self._plain[id(value)] = self._made_plain(value)

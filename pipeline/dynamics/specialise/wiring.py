@@ -21,7 +21,7 @@ LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS, m.BODIES, m.FRAMES)
 SIZES = m.ADDRESSES[0]
 #: a place is a stretch of an array and where in the stretch; the first stretch is the array itself
 STRETCH = 40
-#: stretches of w that are told by an argument: the state and its rates
+#: stretches of w that are reported by an argument: the state and its rates
 STATE, RATES = m.HEADER + 1, m.HEADER + 2
 
 
@@ -39,7 +39,7 @@ def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
 
 
 def header(wired: Wiring) -> list[int]:
-    """The array h of a wiring, with a stretch in the place of every offset in f and w."""
+    """The array h of a wiring, with a stretch instead of every offset in f and w."""
     h = [*wired[0], *((index + 1) << STRETCH for index in range(SIZES, m.HEADER))]
     for table, rows in zip(m.TABLES["h"], wired[1:], strict=True):
         h[table.place] = len(h)

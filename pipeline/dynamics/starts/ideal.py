@@ -1,6 +1,6 @@
-"""A run with clearance that begins as its ideal twin does: its pose and velocities, pins at rest in their sockets.
+"""A run with clearance that begins as its ideal mechanism does: its pose and velocities, pins at rest in their sockets.
 
-The twin has ideal joints in the place of pins and balls with clearance. The force that such a joint carries at the
+The twin has ideal joints instead of pins and balls with clearance. The force that such a joint carries at the
 start presses the pin onto one side of its socket, and so deep into it that the contact carries that force. Slots and
 planes have no ideal joint in their place: they stay as they are, and what touches them where the poses put it.
 """
@@ -30,16 +30,16 @@ from flexclear.pipeline.dynamics.run.run import driven
 from flexclear.pipeline.dynamics.run.start import consistent_start, project, rates_at_speeds
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
-#: a pin is in its place when it is this share of the clearance from it; passes in which that is reached, at most
+#: a pin is in its place when it is this fraction of the clearance from it; passes in which that is reached, at most
 THERE, PASSES = 1e-9, 20
-#: forces below this share of the weight press nothing: the pin stays in the middle
+#: forces below this fraction of the weight press nothing: the pin stays in the middle
 NOTHING = 1e-9
-#: singular values below this share of the largest are rounding
+#: singular values below this fraction of the largest are rounding
 RANK = 1e-9
 
 
 def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, str]:
-    """The scene as its ideal twin starts, and how that was assembled; one without clearance is its own twin.
+    """The scene as its ideal mechanism starts, and how that was assembled; one without clearance is its own twin.
 
     Raises InputError for a twin that cannot be built, SolverError when the pins cannot be put where they are pressed.
     """
@@ -55,7 +55,7 @@ def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -
 
 
 def placed(scene: Scene) -> Scene:
-    """The scene with ideal joints in the place of those that have such a counterpart.
+    """The scene with ideal joints instead of those that have such a counterpart.
 
     Raises InputError where it has contacts, and none of them has one.
     """

@@ -56,7 +56,7 @@ def _cell(choice: Choice | None) -> str:
 class Choice:
     """One way to integrate: its name, cost, largest relative error and the quantity that has it.
 
-    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be told.
+    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be determined.
     """
 
     name: str
@@ -101,7 +101,7 @@ def _notes(study: xr.Dataset) -> list[str]:
     notes = [
         "The error is the largest of all quantities: "
         + ", ".join(str(q) for q in study["quantity"].values)
-        + "; each as a share of its own size, the reference's uncertainty included.",
+        + "; each as a fraction of its own size, the reference's uncertainty included.",
         _confirmed(study),
     ]
     if recorded == recorded:

@@ -15,7 +15,7 @@ RESAMPLES = 2000
 SEED = 7
 #: what is asked of a chaotic run, by contact, and its unit
 STATISTICS = {"peak_force": "N", "impact_count": "1", "contact_time_share": "1"}
-#: the smallest part of an ensemble of which a spread is told: resamples of fewer say little
+#: the smallest part of an ensemble of which a spread is reported: resamples of fewer say little
 FEWEST = 8
 LOOKS = (("#0072B2", "o"), ("#E69F00", "s"), ("#009E73", "^"), ("#D55E00", "v"))
 
@@ -38,7 +38,7 @@ def estimate(values: np.ndarray) -> Estimate:
 
 
 def relative_error(values: np.ndarray) -> float:
-    """Half the interval of the mean as a share of the mean; NaN where that is zero."""
+    """Half the interval of the mean as a fraction of the mean; NaN where that is zero."""
     mean = estimate(values)
     return 0.5 * (mean.high - mean.low) / abs(mean.mean) if mean.mean else np.nan
 

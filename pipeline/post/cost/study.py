@@ -27,7 +27,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
 #: the reference must agree with its independent confirmation this many times better than an error it measures
 MARGIN = 10.0
 LONG_NAMES = {
-    "error": "largest error up to the horizon, as a share of the quantity's size",
+    "error": "largest error up to the horizon, as a fraction of the quantity's size",
     "cpu_seconds": "processor time of the integration of a warm run, median of the repeats",
     "recording_seconds": "processor time of its record: rows and dataset",
     "cpu_spread": "largest minus smallest processor time of the repeats",
@@ -59,7 +59,7 @@ class Point:
 def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
     """The study's dataset; `runs` holds what each point left, by key.
 
-    A run that was refused has no values: its place is NaN and its reason stands in `refused`.
+    A run that was refused has no values: its place is NaN and its reason is in `refused`.
     Raises SolverError when that is the reference.
     """
     reference = runs[next(p.key for p in points if p.group == "reference")]
@@ -161,7 +161,7 @@ def recording(study: xr.Dataset) -> float:
 def relative_errors(
     run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity], until: float
 ) -> dict[str, float]:
-    """Largest error up to a time [s] as a share of the quantity's size, by name."""
+    """Largest error up to a time [s] as a fraction of the quantity's size, by name."""
     return {
         q.name: relative(quantities.error(run, reference, q, until), quantities.scale(reference, q)) for q in chosen
     }
@@ -177,7 +177,7 @@ def believed(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
 
 
 def relative(error: float, scale: float) -> float:
-    """An error as a share of a size; the error itself where there is no size."""
+    """An error as a fraction of a size; the error itself where there is no size."""
     return error / scale if scale > 0.0 else error
 
 

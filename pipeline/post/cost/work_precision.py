@@ -26,7 +26,7 @@ COLUMNS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
-    """One integrator over its settings: cost [s], relative errors (setting, quantity), and which can be told."""
+    """One integrator over its settings: cost [s], relative errors (setting, quantity), and which can be determined."""
 
     name: str
     seconds: np.ndarray
@@ -111,7 +111,7 @@ def _panel(
     marks: tuple[Mark, ...],
     bound: float,
 ) -> None:
-    """One quantity. curves_of: ours, and others'. bound: error below which the reference tells nothing."""
+    """One quantity. curves_of: ours, and others'. bound: error below which the reference says nothing."""
     own, others = curves_of
     for curve in (*own, *others):
         color, mark = look(curve, others)
@@ -132,7 +132,7 @@ def _panel(
     ax.set(xscale="log", yscale="log", title=name)
     plain(ax.xaxis)
     if np.isinf(bound):
-        text = "cannot be told: reference and\nconfirmation have other impacts"
+        text = "cannot be determined: reference and\nconfirmation have other impacts"
         ax.set(yscale="linear", yticks=[])  # there is nothing to scale
         ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", fontsize=7.5, color=INK)
     elif bound > 0.0:
@@ -161,7 +161,7 @@ def _legend(figure: object, own: list[Curve], others: Sequence[Curve], marks: tu
         color, mark = look(curve, others)
         handles.append(Line2D([], [], color=color, marker=mark, label=curve.name))
     handles.append(Line2D([], [], color=INK, linewidth=3.0, alpha=0.18, label="Pareto front"))
-    handles.append(Patch(color=GRID, label="cannot be told"))
+    handles.append(Patch(color=GRID, label="cannot be determined"))
     handles.append(Line2D([], [], color=SOFT, linewidth=0.9, linestyle=":", label="recording, the same for all"))
     if marks:
         handles.append(Line2D([], [], color=INK, marker="*", linestyle="none", label="marked single runs"))

@@ -17,7 +17,7 @@ LEGS = (1, 2, 3, 4)
 TOWARDS, UP = np.array([0.75, -1.35, 0.55]), np.array([0.0, 0.0, 1.0])
 #: radii of the parts that Table 1 decodes into [m]
 CYLINDER, ROD, BALL = 0.02, 0.01, 0.02
-#: where the legs' names stand beside the middle of their cylinders on the paper [m]
+#: where the legs' names are next to the middle of their cylinders on the paper [m]
 LABELS = {1: (0.07, 0.0), 2: (-0.065, 0.0), 3: (-0.055, 0.04), 4: (-0.07, 0.0)}
 STEEL, ALUMINIUM, PLATE, BASE = "#5b7fa6", "#b9c2cc", "#c9a66b", "#dfe5ec"
 
@@ -67,7 +67,7 @@ def _mechanism(axes: Axes, seen: View, at: dict[str, np.ndarray], corners: np.nd
         clear = f"A{k}" == JOINT
         _ball(axes, seen, at[f"platform.A{k}"], CSJ.color if clear else "#3b4754", 8.0)
         _name(axes, seen, at[f"platform.A{k}"], f"A{k}" + (" (clearance)" if clear else ""), (0.012, 0.024))
-        # B3 is behind leg 2, and its name beside that
+        # B3 is behind leg 2, and its name next to that
         _name(axes, seen, at[f"ground.B{k}"], f"B{k}", (0.052, 0.0) if k == 3 else (0.018, -0.036))
     _ball(axes, seen, at["platform.C"], "#3b4754", 8.0)
     _name(axes, seen, at["platform.C"], "C", (0.012, 0.022))

@@ -1,4 +1,4 @@
-"""Figure 10: how the dynamics are computed, beside the paper's steps 1 to 9."""
+"""Figure 10: how the dynamics are computed, next to the paper's steps 1 to 9."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
             figure,
             "Figure 10: contacts end steps where they begin and end; "
             "the paper looks at them at the ends of steps of 10 µs",
-            f"beside the boxes: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {attributes['steps']} steps, "
+            f"next to the boxes: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {attributes['steps']} steps, "
             f"{attributes['evaluations']} evaluations, {attributes['projections']} projections",
         )
         return style.files("fig10", figure)

@@ -11,8 +11,8 @@ from flexclear.pipeline.core.quantities import common_times
 from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
 from flexclear.pipeline.post.models import BALL_FRAME, IDEAL, JOINT, PLATFORM, Model
 
-#: two answers differ by more than this share, and those of two ensembles also by this many standard deviations of the
-#: members
+#: two answers differ by more than this fraction, and those of two ensembles also by this many standard deviations of
+#: the members
 SLIGHT, SEPARATION = 0.1, 2.0
 #: artifacts by reference, such as ``sps4/csj:run``
 Data = Mapping[str, xr.Dataset]

@@ -13,7 +13,7 @@ from flexclear.pipeline.post.plotting.drawing import View, shell, triad, view
 from flexclear.pipeline.post.rod_shape import scale_to, surface
 
 COUNT = 4
-#: drawn size of the largest displacement, as a share of the body's length
+#: drawn size of the largest displacement, as a fraction of the body's length
 FRACTION = 0.16
 #: of the pictures [m]
 MARGIN = 0.008
@@ -47,7 +47,7 @@ def make(name: str, finding: str, bundle: xr.Dataset, printed: tuple[float, ...]
         style.heading(
             figure,
             finding,
-            "mass-normalised shapes of the round section (in kg$^{-1/2}$) times the factor beside each; grey: "
+            "mass-normalised shapes of the round section (in kg$^{-1/2}$) times the factor next to each; grey: "
             "undeformed",
         )
         return style.files(name, figure)

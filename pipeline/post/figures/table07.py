@@ -73,7 +73,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
 
 
 def _contradiction(ours: Deviation) -> str:
-    """The paper's two rows beside what a change of leg 1's length can do."""
+    """The paper's two rows next to what a change of leg 1's length can do."""
     printed = TABLE7["free-free"]
     return (
         f"The paper's two rows contradict each other: {printed.angle:.3g} rad with {printed.displacement:.3g} mm is "

@@ -70,7 +70,7 @@ def _pair(data: dict[str, xr.Dataset], model: Model, ideal: Model) -> tuple[Devi
 
 
 def _velocity(ours: Deviation, first: Deviation) -> str:
-    """The row that is a prediction, beside what the layout predicted that was assumed before."""
+    """The row that is a prediction, next to what the layout predicted that was assumed before."""
     ratio, before = 1e3 * ours.velocity / TABLE8.velocity, 1e3 * first.velocity / TABLE8.velocity
     missed = 1e3 * first.displacement / TABLE8.displacement
     agrees = 1.0 / VELOCITY < ratio < VELOCITY

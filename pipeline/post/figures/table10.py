@@ -46,7 +46,7 @@ def _row(timing: xr.Dataset, name: str) -> tuple[str, ...]:
 
 
 def _steps(timing: xr.Dataset, name: str, reading: str = "tolerance") -> float:
-    """Steps at the paper's tolerance over the ideal model's. reading: a share of the stroke, or of the `size`."""
+    """Steps at the paper's tolerance over the ideal model's. reading: a fraction of the stroke, or of the `size`."""
     steps = timing[f"{reading}_steps"]
     return float(steps.sel(scene=name) / steps.sel(scene=REFERENCE))
 
@@ -97,8 +97,8 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
     facts = timing.attrs
     notes = [
         "Times are processor time of the integration alone; recording (evaluating the rows of the output, and the "
-        "dataset) costs the same whatever the way, stands in a column of its own and is in no ratio. Medians of warm "
-        "repeats in one process, beside other work of the machine, ± half their range; a ratio's "
+        "dataset) costs the same whatever the way, is in a column of its own and is in no ratio. Medians of warm "
+        "repeats in one process, with other programs running, ± half their range; a ratio's "
         "± is half of what the ranges of both times leave it.",
         f"Equal error: each model runs at the tolerance that gives the platform's velocity a relative error of "
         f"{facts['equal_error']:g} at most over the first {100 * facts['share']:.0f} % of the stroke, where all models "
@@ -167,7 +167,7 @@ def _which(timing: xr.Dataset) -> str:
     other = ", ".join(f"{scene} {_number(_steps(timing, scene, 'size'))}" for scene in steps)
     return (
         f"Steps at the paper's tolerance over the ideal model's: {text}. Within a factor of {NEAR:g} of the paper's "
-        f"ratio: {', '.join(near) or 'none'}. Read as a share of the mechanism's size (rtol "
+        f"ratio: {', '.join(near) or 'none'}. Read as a fraction of the mechanism's size (rtol "
         f"{float(timing.size_rtol.median()):.1e}) the same tolerance gives {other}: where the method begins to follow "
         "the rod's vibrations, these ratios are a matter of the reading."
     )

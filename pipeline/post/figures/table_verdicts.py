@@ -60,7 +60,7 @@ NEEDS = (
 
 #: verdicts on the repeated stroke, which take two hours and stand in the repository (`make chaos`)
 SECTIONS = TREE / "docs/chaos/verdicts.csv"
-#: an effect that has no influence is below this share; one that is slight, and answers that agree, below SLIGHT
+#: an effect that has no influence is below this fraction; one that is slight, and answers that agree, below SLIGHT
 SMALL = 0.05
 #: a cost agrees with the paper's within this factor
 NEAR = 1.5
@@ -89,7 +89,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         "layout assumed before one was identified from Table 8; the verdict is on the others. The prismatic joint is "
         "at the rod's lower end here; [reference-conditions.md](reference-conditions.md) judges mode sets at other "
         "places, over layouts of the mechanism, and against the full rod, [chaos.md](chaos.md) the motion under a "
-        "repeated stroke, [geometry.md](geometry.md) what Table 8 tells of the joint coordinates. Tables 4 "
+        "repeated stroke, [geometry.md](geometry.md) what Table 8 says of the joint coordinates. Tables 4 "
         "and 5 have verdicts of their own below them.",
     )
     return files("table_verdicts", Table("Verdicts on the paper's statements (added)", HEADS, rows, notes))
@@ -126,7 +126,7 @@ def _same_acceleration(data: Data) -> Outcome:
 
 
 def _same_path(*models: Model) -> Callable[[Data], Outcome]:
-    """Whether the ball's centre stays beside the ideal model's; as a share of how far that moves."""
+    """Whether the ball's centre stays next to the ideal model's; as a fraction of how far that moves."""
 
     def outcome(data: Data) -> Outcome:
         ideal = measured.centre(data[f"{IDEAL.scene}:run"])
@@ -346,7 +346,7 @@ def _one_stroke(data: Data) -> Outcome:
     end = float(data[f"{CSJ.scene}:run"].time.values[-1])
     horizon = float(data[f"{CSJ.scene}:post"].horizon)
     parts = [1e3 * float(data[f"{m.scene}:post"].ensemble_horizon) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)]
-    return "cannot be told from one stroke", (
+    return "cannot be determined from one stroke", (
         f"neighbours of the CSJ run stay together to {1e3 * horizon:.0f} of {1e3 * end:.0f} ms; of the undamped "
         "FAR-CSJ "
         f"runs they part after {min(parts):.0f} to {max(parts):.0f} ms. Sections of a repeated stroke: chaos.md"

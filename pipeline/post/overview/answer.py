@@ -15,13 +15,13 @@ from flexclear.pipeline.post.horizon import sentence
 from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
 from flexclear.pipeline.post.series import parameters
 
-#: a difference is told from none where it is so many times larger than both runs' own errors
+#: a difference is reported from none where it is so many times larger than both runs' own errors
 DISTINGUISHED = 2.0
-#: below this share of the largest value an effect is called slight
+#: below this fraction of the largest value an effect is called slight
 SLIGHT = 0.01
-#: below this share, both runs' own errors included, there is none, as of a body that a drive leads
+#: below this fraction, both runs' own errors included, there is none, as of a body that a drive leads
 NOTHING = 1e-6
-#: an energy that the ledger misses counts from this share of the largest energy on
+#: an energy that the ledger misses counts from this fraction of the largest energy on
 LEDGER = 1e-3
 NEITHER = "The scene has neither clearance nor flexible bodies"
 
@@ -29,7 +29,7 @@ NEITHER = "The scene has neither clearance nor flexible bodies"
 def answer(compared: xr.Dataset | None, run: xr.Dataset | None, doubts: Sequence[str]) -> str:
     """A list of sentences, as HTML.
 
-    compared: of `overview.comparison`, the ideal twin first and the scene last; None where there is none.
+    compared: of `overview.comparison`, the ideal mechanism first and the scene last; None where there is none.
     run: schema RUN of the scene.  doubts: warnings of the run.
     """
     said = [] if compared is None else _effects(compared)
@@ -46,7 +46,7 @@ def answer(compared: xr.Dataset | None, run: xr.Dataset | None, doubts: Sequence
 
 
 def _effects(compared: xr.Dataset) -> list[str]:
-    """A sentence for each quantity: by how much the scene differs from its ideal, and whether that is told apart."""
+    """A sentence for each quantity: the difference from the ideal mechanism, and whether it exceeds the error."""
     sentences = []
     last = compared.sizes["run"] - 1
     for j, name in enumerate(str(q) for q in compared["quantity"].values):

@@ -1,4 +1,4 @@
-"""Runs beside each other: what they differ by, and by how much each may be wrong itself.
+"""Runs next to each other: what they differ by, and by how much each may be wrong itself.
 
 Differences are taken at the output times that all runs have, never interpolated. The first run is the reference.
 Peaks of an impact lie between those times. Where a force or velocity is larger in one run than it ever is in the other,
@@ -21,7 +21,7 @@ from flexclear.pipeline.post.horizon import sentence
 from flexclear.pipeline.post.overview.curves import curves, has, measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table
 
-#: what a run tells of its price, by its attribute
+#: what a run reports of its cost, by its attribute
 COSTS = {"evaluations": "evaluations", "steps": "steps", "rejected_steps": "rejected steps"}
 #: kinds whose largest value is that of their change from the start
 FROM_THE_START = ("position", "orientation")

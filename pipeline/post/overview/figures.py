@@ -31,7 +31,7 @@ ENERGIES = {
 }
 #: what holds a pin, by type of joint; a ball is in a socket
 HOLDERS = {"clearance-revolute": "journal", "clearance-slot": "slot"}
-#: of an energy that is not drawn: its share of the largest one
+#: of an energy that is not drawn: its fraction of the largest one
 UNSEEN = 1e-6
 
 
@@ -140,7 +140,7 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         pushes = "normal force" if unit == "N" else "torque"
         _over_time(row[2], run, run["contact_normal_force"].values[:, k])
         row[2].set_title(f"{names[k]}: {pushes} ({unit})", pad=16)
-        # a line of its own: beside the title it would be cut off
+        # a line of its own: next to the title it would be cut off
         text = f"{count}, peak {measured(peak, np.nan, unit)}, {fraction:.0%} of the time in contact"
         row[2].text(0.0, 1.015, text, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
     style.heading(figure, f"Joints with clearance{_rest(len(names), CONTACTS)}")

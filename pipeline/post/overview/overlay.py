@@ -1,4 +1,4 @@
-"""The figure of runs beside each other: each watched quantity, and how far the others are from the reference."""
+"""The figure of runs next to each other: each watched quantity, and how far the others are from the reference."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.series import derive, parameters
 
-#: of the runs, the reference first: told apart by colour-blind readers, too
+#: of the runs, the reference first: distinguished by colour-blind readers, too
 COLORS = ("#111111", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-#: of models of one mechanism, by what they have beside the ideal one; the same as in the figures about the paper
+#: of models of one mechanism, by what they have next to the ideal one; the same as in the figures about the paper
 IDEAL, CLEARANCE = "#111111", "#E69F00"
 MODES = {"free-free": "#0072B2", "fixed-fixed": "#D55E00", "craig-bampton": "#009E73"}
 #: opacity of a curve beyond the horizon of its run
@@ -46,7 +46,7 @@ def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) 
             _apart(row[1], runs, quantity, lines)
         style.shared_legend(figure, axes[0, 0], min(len(runs), 3))
         pale = "; pale: beyond the horizon of a run" if any("horizon" in run for run in runs.values()) else ""
-        style.heading(figure, "Runs beside each other", f"right: distance from {next(iter(runs))}{pale}")
+        style.heading(figure, "Runs next to each other", f"right: distance from {next(iter(runs))}{pale}")
         files = style.files(name, figure)
         return files | _orbits(f"{name}_contacts", runs)
 

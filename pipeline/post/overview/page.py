@@ -57,13 +57,13 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
 
 
 def viewer_page(title: str, views: Sequence[str], below: str = "") -> bytes:
-    """A page with views that can be turned (`pipeline.post.pages.viewer`), and what stands below them as HTML."""
+    """A page with views that can be turned (`pipeline.post.pages.viewer`), and what is below them as HTML."""
     return page(title, "", [Part("view", "View" if len(views) == 1 else "Views", beside(views) + below)])
 
 
 def beside(figures: Sequence[str]) -> str:
-    """Figures beside each other where there is room for that."""
-    return "".join(figures) if len(figures) < 2 else f"<div class='beside'>{''.join(figures)}</div>\n"
+    """Figures next to each other where there is room for that."""
+    return "".join(figures) if len(figures) < 2 else f"<div class='side-by-side'>{''.join(figures)}</div>\n"
 
 
 def media(name: str, content: bytes, caption: str, alt: str = "") -> str:
@@ -109,7 +109,7 @@ def downloads(files: Mapping[str, bytes]) -> str:
 
 
 def in_folder(page: bytes) -> dict[str, bytes]:
-    """The same page as ``index.html`` with its pictures and films as files beside it, by name."""
+    """The same page as ``index.html`` with its pictures and films as files next to it, by name."""
     files: dict[str, bytes] = {}
     suffix = {kind: name for name, kind in TYPES.items()}
 

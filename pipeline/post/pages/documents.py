@@ -14,7 +14,7 @@ COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
 def section(page: Path, headings: Sequence[str] = (), pictures: Sequence[str] | None = None) -> str:
     """The text of a page below its title, as HTML; empty where there is no such page.
 
-    headings: only what stands below these; "" is what stands before the first of them.  pictures: endings of the
+    headings: only what is below these; "" is what is before the first of them.  pictures: endings of the
     names of those that are shown; default: all.
     """
     if not page.is_file():

@@ -18,7 +18,7 @@ from flexclear.pipeline.post.plotting.drawing import View, shell, skin, view
 from flexclear.pipeline.post.plotting.style import SOFT
 from flexclear.pipeline.post.rod_shape import AROUND
 
-#: modes beside each other, and drawn size of the largest displacement as a share of the body's length
+#: modes next to each other, and drawn size of the largest displacement as a fraction of the body's length
 COLUMNS, FRACTION = 3, 0.14
 #: of the points around a rod every so many are drawn: a sheet shows its modes small
 EVERY = 2
@@ -80,7 +80,7 @@ def _sheet(body: str, bundle: xr.Dataset, seen: View, fraction: float) -> Figure
     style.heading(
         figure,
         f"{body}: {range_text(bundle)}",
-        "mass-normalised shapes (in kg^-1/2) times the factor beside each; dashed: at rest",
+        "mass-normalised shapes (in kg^-1/2) times the factor next to each; dashed: at rest",
     )
     return figure
 

@@ -22,7 +22,7 @@ FIRM, ADDED, PALE = 0.95, 0.4, 0.28
 STRETCHES = 120
 #: differences whose sizes are further apart than this are drawn on a logarithmic scale around zero
 SEPARATION = 20.0
-#: differences below this share of the largest are rounding
+#: differences below this fraction of the largest are rounding
 ROUNDING = 1e-6
 
 
@@ -155,7 +155,7 @@ def deviation(quantity: Quantity, motion: Motion, reference: Motion) -> tuple[np
 
 
 def ball_deviation(axes: Axes, reference: Motion, others: Sequence[Motion], clearance: float = 0.0) -> None:
-    """Where the ball's centre is beside its place in the ideal model, x-z plane of the world, equal scales.
+    """Where the ball's centre is next to its place in the ideal model, x-z plane of the world, equal scales.
 
     The path itself is 60 mm long: nothing is seen on it.
     """

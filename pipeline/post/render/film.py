@@ -1,4 +1,4 @@
-"""A film of a run: the moving mechanism, and its curves beside it."""
+"""A film of a run: the moving mechanism, and its curves next to it."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def film(
 ) -> tuple[str, bytes]:
     """File suffix and content: MP4 where that is asked for and ffmpeg is there, else GIF; the whole run.
 
-    watched: names of bodies, joints and contacts, of which the first of each is shown beside the mechanism.
+    watched: names of bodies, joints and contacts, of which the first of each is shown next to the mechanism.
     Around the strongest impacts time is stretched, so that they are seen (`pace`).
     """
     rate = RATE if kind == "mp4" else RATE // 2

@@ -20,7 +20,7 @@ from flexclear.pipeline.post.render import shape_files, surfaces
 from flexclear.pipeline.post.render.solids import Solid
 from flexclear.pipeline.post.render.surfaces import Surface
 
-#: half width of a link as a share of the mechanism's size, and of the distance of its joints at most
+#: half width of a link as a fraction of the mechanism's size, and of the distance of its joints at most
 WIDTH, WIDEST = 0.016, 0.2
 #: thickness of flat links, in half widths
 FLAT = 0.9
@@ -28,7 +28,7 @@ FLAT = 0.9
 NEAR = 0.3
 #: a solid is slender where it is so many times longer than thick
 SLENDER = 2.5
-#: largest half extent of a body without joints apart, as a share of the mechanism's size
+#: largest half extent of a body without joints apart, as a fraction of the mechanism's size
 LARGEST = 0.1
 #: joints that turn about z of their frames, and that slide along it
 TURNING = ("revolute", "clearance-revolute", "clearance-slot", "planar")

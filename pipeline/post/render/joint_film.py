@@ -15,7 +15,7 @@ from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import pace
 from flexclear.pipeline.post.series import derive
 
-#: size of a picture in hundreds of pixels, and length of the trail as a share of the run
+#: size of a picture in hundreds of pixels, and length of the trail as a fraction of the run
 SIZE, TRAIL = (9.6, 5.4), 0.02
 
 

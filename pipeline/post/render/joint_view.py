@@ -14,9 +14,9 @@ from flexclear.pipeline.post.series import parameters
 
 #: colour of a path, as in the plots of orbits; most places of it that are drawn
 PATH_COLOR, PLACES = "#009E73", 1500
-#: radius of the mark at the centre and of the path, as shares of the room's size
+#: radius of the mark at the centre and of the path, as fractions of the room's size
 MARK, PATH = 0.05, 0.006
-#: where a sphere and where a flat room are looked at from
+#: where a sphere and where a flat room are examined from
 SLANTED, ABOVE = np.array([0.5, -1.0, 0.7]), np.array([0.0, -0.45, 1.0])
 
 

@@ -24,14 +24,14 @@ from flexclear.pipeline.post.series import parameters
 COLORS = ("#5b7fa6", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b", "#9aa5b1")
 JOINT_COLOR, SOCKET_COLOR, CLEARANCE_COLOR, IMPACT_COLOR = "#3b4754", "#a9bccf", "#E69F00", "#d7191c"
 GROUND_COLOR = "#8d98a4"
-#: as shares of the mechanism's size: joint spheres where no ball radius is known, radius of pins, thickness of rails
+#: as fractions of the mechanism's size: joint spheres where no ball radius is known, radius of pins, thickness of rails
 BALL, PIN, RAIL = 0.022, 0.011, 0.008
 #: size of what has none: one body that rests [m]
 LONE = 1.0
 #: outputs at which is looked how far a mechanism reaches
 SAMPLES = 24
 _CORNERS = np.array([[k & 1, k & 2, k & 4] for k in range(8)], dtype=bool)
-#: largest drawn deformation as a share of the body's length
+#: largest drawn deformation as a fraction of the body's length
 DEFORMATION_SHARE = 0.05
 
 
@@ -88,7 +88,7 @@ class Mechanism:
     flexible: tuple[Flexible, ...]
     view: View
     size: float  #: diagonal of the box of all frames and of the flexible bodies at the start [m]
-    cloud: np.ndarray  #: points that stand for all that is drawn over the run, world axes [m], shape (n, 3)
+    cloud: np.ndarray  #: points that represent all that is drawn over the run, world axes [m], shape (n, 3)
     looks: Looks
 
 
@@ -199,7 +199,7 @@ def _bodies(
                 yield Part(None, own, look.get("color", GROUND_COLOR))
             continue
         if name in bundles:
-            if own is not None:  # beside the deformed mesh: what is fixed to it
+            if own is not None:  # next to the deformed mesh: what is fixed to it
                 yield Part(
                     names.index(name),
                     surfaces.moved(own, -_centre_at_rest(bundles[name])),

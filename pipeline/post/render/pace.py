@@ -14,7 +14,7 @@ from flexclear.pipeline.post.impacts import impacts
 
 #: length of a film [s], and how much slower it runs around impacts
 SECONDS, SLOWER = 3.75, 8.0
-#: so many of the strongest impacts are shown slowly, each within this share of the run
+#: so many of the strongest impacts are shown slowly, each within this fraction of the run
 SHOWN, AROUND = 3, 0.008
 
 

@@ -1,4 +1,4 @@
-"""The plots that run beside a film: drawn once, then only the moving marks."""
+"""The plots that run next to a film: drawn once, then only the moving marks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from flexclear.pipeline.post.render import joint_view
 
 #: a body that turns by less does not turn [degrees]
 STILL = 1e-3
-#: beside titles [pixels]
+#: next to titles [pixels]
 MARGIN = 6.0
 
 

@@ -19,7 +19,7 @@ from flexclear.pipeline.post.render.mechanism import Mechanism, part_pose, place
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.series import parameters
 
-#: longest arrow, and thickness of arrows, as shares of the mechanism's size
+#: longest arrow, and thickness of arrows, as fractions of the mechanism's size
 LONGEST, THICK = 0.3, 0.006
 
 

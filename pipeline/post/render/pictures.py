@@ -149,7 +149,7 @@ def _mode_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
 
 
 def _mode_page(shown: Shown) -> dict[str, bytes]:
-    """The mode sets of all bodies beside each other."""
+    """The mode sets of all bodies next to each other."""
     views = [
         viewer(player.modes(bundle), f"{body}: {mode_sheet.range_text(bundle)}", play=True)
         for body, bundle in _bodies(shown).items()

@@ -31,7 +31,7 @@ from flexclear.pipeline.post.render.view import View, eye
 
 #: frames of a motion, and width over height of a picture that is neither wide nor narrow
 FRAMES, ASPECT = 240, 1.2
-#: drawn size of the largest displacement of a mode, as a share of the body's length
+#: drawn size of the largest displacement of a mode, as a fraction of the body's length
 FRACTION = 0.12
 
 
@@ -132,7 +132,7 @@ def vibrations(drawn: Mechanism, linear: Vibrations) -> dict[str, Any]:
 
 
 def side(bundle: xr.Dataset) -> View:
-    """From where a body alone is looked at: its length across the picture."""
+    """From where a body alone is examined: its length across the picture."""
     x = bundle["node_position"].values
     (axis, *_), _ = box(bundle)
     axis = axis * (1.0 if axis @ (x[-1] - x[0]) >= 0.0 else -1.0)

@@ -15,7 +15,7 @@ from flexclear.pipeline.post.render.pace import Caption
 from flexclear.pipeline.post.render.stage import SOFT, image, plotter, polydata
 from flexclear.pipeline.post.render.vibrations import Vibrations
 
-#: size of a film's pictures and of those on a sheet, and how many stand beside each other there
+#: size of a film's pictures and of those on a sheet, and how many are next to each other there
 SIZE, TILE, COLUMNS = (960, 540), (480, 360), 3
 #: how long one vibration is shown [s], and how many periods it goes through meanwhile
 SECONDS, PERIODS = 1.5, 2
@@ -50,7 +50,7 @@ def sheet(drawn: Mechanism, modes: Vibrations) -> np.ndarray:
 
 
 def _cloud(modes: Vibrations) -> np.ndarray:
-    """Points that stand for all that is drawn, at both ends of each vibration that is shown."""
+    """Points that represent all that is drawn, at both ends of each vibration that is shown."""
     clouds = []
     for piece in modes.pieces:
         for k in range(min(len(modes.labels), SHOWN)):

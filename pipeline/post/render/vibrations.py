@@ -13,7 +13,7 @@ from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.fields import hertz, linear_fields
 from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose
 
-#: drawn size of the largest displacement of a vibration, as a share of the mechanism's size
+#: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size
 FRACTION = 0.12
 #: largest drawn rotation of any frame [rad]: points of a body that turns further would leave it, they move linearly
 TURN = 0.5

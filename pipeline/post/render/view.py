@@ -1,4 +1,4 @@
-"""From where a mechanism is looked at: a planar one along its normal, any other from above and in front."""
+"""From where a mechanism is examined: a planar one along its normal, any other from above and in front."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import xarray as xr
 
 #: from a spatial mechanism to the eye, and how far the eye is from a planar mechanism's normal: depth is then seen
 SPATIAL, TILT = np.array([-0.95, 1.45, 0.68]), 0.32
-#: speeds out of the plane that are rounding, as a share of those in it
+#: speeds out of the plane that are rounding, as a fraction of those in it
 PLANAR = 1e-3
 #: angle of vision from the lower to the upper edge of a picture [degrees], and what is left around the mechanism
 ANGLE, MARGIN = 30.0, 1.08

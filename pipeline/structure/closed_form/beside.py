@@ -1,4 +1,4 @@
-"""Closed-form frequencies beside those of a mesh, mode by mode, where the rod and its ends have any."""
+"""Closed-form frequencies next to those of a mesh, mode by mode, where the rod and its ends have any."""
 
 from __future__ import annotations
 

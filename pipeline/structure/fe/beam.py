@@ -78,7 +78,7 @@ def geometric_stiffness(mesh: xr.Dataset, axial_force: np.ndarray) -> sp.csr_arr
     r"""Stiffness that a tension N gives to the deflections, :math:`\int N (v'^2 + w'^2)\,dx`, shape (ndof, ndof).
 
     axial_force: N [N], tension positive, of each cell, shape (cells,), or at its Gauss points, shape (cells, points).
-    The axis alone is counted: no term of the twist (Wagner) and none of masses beside the axis.
+    The axis alone is counted: no term of the twist (Wagner) and none of masses off the axis.
     Source: Przemieniecki (1968), ch. 15.
     """
     beam = assemble(mesh)

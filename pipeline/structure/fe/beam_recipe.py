@@ -14,7 +14,7 @@ from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, ch
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
-#: places along a rod that differ by less than this share of its length are the same; they come from decimal text
+#: places along a rod that differ by less than this fraction of its length are the same; they come from decimal text
 SAME_PLACE = 1e-9
 
 

@@ -18,7 +18,7 @@ def recipe_schema() -> dict[str, Any]:
     shapes = {
         kind: next(b for b in branches if b["$ref"].endswith(f"/{model.__name__}")) for kind, model in MODELS.items()
     }
-    # a choice by the shape, so that an editor tells what is wrong with this kind and not with all others
+    # a choice by the shape, so that an editor reports what is wrong with this kind and not with all others
     chosen = [
         {
             "if": {"properties": {"shape": {"properties": {"type": {"const": kind}}, "required": ["type"]}}},

@@ -43,7 +43,7 @@ class Integrals:
 
 @dataclass(frozen=True)
 class Families:
-    """How modes are told apart, named and signed.
+    """How modes are distinguished, named and signed.
 
     names: families in the order that they take within a cluster of equal frequencies.
     local: the model's vector to components along the body's own axes, orthogonal, shape (ndof, ndof).

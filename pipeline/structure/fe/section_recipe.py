@@ -21,7 +21,7 @@ def _pair(value: Any) -> Any:
 
 def _shares(value: tuple[float, float]) -> tuple[float, float]:
     if not all(0.0 < kappa <= 1.0 for kappa in value):
-        raise ValueError(f"a shear coefficient is a share of the area, above 0 and at most 1, not {list(value)}")
+        raise ValueError(f"a shear coefficient is a fraction of the area, above 0 and at most 1, not {list(value)}")
     return value
 
 
@@ -127,7 +127,7 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
 
 
 def constants(start: Any, end: Any | None, s: Value) -> Section:
-    """Section constants at the share s of a span from the section `start` to the section `end` (None: no taper)."""
+    """Section constants at the fraction s of a span from the section `start` to the section `end` (None: no taper)."""
     if start.type == "general":
         return Section(start.area, start.torsion, start.second_y, start.second_z, start.product)
     return getattr(sections, start.type)(*_dimensions(start, end, s))

@@ -108,7 +108,7 @@ def _lump_maps(mesh: xr.Dataset, size: int) -> tuple[Maps, Maps]:
 
 
 def carried(node: list[sp.csr_array], r: np.ndarray) -> tuple[Maps, Maps]:
-    """Motion of nodes carried to centres beside them, s = u + theta x r.
+    """Motion of nodes carried to centres next to them, s = u + theta x r.
 
     node: vector to ux uy uz rx ry rz of the nodes, each of shape (p, ndof).  r: from node to centre [m], (p, 3).
     """

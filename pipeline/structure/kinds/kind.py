@@ -32,7 +32,7 @@ class Kind:
     write_vtu: the mesh dataset to a file that ParaView opens.
     assemble: the mesh dataset to matrices.
     words: what each mode does, in a word, from its family and vectors of shape (ndof, n).
-    exact: closed-form frequencies [Hz] beside those of a reference condition, by variable, from the modes'
+    exact: closed-form frequencies [Hz] next to those of a reference condition, by variable, from the modes'
         families and the interfaces' names.
     """
 

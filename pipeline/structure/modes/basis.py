@@ -1,4 +1,4 @@
-"""The shapes of a body under a reference condition: static ones, and as many normal modes as are wanted."""
+"""The shapes of a body under a reference condition: static ones, and as many normal modes as are requested."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flexclear.pipeline.structure.modes.normal import Normal
 from flexclear.pipeline.structure.modes.select import ModeRequest
 from flexclear.pipeline.structure.modes.statics import Flexibility, border
 
-#: normal modes tried first where a share decides how many are needed; then twice as many, and so on
+#: normal modes tried first where a fraction decides how many are needed; then twice as many, and so on
 FIRST = 16
 
 

@@ -1,4 +1,4 @@
-"""Static compliance at the frames of the full model, and the share of it that a basis has."""
+"""Static compliance at the frames of the full model, and the fraction of it that a basis has."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vector
 
 
 def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:
-    """Smallest share of the compliance between the interfaces (of a single one: of the free body), and where."""
+    """Smallest fraction of the compliance between the interfaces (of a single one: of the free body), and where."""
     whole = full(flexibility, interfaces)
     each = fractions(of_basis(flexibility, interfaces, vectors), whole)
     if len(interfaces) > 1:

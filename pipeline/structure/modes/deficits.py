@@ -1,7 +1,7 @@
 r"""What a reduced body cannot do, measured against the full model.
 
 *Compliance*: displacement of a frame under unit static loads while another frame is held (or nothing is, the load
-being balanced by the body's inertia), full model and share of the basis.
+being balanced by the body's inertia), full model and fraction of the basis.
 
 *Error bound*: a force :math:`f e^{i\omega t}` at a frame moves the free body by u, and the reduced one (with its rigid
 motion) by :math:`\hat u`. With :math:`D = K - \omega^2 M` and the residual :math:`r = f - D\hat u`, which the basis and
@@ -38,7 +38,7 @@ from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model
 from flexclear.pipeline.structure.modes import compliance, eigen, normal
 from flexclear.pipeline.structure.modes.statics import Flexibility
 
-#: frequencies of the error bound, as shares of the free body's first one
+#: frequencies of the error bound, as fractions of the free body's first one
 BOUND_AT = (0.0, 0.25, 0.5)
 #: a frequency this close to the full model's is resolved
 RESOLVED = 0.01

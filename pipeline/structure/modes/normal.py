@@ -44,7 +44,7 @@ def lowest(
 ) -> Normal:
     """The `count` lowest normal modes with the functionals `held`, shape (c, ndof), at zero.
 
-    Without held functionals: of the free body, its six rigid modes told by a gap and left out.
+    Without held functionals: of the free body, its six rigid modes identified by a gap and left out.
     rough: frequencies of a large model to six digits only, and not checked to be all there.
     Raises InputError when so many modes of so large a mesh are asked for, SolverError when some are missed.
     """

@@ -32,7 +32,7 @@ def _rank(model: Model) -> np.ndarray:
 
 
 def family(model: Model, vectors: np.ndarray) -> list[str]:
-    """For each vector the family with the largest share of its kinetic energy."""
+    """For each vector the family with the largest fraction of its kinetic energy."""
     families = model.families
     fraction = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
     totals = np.stack([fraction[families.member == k].sum(axis=0) for k in range(len(families.names))])

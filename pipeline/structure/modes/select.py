@@ -13,7 +13,7 @@ from flexclear.pipeline.structure.modes.eigen import EQUAL, frequency
 WHERE = "modes.count"
 #: rigid eigenvalues are zero up to rounding; elastic ones lie at least this factor above them
 RIGID_GAP = 1e4
-#: modes to compute beyond those wanted, to see where the last cluster ends
+#: modes to compute beyond those requested, to see where the last cluster ends
 MARGIN = 8
 
 
@@ -22,8 +22,8 @@ class ModeRequest:
     """What decides the number of coordinates; nothing at all means every one that the mesh has.
 
     count: elastic coordinates, static ones included.  up_to: highest normal frequency kept [Hz].
-    compliance: least share of the static compliance between the interfaces, in each direction.
-    mass: least share of the mass that moves with the basis, in each direction.
+    compliance: least fraction of the static compliance between the interfaces, in each direction.
+    mass: least fraction of the mass that moves with the basis, in each direction.
     """
 
     count: int | None = None
@@ -66,7 +66,7 @@ def request(count: int | None, available: int, static: int = 0) -> Request:
 
 
 def whole(values: np.ndarray, requested: Request) -> int:
-    """`wanted.normal`, or InputError when it would keep a part of a cluster of equal frequencies.
+    """`requested.normal`, or InputError when it would keep a part of a cluster of equal frequencies.
 
     values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are kept unless there are no more.
     """

@@ -39,7 +39,7 @@ def solve(
 
     mesh: what a kind of body built.  reference: a name of `pipeline.structure.modes.reference`.
     count: number of elastic coordinates, static ones included; None for a complete basis.
-    wanted: other ways to choose.
+    requested: other ways to choose.
     interfaces: named frames; None for the recipe's own list.  held, of: see `condition.Given`.
     Raises InputError for an unknown reference or frame, a count beyond the mesh, or one that cuts a cluster
     of equal frequencies (with the two nearest whole counts).

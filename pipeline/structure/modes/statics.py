@@ -22,7 +22,7 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.structure.fe.model import Model, own_dofs
 from flexclear.pipeline.structure.sparse.multifrontal import Factor, cholesky
 
-#: a pivot this small beside its diagonal entry is rounding: the body moves there without strain
+#: a pivot this small next to its diagonal entry is rounding: the body moves there without strain
 PIVOT = 1e-14
 
 

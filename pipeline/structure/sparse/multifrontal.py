@@ -45,7 +45,7 @@ class Factor:
         return sum(block.diagonal.size + block.under.size for block in self.blocks)
 
     def smallest_pivot(self, diagonal: np.ndarray) -> float:
-        """Least pivot as a share of the matrix' own `diagonal`, shape (n,); rounding when the matrix is singular."""
+        """Least pivot as a fraction of the matrix' own `diagonal`, shape (n,); rounding when the matrix is singular."""
         pivots = np.concatenate([np.diag(block.diagonal) for block in self.blocks]) ** 2
         return float((pivots / diagonal[self.order]).min())
 
@@ -113,7 +113,7 @@ def cholesky(matrix: sp.csr_array, positions: np.ndarray, tell: Tell = lambda fr
     """Factor of a symmetric positive definite matrix, shape (n, n).
 
     positions: where each row belongs [m], shape (n, 3); it decides the order of elimination only.
-    tell: is told the done share.  Raises SolverError when the matrix is not positive definite.
+    tell: receives the finished fraction.  Raises SolverError when the matrix is not positive definite.
     """
     tree = dissect(matrix, positions)
     blocks = []

@@ -2,7 +2,7 @@ r"""Stress in a cross section from its section forces: linear maps at fibres on 
 
 Axial stress is :math:`\sigma = N/A + M_y z/I_y - M_z y/I_z`. Shear stress of circles and tubes is the exact solution of
 St. Venant (torsion and flexure); that of rectangles the exact one of torsion and the parabola of flexure, which leaves
-out Poisson's share of the variation across the width.
+out Poisson's part of the variation across the width.
 
 Sources: Love, *A Treatise on the Mathematical Theory of Elasticity*, ch. XV (flexure of a hollow circular cylinder);
 Timoshenko & Goodier, *Theory of Elasticity*, sec. 109 (torsion of a rectangle).

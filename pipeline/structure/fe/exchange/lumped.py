@@ -5,7 +5,7 @@ A node's block of such a matrix, with the mass m, its centre c from the node and
 .. math:: \begin{bmatrix} m 1 & -m\tilde c \\ m\tilde c & J - m\tilde c\tilde c \end{bmatrix},
 
 and from it every integral over the volume follows (`fe.slices`). A consistent mass of nodes that turn does not tell
-them: it has forgotten where in the element each share of mass is.
+them: it has forgotten where in the element each fraction of mass is.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from flexclear.pipeline.core.algebra import skew
 from flexclear.pipeline.structure.fe.slices import Slices, carried
 
-#: entries that differ by less than this share of the mass (times a length, where they do) are the same
+#: entries that differ by less than this fraction of the mass (times a length, where they do) are the same
 ALIKE = 1e-9
 
 

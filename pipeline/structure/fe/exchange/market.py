@@ -51,15 +51,15 @@ def entries(path: Path, where: str, allowed: float) -> dict[str, Any]:
         count = rest[0] if rest else rows * columns
         machine.require_memory(COPIES * 24.0 * count, f"{where}: '{path.name}'", SMALLER, allowed)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a file without entries, which is told below
-            # one more than there should be: packed files have no end that their size tells
+            warnings.simplefilter("ignore")  # of a file without entries, which is reported below
+            # one more than there should be: packed files have no end that follows from their size
             held = np.loadtxt(file, comments="%", ndmin=2, max_rows=count + 1)
     matrix = _sparse(held, rows, columns, count, symmetric) if layout else _dense(held, rows, columns, symmetric)
     return {"shape": list(matrix.shape), "row": matrix.row, "column": matrix.col, "value": matrix.data}
 
 
 def read_unknowns(path: Path, count: int) -> dict[str, Any]:
-    """A table of unknowns, of so many rows at most and one more, which tells that it is longer.
+    """A table of unknowns, of so many rows at most and one more, which shows that it is longer.
 
     node: numbers.  component: texts.  position: shape (rows, 3).  Raises `apart.UnreadableError`.
     """

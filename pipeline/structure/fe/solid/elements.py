@@ -27,7 +27,7 @@ class Element:
     """One type of cell.
 
     cell: meshio's name.  local: places of its nodes in the reference cell, shape (nodes, 3).
-    faces: corner nodes of each face.  between: corners whose mean is near a node that is no corner, by node.
+    faces: corner nodes of each face.  between: corners whose mean is close to a node that is no corner, by node.
     stiffness_order, mass_order: degrees that the quadrature integrates; the mass of cells with curved sides is exact.
     """
 

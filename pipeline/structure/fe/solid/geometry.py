@@ -14,7 +14,7 @@ from flexclear.pipeline.structure.fe.solid.elasticity import check_cells
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.recipe import Block, Cylinder
 
-#: a node that is no corner lies this near to the mean of its corners, as a share of the cell's size
+#: a node that is no corner lies this near to the mean of its corners, as a fraction of the cell's size
 ASTRAY = 0.3
 
 

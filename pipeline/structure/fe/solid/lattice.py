@@ -6,9 +6,9 @@ import numpy as np
 
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, HEX_FACES, TET_EDGES, shape_functions
 
-#: half side of the square core of a cylinder's section, as a share of the radius
+#: half side of the square core of a cylinder's section, as a fraction of the radius
 CORE = 0.55
-#: outward bulge of the core's sides, as a share of its half side; evens out the angles at its corners
+#: outward bulge of the core's sides, as a fraction of its half side; evens out the angles at its corners
 BULGE = 0.12
 
 
@@ -78,7 +78,7 @@ def _core(s: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 
 def _shell(s: np.ndarray, t: np.ndarray, half: float, radius: float) -> np.ndarray:
-    """Between the core's side at +y (s = 0) and the quarter circle beside it (s = 1)."""
+    """Between the core's side at +y (s = 0) and the quarter circle next to it (s = 1)."""
     side = 2.0 * t - 1.0
     inner = half * _core(np.ones_like(side), side)
     angle = 0.25 * np.pi * side

@@ -1,7 +1,7 @@
 r"""Frames tied to nodes: which nodes, and how.
 
 Rigid (RBE2): the nodes follow the frame, :math:`u_n = u_p + \theta\times(x_n - p)`. Mean (RBE3): the frame follows the
-nodes, with weights w (the area that a node stands for) and :math:`c = \sum w x / \sum w`,
+nodes, with weights w (the area that a node represents) and :math:`c = \sum w x / \sum w`,
 
 .. math:: \theta = J^{-1}\sum w\,(x_n-c)\times u_n, \quad J = \sum w\,(|r|^2 1 - r r^T), \quad
           u_p = \sum w\,u_n/\sum w + \theta\times(p - c) .
@@ -22,7 +22,7 @@ from flexclear.pipeline.structure.fe.solid.elements import on_face
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry, boundary, boundary_nodes, face_nodes
 from flexclear.pipeline.structure.fe.solid.recipe import On
 
-#: default distance from a surface within which a node lies on it, as a share of the body's size
+#: default distance from a surface within which a node lies on it, as a fraction of the body's size
 TOLERANCE = 1e-6
 
 
