@@ -43,6 +43,7 @@ __all__ = [
     "report",
     "run",
     "sections",
+    "stability",
     "sweep",
 ]
 
@@ -103,13 +104,28 @@ def run(scene: Scene | str | Path) -> xr.Dataset:
     return _stages("run").run(_loaded(scene))
 
 
-def cost(scene: Scene | str | Path) -> xr.Dataset:
-    """Error against cost of a scene over integrators, tolerances, steps and models; cached point by point.
+def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models: bool = False) -> xr.Dataset:
+    """What accuracy costs: error against cost over integrators, tolerances and steps; cached point by point.
 
-    The quantities are those of the scene's `[accuracy]`, else the usual ones.  Raises FlexclearError.
+    The quantities are those of the scene's `[accuracy]`, else the usual ones.  budget: processor time that the runs may
+    take [s], or text such as "2min"; by default that of ``flexclear cost``.  models: also other meshes and mode sets.
+    In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
-    dataset, _ = _stages("cost").bring(_loaded(scene), _stages("run").open_workplace())
-    return dataset
+    result: xr.Dataset = _stages("cost").dataset(_loaded(scene), _stages("run").open_workplace(), budget, models)
+    return result
+
+
+def stability(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
+    """Whether the run of a scene is stable: value, limit, verdict and remedy over `check`.
+
+    Energy balance, closed loops, agreement with tighter runs and with another method, rejected and stiff steps,
+    singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost.  In a notebook
+    the dataset shows the answer first.  Raises FlexclearError.
+    """
+    result: xr.Dataset = _stages("answers").dataset(
+        "stability", _loaded(scene), _stages("run").open_workplace(), budget
+    )
+    return result
 
 
 def sweep(
@@ -132,8 +148,8 @@ def sweep(
     >>> import flexclear as fc
     >>> where = {"load.gravity.acceleration.1": [-9.81, -1.62]}  # on the earth, and on the moon
     >>> kept, short = ["bob.velocity.largest"], {"time.end": "0.2 s"}
-    >>> results = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
-    >>> results["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
+    >>> found = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
+    >>> found["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
     [1.954, 0.324]
     """
     given = {name: _plain(values) for name, values in vary.items()}
@@ -191,8 +207,8 @@ def frequencies(
     Arguments and errors as there.
 
     >>> import flexclear as fc
-    >>> modes = fc.frequencies("scenes/checks/oscillator.toml")
-    >>> round(modes["frequency"].item(), 4), round(modes["damping_ratio"].item(), 6)  # [Hz], [-]
+    >>> found = fc.frequencies("scenes/checks/oscillator.toml")
+    >>> round(found["frequency"].item(), 4), round(found["damping_ratio"].item(), 6)  # [Hz], [-]
     (1.5836, 0.1)
     """
     return _linear(scene, time, drives, moving=moving, vibrations=True)
@@ -215,12 +231,19 @@ def compare(
     return comparison.dataset()
 
 
-def effects(scene: Scene | str | Path) -> xr.Dataset:
+def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
     """What each effect of a scene does to each quantity, taken away and put in, alone and in pairs.
 
     Variables and meanings: `pipeline.post.effect_sizes`.  The quantities are those of `[view] watch`, else of
-    `[accuracy]`, else the usual ones.  Raises FlexclearError.
+    `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is taken away alone, the most
+    important ones first, with as many members as decide the change (`pipeline.post.matters`); a notebook shows the
+    answer first.  Raises FlexclearError.
     """
+    if budget is not None:
+        some: xr.Dataset = _stages("answers").dataset(
+            "matters", _loaded(scene), _stages("run").open_workplace(), budget
+        )
+        return some
     dataset: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").open_workplace())
     return dataset
 
@@ -240,9 +263,15 @@ def render(scene: Scene | str | Path) -> Path:
     return _stages("render").rendered(_loaded(scene))
 
 
-def report(scene: Scene | str | Path) -> Path:
-    """The page with everything about a scene, one file, brought up to date.  Raises FlexclearError."""
-    return _stages("own_report").make(_stages("run").graph(_loaded(scene)), _stages("run").open_workplace())
+def report(scene: Scene | str | Path, budget: str | float | None = None, *, answers: bool = True) -> Path:
+    """The page with everything about a scene, one file, brought up to date.
+
+    budget: of what accuracy costs, whether the run is stable and which effects matter, as of `stability`; answers:
+    whether these are there.  Raises FlexclearError.
+    """
+    seconds = _stages("answers").seconds(budget)
+    graph, where = _stages("run").graph(_loaded(scene)), _stages("run").open_workplace()
+    return _stages("own_report").make(graph, where, seconds=seconds, answers=answers)
 
 
 def open(scene: Scene | str | Path) -> xr.DataTree:

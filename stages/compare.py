@@ -92,9 +92,14 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
             "name several, or compare it with its ideal mechanism: --ideal",
         )
     graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(_labels(sides), sides, strict=True)}
-    check(workplace.bring([graph.simulate for graph in graphs.values()]))
+    made = workplace.bring([graph.simulate for graph in graphs.values()])
+    check(made)
     # their kernels are there now, so that these do not compile side by side what the first ones did
-    tight = {label: graph.tight for label, graph in graphs.items() if graph.has_tighter}
+    tight = {
+        label: graph.tighter(int(workplace.store.load(made.records[id(graph.simulate)]).attrs["evaluations"]))
+        for label, graph in graphs.items()
+        if graph.has_tighter
+    }
     outcome = workplace.bring(list(tight.values()))
     for failure in outcome.failures:
         workplace.monitor.say(f"no error can be determined: {failure.message}")

@@ -23,9 +23,9 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """The kept part of the run with ``cpu_repeat(repeat)`` of the integration and the other costs as attributes, the
     median time of the recording among them.
 
-    params: `simulate`, as of the simulate stage, and the `quantities` of the study.  inputs: bundles, and `kernels`,
-    the artifact of `stages.kernels`.  A run that the solver refuses leaves an empty dataset whose attribute `refused`
-    says why: that, too, is a result of the study.
+    params: `simulate`, as of the simulate stage, the `quantities` of the study, and whether the point is `brief`, as of
+    `dynamics.cost`.  inputs: bundles, and `kernels`, the artifact of `stages.kernels`.  A run that the solver refuses
+    leaves an empty dataset whose attribute `refused` says why: that, too, is a result of the study.
     """
     import numpy as np
     import xarray as xr
@@ -39,7 +39,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     reduced = bundles(inputs)
     warm(scene, reduced, progress)
     try:
-        cost = dynamics.cost(scene, reduced, progress)
+        cost = dynamics.cost(scene, reduced, progress, brief=params["brief"])
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     done = cost.run
@@ -71,7 +71,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     warm(scene, reduced, progress)
     try:
         done = dynamics.ensemble(scene, reduced, progress)
-        seconds = float(np.median(dynamics.cost(scene, reduced, silent).integration))
+        seconds = float(np.median(dynamics.cost(scene, reduced, silent, brief=True).integration))
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     recorded = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -35,6 +36,8 @@ ARTIFACTS |= {"run": "simulate", "fine-modes": "fine_modes"}
 TIGHTER, FINER = 1e-2, 4
 #: the tightest tolerance that makes a difference: beyond, rounding does
 TIGHTEST = 1e-13
+#: a comparison run may take so many times the evaluations of the run that it is compared with
+MOST = 10.0
 
 
 @dataclass(frozen=True)
@@ -220,9 +223,17 @@ class Graph:
     @cached_property
     def tight(self) -> Task:
         """The same run at a tighter tolerance, or of half the step where steps are fixed, to tell its error by."""
+        return self._tighter({})
+
+    def tighter(self, evaluations: int) -> Task:
+        """`tight` that may take MOST times so many evaluations, rounded up to a power of ten, which keys can share."""
+        most = 10 ** math.ceil(math.log10(MOST * max(evaluations, 1)))
+        return self._tighter({"evaluations": min(most, self.scene.solver.evaluations)})
+
+    def _tighter(self, limits: dict[str, float]) -> Task:
         solver = self.scene.solver
         finer = {"rtol": max(TIGHTER * solver.rtol, TIGHTEST)} if solver.step is None else {"step": 0.5 * solver.step}
-        change = {f"solver.{key}": value for key, value in finer.items()} | {"accuracy": None}
+        change = {f"solver.{key}": value for key, value in (finer | limits).items()} | {"accuracy": None}
         task = Graph(edited(self.scene, change), shown=False, recipe=self.recipe).simulate
         # progress and messages name it, else the scene would seem to be run twice
         how = "a tighter tolerance" if solver.step is None else "half the step"

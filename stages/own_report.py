@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import html
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.store import Record, publish
+from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.provenance import assumed
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.post.horizon import sentence
 from flexclear.stages import compare, s5_post
+from flexclear.stages.answers import Answer, Answers, said
 from flexclear.stages.graph import Graph
 from flexclear.stages.run import Workplace, check, in_file
+from flexclear.stages.workplace import FailedTasksError
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.post.overview.page import Part
 
 #: general figures, in this order: caption, and what a reader who does not see them reads
 FIGURES = {
@@ -57,11 +64,14 @@ PROVENANCE = {
 }
 
 
-def make(graph: Graph, workplace: Workplace, *, folder: bool = False) -> Path:
+def make(
+    graph: Graph, workplace: Workplace, *, folder: bool = False, seconds: float | None = None, answers: bool = True
+) -> Path:
     """Bring everything that the report of a scene shows up to date; returns the page.
 
     One file with all inside; or with `folder` a folder with the page and its pictures as files.  Without GL libraries
-    it has no film.  Raises FailedTasksError when the run itself cannot be made.
+    it has no film.  seconds, answers: budget of the three answers (`stages.answers`), and whether they are there.
+    Raises FailedTasksError when the run itself cannot be made.
     """
     scene = graph.scene
     compared = None
@@ -75,7 +85,8 @@ def make(graph: Graph, workplace: Workplace, *, folder: bool = False) -> Path:
     for failure in outcome.failures:
         workplace.monitor.say(f"not in the report: {failure.message}")
     run = workplace.store.load(outcome.records[id(graph.simulate)]) if id(graph.simulate) in outcome.records else None
-    text = _page(graph, workplace, outcome.records, compared, run)
+    result = _answers(Answers(scene, workplace, seconds), workplace) if answers and run is not None else {}
+    text = _page(graph, workplace, outcome.records, compared, run, result)
     return publish_page(workplace.store.root / f"runs/{scene.name}", "report", text, folder=folder)
 
 
@@ -91,13 +102,42 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
     return where / name / "index.html"
 
 
+def _answers(answers: Answers, workplace: Workplace) -> dict[str, Answer]:
+    """Those of the three answers that can be given, by name; why one cannot is said."""
+    result = {}
+    for name in ("accuracy", "stability", "matters"):
+        try:
+            answer = getattr(answers, name)
+        except (InputError, SolverError, FailedTasksError) as error:
+            workplace.monitor.say(f"not in the report: {name}: {error}")
+            continue
+        if answer is not None:
+            result[name] = answer
+    return result
+
+
+def _answered(scene: Scene, result: Mapping[str, Answer]) -> list[Part]:
+    """The three sections: each with a sentence that answers, a picture and a table."""
+    from flexclear.pipeline.post.overview.page import Part, media
+
+    parts = []
+    for name, answer in result.items():
+        words = said(name, answer, scene)
+        picture = answer.file(words.picture)
+        shown = "" if picture is None else media(words.picture, picture.read_bytes(), words.caption)
+        parts.append(Part(name, words.heading, f"<p>{html.escape(words.text)}</p>\n{shown}{words.table}"))
+    return parts
+
+
 def _page(
     graph: Graph,
     workplace: Workplace,
     records: Mapping[int, Record],
     compared: compare.Comparison | None,
     run: xr.Dataset | None,
+    answers: Mapping[str, Answer],
 ) -> bytes:
+    from flexclear.pipeline.post.matters import ideal_sentences
     from flexclear.pipeline.post.overview.answer import answer, by_weight, effects
     from flexclear.pipeline.post.overview.page import Part, downloads, listed, page
     from flexclear.pipeline.post.series import parameters
@@ -109,6 +149,7 @@ def _page(
     parts: list[Any] = [
         Part("film", "The mechanism moving", _moving(graph, workplace, records)),
         Part("run", "The run", _media(workplace, graph.overview, records, FIGURES)),
+        *_answered(scene, answers),
         *(compare.parts(compared) if compared is not None else []),
         Part("doubts", "Warnings", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("no.", "warning"))),
         Part("assumptions", "Assumptions, the most influential first", listed(assumptions, ("value", "assumption"))),
@@ -118,13 +159,18 @@ def _page(
             listed(effects(parameters(run)), ("effect", "in the scene")) if run is not None else "",
         ),
         Part("cost", "Computing cost", listed(_rows(attributes, COST), ("figure", "value"))),
-        Part("stability", "Stability and constraints", listed(_stability(run), ("figure", "value"))),
+        Part(
+            "stability",
+            "Stability and constraints",
+            "" if "stability" in answers else listed(_stability(run), ("figure", "value")),
+        ),
         Part("provenance", "Provenance", listed(_provenance(graph, workplace, records), ("item", "value"))),
         Part("downloads", "Downloads", downloads(_files(graph, compared))),
     ]
     dataset = None if compared is None else compared.dataset()
     lead = " ".join(scene.description.split()) or scene.name
-    return page(scene.title, lead, parts, answer(dataset, run, doubts))
+    changes = ideal_sentences(answers["matters"].dataset()) if "matters" in answers else []
+    return page(scene.title, lead, parts, answer(dataset, run, doubts, changes))
 
 
 def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:

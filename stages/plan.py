@@ -4,6 +4,7 @@ evidence."""
 from __future__ import annotations
 
 import argparse
+import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,9 +15,9 @@ from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.coupling import lessened
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import run, s4_watched, s8_plan
+from flexclear.stages import limit, run, s4_watched, s8_plan
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check, open_workplace
+from flexclear.stages.workplace import FailedTasksError, Workplace, check, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,15 +26,22 @@ if TYPE_CHECKING:
 
 #: how a planned scene's file is called, after its scene's
 SUFFIX = ".planned.toml"
-#: starts that `--verify` runs of scenes with contacts
-MEMBERS = 4
+#: starts that `--verify` runs of scenes with contacts: more of them until the verdict is decided or the budget used [s]
+MEMBERS, BUDGET = (4, 8, 16, 32), 60.0
+#: accuracies that are planned for a scene without `[accuracy]`, as fractions of each watched quantity's size
+LEVELS = ("10 %", "1 %", "0.1 %")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     run.scene_arguments(parser)
     parser.add_argument("--out", type=Path, metavar="FILE.toml", help="write the planned scene here, too (one scene)")
-    parser.add_argument("--verify", action="store_true", help="run the full scene and tell the plan's true error")
+    parser.add_argument(
+        "--verify", action="store_true", help="run the full scene and say what the plan's true error is"
+    )
+    parser.add_argument(
+        "--budget", metavar="TIME", default=f"{BUDGET:g}s", help=f"time for members that decide (default {BUDGET:g}s)"
+    )
 
 
 def command(options: argparse.Namespace) -> None:
@@ -44,16 +52,49 @@ def command(options: argparse.Namespace) -> None:
         run.check_target(options.out)
     workplace = open_workplace(options)
     missed = list[str]()
+    budget = limit.seconds(options.budget, "--budget")
     for graph in run.graphs(options.scenes, options.set):
+        if graph.scene.accuracy is None and not options.verify and options.out is None:
+            print(levels(graph.scene, workplace))
+            continue
         planned = bring(graph.scene, workplace)
         print(planned.text())
         if options.out is not None:
             publish(options.out, planned.file(options.out))
         if options.verify:
-            missed += verify(planned, workplace)
+            missed += verify(planned, workplace, budget)
         planned.tell()
     if missed:
         raise run.MissedAccuracyError("\n".join(missed))
+
+
+def levels(scene: Scene, workplace: Workplace) -> str:
+    """What three accuracies of all watched quantities call for, as a table.
+
+    Raises InputError for a scene without effects, or that watches nothing.
+    """
+    from flexclear.pipeline.post.plan import levels as shown
+    from flexclear.pipeline.post.plotting.table import as_markdown
+
+    plans: dict[str, xr.Dataset | str] = {}
+    for level in LEVELS:
+        try:
+            plans[level] = bring(asking(scene, level), workplace).dataset()
+        except (InputError, FailedTasksError) as error:
+            if not variants.effects(scene):
+                raise
+            plans[level] = str(error)
+    return as_markdown(shown(plans))
+
+
+def asking(scene: Scene, level: str) -> Scene:
+    """The scene with one accuracy of all its watched quantities, as a fraction of their sizes."""
+    chosen = {quantity.name: level for quantity in scene.watched()}
+    if not chosen:
+        raise InputError(str(scene.path or scene.name), "watches nothing", "name quantities in [view] watch")
+    asked = edited(scene, {"accuracy": chosen})
+    asked._name, asked._path = f"{scene.name} to {level.replace(' ', '')}", None
+    return asked
 
 
 def planned_scenes(requested: list[Graph], workplace: Workplace) -> list[Planned]:
@@ -202,51 +243,78 @@ def page(planned: Planned) -> bytes:
     return made(f"Plan: {planned.scene.title}", words(planned.dataset()), parts)
 
 
-def verify(planned: Planned, workplace: Workplace) -> list[str]:
-    """Run the full and the planned scene, print how much they differ, and return what was missed, in words."""
-    from flexclear.pipeline.post.plan import verified
+def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> list[str]:
+    """Run the full and the planned scene, print how much they differ, and return what was missed, in words.
+
+    budget: time for members that decide the verdicts [s].
+    """
+    from flexclear.pipeline.post.plan import MISSED, verdict, verified
     from flexclear.pipeline.post.plotting.table import as_markdown
 
-    compared = beside(planned, workplace)
+    compared = beside(planned, workplace, budget)
     print(as_markdown(verified(compared)))
     requested = planned.scene.accuracy
+    columns = ("quantity", "unit", "error", "chance", "wanted")
     over = [
         f"{planned.scene.name}: the plan misses {name}: {error:.3g} instead of {most:.3g} {unit}"
-        for name, unit, error, most in zip(
-            *(compared[key].values for key in ("quantity", "unit", "error", "wanted")), strict=True
-        )
-        if error > most
+        for name, unit, error, chance, most in zip(*(compared[key].values for key in columns), strict=True)
+        if verdict(error, chance, most) == MISSED
     ]
     return over if requested is None or not requested.allow_missed else []
 
 
-def beside(planned: Planned, workplace: Workplace) -> xr.Dataset:
-    """Distance of the planned run from the full one by quantity, each over members where it has contacts."""
+def beside(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> xr.Dataset:
+    """Distance of the planned run from the full one by quantity, each over members where it has contacts.
+
+    Members are added until every verdict is decided, as long as the next ones fit into the budget [s].
+    """
+    from flexclear.pipeline.post.plan import UNDECIDED, verdict
+
+    begun, last = time.monotonic(), 0.0
+    for members in MEMBERS:
+        round_begun = time.monotonic()
+        result = _compared(planned, workplace, members)
+        last = time.monotonic() - round_begun
+        open_ = [verdict(*values) == UNDECIDED for values in _columns(result)]
+        loose = planned.scene.contacts() or planned.scene.stop
+        if not any(open_) or not loose or time.monotonic() - begun + 2.0 * last > budget:
+            break
+    return result
+
+
+def _columns(result: xr.Dataset) -> list[tuple[float, float, float]]:
+    """Error, chance and what is requested, by quantity."""
+    columns = (result[key].values for key in ("error", "chance", "wanted"))
+    return [(float(e), float(c), float(w)) for e, c, w in zip(*columns, strict=True)]
+
+
+def _compared(results: Planned, workplace: Workplace, members: int) -> xr.Dataset:
+    """Distance of the planned run from the full one over so many members."""
     from flexclear.pipeline.core import effect_size
     from flexclear.pipeline.core.errors import SolverError
     from flexclear.pipeline.core.scene.requested_accuracy import parse
 
-    assert planned.scene.accuracy is not None
-    names = list(planned.scene.accuracy.quantities)
-    chosen = [parse(name, planned.scene.owners()) for name in names]
-    full = edited(planned.scene, {"accuracy": None})
-    tasks = [s4_watched.task(scene, chosen, MEMBERS) for scene in (full, planned.planned)]
+    assert results.scene.accuracy is not None
+    names = list(results.scene.accuracy.quantities)
+    chosen = [parse(name, results.scene.owners()) for name in names]
+    full = edited(results.scene, {"accuracy": None})
+    tasks = [s4_watched.task(scene, chosen, members) for scene in (full, results.planned)]
     outcome = workplace.bring(tasks)
     check(outcome)
     one, two = (
         s4_watched.point(workplace.store.load(outcome.records[id(task)]), scene, chosen)
-        for task, scene in zip(tasks, (full, planned.planned), strict=True)
+        for task, scene in zip(tasks, (full, results.planned), strict=True)
     )
     for point, what in ((one, "full"), (two, "planned")):
         if point.refused:
-            raise SolverError(f"{planned.scene.name}: the {what} run is refused: {point.refused}")
-    plan = planned.dataset()
-    apart = [effect_size.influence(two, one, q, MEMBERS) for q in chosen]
+            raise SolverError(f"{results.scene.name}: the {what} run is refused: {point.refused}")
+    plan = results.dataset()
+    apart = [effect_size.influence(two, one, q, members) for q in chosen]
     result = plan[["wanted"]].copy()
     for k, q in enumerate(chosen):
-        want = planned.scene.accuracy.quantities[q.name]
+        want = results.scene.accuracy.quantities[q.name]
         if want.relative is not None:  # what it is relative to is known now
             result["wanted"][k] = want.relative * effect_size.size(one, q)
     result["error"] = (("quantity",), [i.difference for i in apart])
     result["chance"] = (("quantity",), [i.uncertainty for i in apart])
-    return result.assign_attrs(full_evaluations=one.evaluations, planned_evaluations=two.evaluations)
+    return result.assign_attrs(full_evaluations=one.evaluations, planned_evaluations=two.evaluations, members=members)

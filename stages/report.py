@@ -21,6 +21,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--folder", action="store_true", help="a folder with the page and its pictures as files, not one file with all"
     )
+    parser.add_argument(
+        "--budget",
+        metavar="TIME",
+        help="processor time for the three answers about each scene, such as 10s, 2min or 1h; default: three times the "
+        "run's own",
+    )
+    parser.add_argument(
+        "--answers", choices=("all", "none"), default="all", help="none leaves the three answers out (default all)"
+    )
     common_arguments(parser)
 
 
@@ -30,10 +39,12 @@ def command(options: argparse.Namespace) -> None:
     if not options.scenes:
         print(near(make(workplace, folder=options.folder)))
         return
-    from flexclear.stages import own_report, run
+    from flexclear.stages import limit, own_report, run
 
+    seconds = None if options.budget is None else limit.seconds(options.budget, "--budget")
     for graph in run.graphs(options.scenes, options.set):
-        print(near(own_report.make(graph, workplace, folder=options.folder)))
+        answers = options.answers != "none"
+        print(near(own_report.make(graph, workplace, folder=options.folder, seconds=seconds, answers=answers)))
 
 
 def make(workplace: Workplace, *, folder: bool = False) -> Path:

@@ -16,6 +16,8 @@ EVIDENCE = {
     PILOT: "short runs with and without it",
     NONE: "not looked into",
 }
+#: why an effect is kept of which no run was made
+NOT_WORTH = "to leave it out would save no time worth the look"
 
 
 @dataclass(frozen=True)

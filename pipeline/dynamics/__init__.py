@@ -70,11 +70,13 @@ def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     return of(deliver(scene, compared, progress, suit(scene, bundles)))
 
 
-def cost(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *, checked: bool = True) -> Cost:
+def cost(
+    scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *, checked: bool = True, brief: bool = False
+) -> Cost:
     """One run, and what its integration and its recording cost each (`pipeline.dynamics.record.cost.measure`)."""
     from flexclear.pipeline.dynamics.record.cost import measure
 
-    return measure(scene, bundles, progress, checked=checked)
+    return measure(scene, bundles, progress, checked=checked, brief=brief)
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:

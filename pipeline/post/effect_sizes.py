@@ -207,6 +207,9 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")
+            least = min((bar.get_width() for bar in panel.patches if bar.get_width() > 0.0), default=0.0)
+            if least > 0.0:  # bars that begin near their ends would make small differences look large
+                panel.set_xlim(left=0.1 * least)
             if requested and np.isfinite(requested.get(chosen[k], np.nan)):
                 panel.axvline(requested[chosen[k]], color="#D55E00", lw=1.3, label="requested accuracy")
             low, high = panel.get_xlim()

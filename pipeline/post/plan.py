@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.decisions import EVIDENCE, Plan
+from flexclear.pipeline.core.decisions import EVIDENCE, NOT_WORTH, Plan
 from flexclear.pipeline.post.effect_sizes import written
 from flexclear.pipeline.post.plotting.table import Table
 
@@ -156,14 +156,14 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
 
 def words(planned: xr.Dataset) -> str:
     """The plan in a sentence or two, for a designer."""
-    remaining = [str(w) for w, k in zip(planned["words"].values, planned["kept"].values, strict=True) if k]
-    gone = [str(w) for w, k in zip(planned["words"].values, planned["kept"].values, strict=True) if not k]
+    needed, unseen, gone = _sorted(planned)
     asked = " and ".join(str(name) for name in planned["quantity"].values)
-    if not remaining:
+    if not needed and not unseen:
         return f"For {asked} as requested nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
-    if not gone:
-        return f"For {asked} as requested all effects are needed: {listed(remaining)}."
-    return f"For {asked} as requested {listed(remaining)} must be kept; {listed(gone)} may be left out."
+    left = f"{listed(gone)} may be left out" if gone else "nothing may be left out" if not unseen else ""
+    parts = [f"{listed(needed)} must be kept" if needed else "", left]
+    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} kept without a look" if unseen else ""]
+    return f"For {asked} as requested {'; '.join(filter(None, parts))}."
 
 
 def listed(names: list[str]) -> str:
@@ -178,9 +178,9 @@ def verified(planned: xr.Dataset) -> Table:
         unit = str(planned["unit"].values[k])
         error, chance = float(planned["error"][k]), float(planned["chance"][k])
         requested = float(planned["wanted"][k])
-        fraction = error / requested
-        verdict = "met" if fraction <= 1.0 else f"missed, {fraction:.2g} times"
-        rows.append((str(name), written(requested, 0.0, unit), written(error, chance, unit), verdict))
+        rows.append(
+            (str(name), written(requested, 0.0, unit), written(error, chance, unit), _verdict(planned.isel(quantity=k)))
+        )
     notes = [
         f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
         f"{int(planned.attrs['planned_evaluations']):,} as planned, of all members together.",
@@ -189,6 +189,62 @@ def verified(planned: xr.Dataset) -> Table:
     ]
     return Table(
         "The plan next to the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)
+    )
+
+
+MET, MISSED, UNDECIDED = "met", "missed", "not decided"
+
+
+def verdict(error: float, chance: float, requested: float) -> str:
+    """Met where error and chance together are below what is requested, missed where both are above, else not
+    decided."""
+    if error + chance <= requested:
+        return MET
+    return MISSED if error - chance > requested else UNDECIDED
+
+
+def _verdict(one: xr.Dataset) -> str:
+    """The verdict on one quantity, with what it would take where it is not decided."""
+    error, chance, requested = (float(one[name]) for name in ("error", "chance", "wanted"))
+    said = verdict(error, chance, requested)
+    if said == MISSED:
+        return f"missed, {error / requested:.2g} times"
+    if said == UNDECIDED and error < requested:
+        members = int(one.attrs["members"])
+        return f"not decided: {int(np.ceil(members * (chance / (requested - error)) ** 2))} members would"
+    return said
+
+
+def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
+    """What each accuracy calls for, by the accuracy in words; why there is no plan, where there is none."""
+    rows = list[tuple[str, ...]]()
+    for level, result in plans.items():
+        if isinstance(result, str):
+            rows.append((level, "–", "–", "–", "–", result.splitlines()[0]))
+            continue
+        text = json.loads(result.attrs["planned"])
+        needed, unseen, gone = _sorted(result)
+        modes = ", ".join(f"{count} of {body}" for body, count in text["modes"].items()) or "all"
+        method = f"{text['integrator']}, rtol {text['rtol']:.0e}"
+        rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
+    return Table(
+        "What accuracy calls for",
+        ("of each size", "needed", "kept without a look", "may be left out", "modes", "integrated by"),
+        tuple(rows),
+        (
+            "Each accuracy is that of all watched quantities; name one in [accuracy] to get its planned scene. "
+            "Kept without a look: leaving the effect out would save no time worth the runs that tell its size.",
+        ),
+    )
+
+
+def _sorted(result: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
+    """Effects in words: those that are needed, those that are kept without evidence, and those that may be left out."""
+    rows = list(zip(result["words"].values, result["kept"].values, result["reason"].values, strict=True))
+    return (
+        [str(w) for w, recorded, reason in rows if recorded and reason != NOT_WORTH],
+        [str(w) for w, recorded, reason in rows if recorded and reason == NOT_WORTH],
+        [str(w) for w, recorded, _ in rows if not recorded],
     )
 
 

@@ -30,6 +30,7 @@ from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.search import summed
 from flexclear.pipeline.dynamics.plan.tolerance import no_dearer
 from flexclear.pipeline.dynamics.run.run import Run, integrate
+from flexclear.pipeline.post.plan import verdict as judged
 from flexclear.stages import plan, s4_simulate, s4_watched, s8_plan
 from flexclear.stages.__main__ import main
 from flexclear.stages.graph import Graph
@@ -276,7 +277,7 @@ def test_the_planned_scene_is_a_file_that_runs_and_verifies(tmp_path: Path, caps
 
 def test_bad_plans_are_refused_in_words(tmp_path: Path, capsys: pytest.CaptureFixture, results: Path):
     path = write("pendulum", tmp_path)[0]
-    assert main(["plan", str(path), "-q", "--jobs", "1"]) == 2
+    assert main(["plan", str(path), "-q", "--jobs", "1", "--verify"]) == 2
     assert "asks for no accuracy" in capsys.readouterr().err
     path.write_text(path.read_text() + '\n[accuracy]\nnobody.position = "10 um"\n')
     assert main(["plan", str(path), "-q", "--jobs", "1"]) == 2
@@ -284,6 +285,22 @@ def test_bad_plans_are_refused_in_words(tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["run", str(path), "-q", "--verify"]) == 2
     assert "--planned" in capsys.readouterr().err
     assert not (results / "plan").exists()
+
+
+def test_without_a_requested_accuracy_three_levels_are_planned(tmp_path: Path, capsys: pytest.CaptureFixture):
+    path = write("pendulum", tmp_path)[0]
+    assert main(["plan", str(path), "-q", "--jobs", "1"]) == 0
+    said = capsys.readouterr().out
+    assert all(f"| {level}" in said for level in plan.LEVELS)
+    assert said.count("gravity") >= 3  # without it nothing swings
+
+
+@pytest.mark.parametrize(
+    "error, chance, wanted, verdict",
+    [(0.0, 0.5, 1.0, "met"), (0.6, 0.5, 1.0, "not decided"), (1.2, 0.5, 1.0, "not decided"), (1.6, 0.5, 1.0, "missed")],
+)
+def test_met_and_missed_are_said_only_where_error_and_chance_agree(error, chance, wanted, verdict):
+    assert judged(error, chance, wanted) == verdict
 
 
 def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Path, results: Path):

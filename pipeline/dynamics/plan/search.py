@@ -15,7 +15,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.decisions import BOUND, NONE, PILOT, RESPONSE, Mesh, Plan
+from flexclear.pipeline.core.decisions import BOUND, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
 from flexclear.pipeline.core.scene.requested_accuracy import KINDS, parse
@@ -264,7 +264,7 @@ def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -
         if effect.name in search.decisions:
             continue
         if dear:
-            search.decide(effect, True, NONE, "to leave it out would save no time worth the look")
+            search.decide(effect, True, NONE, NOT_WORTH)
             continue
         there, lost = search.pilots.point(gone), search.pilots.point([*gone, effect])
         apart = search.pilots.between(lost, there)

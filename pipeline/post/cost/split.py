@@ -31,6 +31,7 @@ def causes_of(
     there = [p for p in points if "refused" not in runs[p.key].attrs]
     asis = next((runs[p.key] for p in there if p.group == "sampling" and p.key == "as it is"), None)
     reference = next(runs[p.key] for p in there if p.group == "reference")
+    growth = 0.0 if asis is None else float(asis.attrs.get("growth", 0.0))
     until = believed(there, runs)
     size = quantities.scale(reference, quantity)
 
@@ -46,7 +47,7 @@ def causes_of(
         "beam theory": between(base, _model(model, runs, _other_theory)),
         "modal truncation": between(base, _model(model, runs, _most_modes)),
         "time integration": between(asis, reference),
-        "event location": _location(quantity, reference, located, size),
+        "event location": _location(quantity, reference, located, size, growth),
         "sampling of the output": _sampling(quantity, asis, there, runs, size),
         "ensemble spread": _spread(quantity, ensemble, size),
     }
@@ -89,13 +90,13 @@ def _other_theory(points: Sequence[Point]) -> Point | None:
     return next((p for p in points if p.factors["theory"] == "timoshenko"), None)
 
 
-def _location(quantity: Quantity, reference: xr.Dataset, located: float, size: float) -> float:
+def _location(quantity: Quantity, reference: xr.Dataset, located: float, size: float, growth: float) -> float:
     """Bound from the root finder's tolerance: a displacement of that size, grown as the perturbed run's does."""
     if "clearance" not in reference.attrs:
         return np.nan
     displacement = located * float(reference.attrs["clearance"])
     if quantity.kind == "velocity":
-        return float(reference.attrs.get("growth", 0.0)) * located
+        return growth * located
     if quantity.kind == "impact_times":
         speed = reference["event_approach_speed"].values[reference["event_kind"].values == "closing"]
         hard = speed[speed > quantities.IMPACT]

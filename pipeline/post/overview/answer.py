@@ -14,6 +14,7 @@ from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 from flexclear.pipeline.post.horizon import sentence
 from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
 from flexclear.pipeline.post.series import parameters
+from flexclear.pipeline.post.stability import ENERGY, largest_energy
 
 #: a difference is reported from none where it is so many times larger than both runs' own errors
 DISTINGUISHED = 2.0
@@ -21,18 +22,22 @@ DISTINGUISHED = 2.0
 SLIGHT = 0.01
 #: below this fraction, both runs' own errors included, there is none, as of a body that a drive leads
 NOTHING = 1e-6
-#: an energy that the ledger misses counts from this fraction of the largest energy on
-LEDGER = 1e-3
 NEITHER = "The scene has neither clearance nor flexible bodies"
 
 
-def answer(compared: xr.Dataset | None, run: xr.Dataset | None, doubts: Sequence[str]) -> str:
+def answer(
+    compared: xr.Dataset | None,
+    run: xr.Dataset | None,
+    doubts: Sequence[str],
+    changes: Sequence[str] = (),
+) -> str:
     """A list of sentences, as HTML.
 
-    compared: of `overview.comparison`, the ideal mechanism first and the scene last; None where there is none.
-    run: schema RUN of the scene.  doubts: warnings of the run.
+    compared: of `overview.comparison`, the ideal counterpart first and the scene last; None where there is none.
+    run: schema RUN of the scene.  doubts: warnings of the run.  changes: sentences of `post.matters` on what
+    differs from the ideal mechanism, which replace those that two runs alone allow.
     """
-    said = [] if compared is None else _effects(compared)
+    said = [] if compared is None else [*changes] or _effects(compared)
     if compared is None and run is not None:
         lacks = "Slots, planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
         said.append(f"{lacks}, so there is no idealised run to compare it with.")
@@ -102,14 +107,9 @@ def _horizon(run: xr.Dataset) -> list[str]:
 
 
 def _trust(run: xr.Dataset) -> list[str]:
-    energies = [
-        np.abs(run[n].values - run[n].values[0]).max()
-        for n in ("kinetic", "potential", "elastic", "drive_work", "load_work")
-        if n in run
-    ]
-    largest, missed = max(map(float, energies), default=0.0), float(np.abs(run["energy_error"].values).max())
+    largest, missed = largest_energy(run), float(np.abs(run["energy_error"].values).max())
     fraction = missed / largest if largest > 0.0 else 0.0
-    word = "<span class='good'>closes</span>" if fraction < LEDGER else "<span class='bad'>does not close</span>"
+    word = "<span class='good'>closes</span>" if fraction < ENERGY else "<span class='bad'>does not close</span>"
     return [
         f"The energy balance {word}: <span class='n'>{fraction:.1e}</span> of the largest energy is unaccounted for."
     ]
