@@ -35,10 +35,10 @@ def compiled(names: list[str], workplace: Workplace) -> list[str]:
     if names:
         return _all(graphs(names), workplace)
     with TemporaryDirectory() as folder:
-        apart = Workplace(
+        temporary = Workplace(
             Store(Path(folder) / "results"), workplace.sources, workplace.monitor, workplace.jobs, workplace.end
         )
-        return _all(graphs([str(new.write(kind, Path(folder) / kind)[0]) for kind in USUAL]), apart)
+        return _all(graphs([str(new.write(kind, Path(folder) / kind)[0]) for kind in USUAL]), temporary)
 
 
 def _all(requested: Sequence[Graph], workplace: Workplace) -> list[str]:

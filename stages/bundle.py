@@ -177,9 +177,9 @@ def _bytes(path: Path, files: Sequence[Path]) -> bytes:
     if path.suffix != ".toml":
         return content
     for other in files:
-        near = Path(os.path.relpath(other, path.parent)).as_posix()
+        relative = Path(os.path.relpath(other, path.parent)).as_posix()
         for text in _spellings(other):
-            content = content.replace(os.fsencode(text), near.encode())
+            content = content.replace(os.fsencode(text), relative.encode())
     return content
 
 

@@ -84,7 +84,7 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
 
     without: one of IDEAL, or None for the scenes alone.  Raises InputError for what cannot be compared.
     """
-    sides = [side for scene in scenes for side in (*twins(scene, without), scene)] if without else scenes
+    sides = [side for scene in scenes for side in (*ideal_scenes(scene, without), scene)] if without else scenes
     if len(sides) < 2:
         raise InputError(
             sides[0].name if sides else "compare",
@@ -111,17 +111,17 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
     return comparison
 
 
-def twins(scene: Scene, without: str) -> list[Scene]:
+def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
     """The scene without what `without` says, the most ideal one first; InputError when there is nothing to take."""
     sets = {"both": (tuple(EFFECTS),), "each": (tuple(EFFECTS), *((effect,) for effect in EFFECTS))}
     ideals: list[Scene] = []
     for effects in sets.get(without, ((without,),)):
         there = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
         if there or not ideals:
-            twin = ideal(scene, effects)
-            same = any(twin.model_dump() == other.model_dump() for other in ideals)
-            twin._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
-            ideals += [] if same else [twin]
+            other = ideal(scene, effects)
+            same = any(other.model_dump() == other.model_dump() for other in ideals)
+            other._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
+            ideals += [] if same else [other]
     return ideals
 
 

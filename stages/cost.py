@@ -19,7 +19,7 @@ from flexclear.stages import as_json, cost_design, cost_peers, kernels, limit, r
 from flexclear.stages.cost_peers import Track
 from flexclear.stages.graph import Graph
 from flexclear.stages.run import Workplace, bundles, check
-from flexclear.stages.workplace import near, open_workplace
+from flexclear.stages.workplace import open_workplace, relative
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -74,7 +74,7 @@ def command(options: argparse.Namespace) -> None:
     def first(folder: Path) -> None:
         if not options.json:
             text = (folder / PRINTED[0]).read_text(encoding="utf-8")
-            print(text, f"{near(folder)}: first answer; going on\n", sep="\n", flush=True)
+            print(text, f"{relative(folder)}: first answer; going on\n", sep="\n", flush=True)
 
     for graph in run.graphs(options.scenes, options.set):
         scene, others = graph.scene, peers.get(graph.scene.name, ())
@@ -151,7 +151,7 @@ class Study:
 
     @cached_property
     def _near(self) -> list[cost_design.Design]:
-        return cost_design.near(self.scene, self.setting)
+        return cost_design.neighbours(self.scene, self.setting)
 
     @cached_property
     def setting(self) -> cost_design.Setting:

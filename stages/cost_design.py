@@ -81,7 +81,7 @@ class Design:
         return known[at] * (at / solver.rtol) ** (1.0 / (order + 1.0))
 
 
-def near(scene: Scene, own: Setting) -> list[Design]:
+def neighbours(scene: Scene, own: Setting) -> list[Design]:
     """The scene as it is and its neighbourhood, what answers most first."""
     asis, denser = _sampling(scene, own)
     if own.step is not None:

@@ -41,7 +41,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     title = params["title"]
     said = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
     said += (f"Not run within the budget: {params['undone']}.",) if params["undone"] else ()
-    study = causes.beside(study, split)
+    study = causes.with_causes(study, split)
     result: dict[str, Any] = {"nc": study}
     result |= files("price", price.price_list(study, f"What accuracy costs: {title}", said))
     result |= files("quantities", price.by_quantity(study, f"What each quantity costs: {title}"))

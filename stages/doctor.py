@@ -177,10 +177,10 @@ def _self_test() -> tuple[str, bool]:
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8", newline="\n")
             # results and kernels have lines of their own
-            apart = {"FLEXCLEAR_RESULTS": folder, "FLEXCLEAR_KERNELS": str(Path(folder) / "kernels")}
+            environment = {"FLEXCLEAR_RESULTS": folder, "FLEXCLEAR_KERNELS": str(Path(folder) / "kernels")}
             done = subprocess.run(
                 [sys.executable, "-W", "ignore", "-c", RUN, str(Path(folder) / "fall.toml")],
-                env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": paths, **apart},
+                env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": paths, **environment},
                 capture_output=True,
                 encoding="utf-8",
                 errors="replace",

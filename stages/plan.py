@@ -195,7 +195,7 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities set."""
     decided = s8_plan.from_dataset(plan)
     bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
-    fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["apart"])
+    fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
     there = {name for names in owners.values() for name in names}
     watch = [q.name for q in scene.watched() if q.owner in there and (q.kind in _kinds(owners, q.owner))]
@@ -251,7 +251,7 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
     from flexclear.pipeline.post.plan import MISSED, verdict, verified
     from flexclear.pipeline.post.plotting.table import as_markdown
 
-    compared = beside(planned, workplace, budget)
+    compared = errors_of(planned, workplace, budget)
     print(as_markdown(verified(compared)))
     requested = planned.scene.accuracy
     columns = ("quantity", "unit", "error", "chance", "wanted")
@@ -263,7 +263,7 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
     return over if requested is None or not requested.allow_missed else []
 
 
-def beside(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> xr.Dataset:
+def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> xr.Dataset:
     """Distance of the planned run from the full one by quantity, each over members where it has contacts.
 
     Members are added until every verdict is decided, as long as the next ones fit into the budget [s].
@@ -309,12 +309,12 @@ def _compared(results: Planned, workplace: Workplace, members: int) -> xr.Datase
         if point.refused:
             raise SolverError(f"{results.scene.name}: the {what} run is refused: {point.refused}")
     plan = results.dataset()
-    apart = [effect_size.influence(two, one, q, members) for q in chosen]
+    difference = [effect_size.influence(two, one, q, members) for q in chosen]
     result = plan[["wanted"]].copy()
     for k, q in enumerate(chosen):
         want = results.scene.accuracy.quantities[q.name]
         if want.relative is not None:  # what it is relative to is known now
             result["wanted"][k] = want.relative * effect_size.size(one, q)
-    result["error"] = (("quantity",), [i.difference for i in apart])
-    result["chance"] = (("quantity",), [i.uncertainty for i in apart])
+    result["error"] = (("quantity",), [i.difference for i in difference])
+    result["chance"] = (("quantity",), [i.uncertainty for i in difference])
     return result.assign_attrs(full_evaluations=one.evaluations, planned_evaluations=two.evaluations, members=members)

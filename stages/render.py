@@ -12,7 +12,7 @@ from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
 from flexclear.stages.s6_render import FORMATS
-from flexclear.stages.workplace import Workplace, check, near, open_workplace
+from flexclear.stages.workplace import Workplace, check, open_workplace, relative
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
@@ -101,7 +101,7 @@ def _beside(graphs: list[Graph]) -> Task:
 def _tell(workplace: Workplace, folder: str, files: list[str]) -> None:
     shown = [name for name in sorted(files) if not name.endswith(".vtp")]
     rest = len(files) - len(shown)
-    print(f"{near(workplace.store.root / folder)}: {', '.join(shown)}{f' and {rest} files next to' if rest else ''}")
+    print(f"{relative(workplace.store.root / folder)}: {', '.join(shown)}{f' and {rest} more files' if rest else ''}")
 
 
 def rendered(scene: Scene, workplace: Workplace | None = None) -> Path:

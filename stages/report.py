@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 
 from flexclear.pipeline.post.render import gl
-from flexclear.stages.workplace import Workplace, check, common_arguments, near, open_workplace
+from flexclear.stages.workplace import Workplace, check, common_arguments, open_workplace, relative
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -37,14 +37,14 @@ def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
     workplace = open_workplace(options)
     if not options.scenes:
-        print(near(make(workplace, folder=options.folder)))
+        print(relative(make(workplace, folder=options.folder)))
         return
     from flexclear.stages import limit, own_report, run
 
     seconds = None if options.budget is None else limit.seconds(options.budget, "--budget")
     for graph in run.graphs(options.scenes, options.set):
         answers = options.answers != "none"
-        print(near(own_report.make(graph, workplace, folder=options.folder, seconds=seconds, answers=answers)))
+        print(relative(own_report.make(graph, workplace, folder=options.folder, seconds=seconds, answers=answers)))
 
 
 def make(workplace: Workplace, *, folder: bool = False) -> Path:

@@ -24,7 +24,7 @@ from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages import export, owner
 from flexclear.stages.graph import STAGES, Graph
 from flexclear.stages.s5_post import origins
-from flexclear.stages.workplace import Workplace, check, common_arguments, near, open_workplace
+from flexclear.stages.workplace import Workplace, check, common_arguments, open_workplace, relative
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -92,7 +92,7 @@ def print_files(folder: Path, files: Mapping[str, str]) -> None:
     """One line on what was written where, of those files that are there."""
     there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
     if there:
-        print(f"{near(folder)}: {', '.join(there)}")
+        print(f"{relative(folder)}: {', '.join(there)}")
 
 
 def joined(names: Sequence[str]) -> str:
@@ -168,7 +168,7 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
         if len(path.relative_to(folder).parts) <= 2 and not path.stem.endswith(PARTIAL)
     )
     if not files:
-        raise InputError(name, f"there are no results in {near(folder)}", f"flexclear run {name}")
+        raise InputError(name, f"there are no results in {relative(folder)}", f"flexclear run {name}")
     if _of_another_run(folder):
         files = [path for path in files if path != folder / "post.nc"]
     # read and closed: the garbage collector closes what stays open, inside of whatever NetCDF call runs then

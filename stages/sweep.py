@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
 from flexclear.stages import export, limit, run, sweep_large, sweep_plan
 from flexclear.stages.sweep_engine import Engine, Job, engine, now
-from flexclear.stages.workplace import Workplace, near, open_workplace, said_arguments
+from flexclear.stages.workplace import Workplace, open_workplace, relative, said_arguments
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -82,9 +82,9 @@ def width(asked: int | None) -> int:
 def read(path: Path) -> tuple[Sweep, Scene]:
     """A sweep file and its scene, which is searched for next to the file, then below scenes/."""
     sweep = load_sweep(path)
-    beside = path.parent / sweep.scene
+    own_path = path.parent / sweep.scene
     try:
-        scene_path = beside if is_file(beside) else run.find_scene(sweep.scene)
+        scene_path = own_path if is_file(own_path) else run.find_scene(sweep.scene)
     except InputError as error:
         raise InputError(f"{path} [scene]", f"'{sweep.scene}' {error.problem}", error.remedy) from None
     return sweep, load_scene(scene_path)
@@ -234,7 +234,7 @@ def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | N
 def summary(plan: sweep_plan.Plan, result: xr.Dataset, file: Path) -> Iterator[str]:
     """Points, refusals by their reason, and where the dataset is."""
     refused = [str(reason) for reason in result["reason"].values.ravel() if reason]
-    shown = [near(path) for path in (file, file.with_suffix(".png")) if path.exists()]
+    shown = [relative(path) for path in (file, file.with_suffix(".png")) if path.exists()]
     yield f"{plan.sweep.name}: {result['status'].size} points, {len(refused)} refused; {', '.join(shown)}"
     kinds: dict[str, list[str]] = {}
     for reason in refused:

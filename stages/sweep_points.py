@@ -96,15 +96,15 @@ def _abreast(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]], 
     """Points side by side, each in a thread, where that can be."""
     from flexclear.pipeline.core.workflow.cores import side_by_side
 
-    with runner.abreast(scene, len(points)) as crews:
+    with runner.abreast(scene, len(points)) as groups:
 
         def one(k: int, alive: Progress) -> Point:
-            if crews is None:
+            if groups is None:
                 return _point(runner, scene, points[k], own[k], alive=alive)
-            with crews.place() as where:
+            with groups.place() as where:
                 return _point(runner, scene, points[k], own[k], where, alive)
 
-        return side_by_side(one, len(points), lambda _: None, 1 if crews is None else crews.lanes)
+        return side_by_side(one, len(points), lambda _: None, 1 if groups is None else groups.lanes)
 
 
 def _point(

@@ -46,7 +46,7 @@ def said_arguments(parser: argparse.ArgumentParser) -> None:
     said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
 
 
-def near(path: Path) -> str:
+def relative(path: Path) -> str:
     """A path as seen from the current folder, where it lies below it."""
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
 

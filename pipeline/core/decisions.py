@@ -54,7 +54,7 @@ class Plan:
 
     modes: elastic coordinates of kept flexible bodies that need fewer than they have.
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
-    the plan has run.  runs: how many.  apart: places of parts that nothing couples to what is asked for.
+    the plan has run.  runs: how many.  uncoupled: names of parts that nothing couples to the requested quantities.
     meshes: finite elements of flexible bodies whose recipes tell them.  ledger_tolerance: of the planned run, where it
     is not the usual one.  dearer: in words, why it takes more evaluations than with the scene's own integrator.
     """
@@ -67,7 +67,7 @@ class Plan:
     modes: Mapping[str, int]
     evaluations: int
     runs: int
-    apart: tuple[str, ...] = ()
+    uncoupled: tuple[str, ...] = ()
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
     ledger_tolerance: float | None = None
     dearer: str = ""

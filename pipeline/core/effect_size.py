@@ -65,15 +65,15 @@ def chance(members: int) -> float:
     return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * RARE))
 
 
-def members_apart(scene: Scene) -> Scene:
+def with_members(scene: Scene) -> Scene:
     """The scene with members that start a hair apart: a thousandth of its least clearance, at least 1e-8 m.
 
     No start is known better; and members that are nearer to each other than the errors of a loose tolerance would make
     these look like influences.
     """
     clearances = [joint.clearance for joint in scene.contacts().values()]
-    apart = max(LEAST, FRACTION * min(clearances, default=0.0))
-    changed = scene.model_copy(update={"ensemble": Ensemble(perturbation=apart)})
+    perturbation = max(LEAST, FRACTION * min(clearances, default=0.0))
+    changed = scene.model_copy(update={"ensemble": Ensemble(perturbation=perturbation)})
     changed._name, changed._path = scene.name, scene.path
     return changed
 

@@ -87,9 +87,9 @@ def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
     import difflib  # here, since a right name needs none
 
     # the comparison takes the product of both lengths
-    near = difflib.get_close_matches(name, list(known), n=1) if len(name) <= LONGEST_NAME else []
-    if near:
-        return f"did you mean '{near[0]}'?"
+    matches = difflib.get_close_matches(name, list(known), n=1) if len(name) <= LONGEST_NAME else []
+    if matches:
+        return f"did you mean '{matches[0]}'?"
     names = sorted(known)
     more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
     return "known: " + ", ".join(names[:LISTED]) + more if names else "there are none"

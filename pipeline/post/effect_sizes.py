@@ -75,11 +75,11 @@ def assemble(
             bare, lost = points.get(ground, UNKNOWN), points[closed(effects, pair)]
             gained = points[every - closed_up(effects, pair)]
             alone = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
-            apart = i != j and one.within != other.name and other.within != one.name
+            independent = i != j and one.within != other.name and other.within != one.name
             for k, quantity in enumerate(chosen):
                 variables = {"dropped": _between(lost, full, quantity, members)}
                 variables["added"] = _between(gained, bare, quantity, members)
-                if apart:
+                if independent:
                     variables["interaction"] = _interaction(gained, alone, bare, quantity, members)
                 for name, value in variables.items():
                     data[name][i, j, k], data[f"{name}_uncertainty"][i, j, k] = value.difference, value.uncertainty

@@ -33,7 +33,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         "integrator": plan.integrator,
         "rtol": plan.rtol,
         **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
-        "apart": list(plan.apart),
+        "uncoupled": list(plan.uncoupled),
     }
     plan_dataset = xr.Dataset(
         {
@@ -117,8 +117,8 @@ def table(planned: xr.Dataset) -> Table:
         f"{name} keeps {count} of its modes, which do the same as all." for name, count in decided["modes"].items()
     ]
     notes += [_of_mesh(planned.sel(body=body), units) for body in planned["body"].values]
-    if decided["apart"]:
-        notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(decided['apart'])}.")
+    if decided["uncoupled"]:
+        notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(decided['uncoupled'])}.")
     if planned.attrs["dearer"]:
         notes.append(f"{planned.attrs['dearer']}.")
     notes.append(

@@ -75,13 +75,13 @@ def test_members_are_the_same_to_the_last_bit_however_many_are_evaluated_at_once
     monkeypatch.setattr(cores, "cores", lambda: 1)
     monkeypatch.setattr(specialised, "LANES", (lanes,))
     known, made = six(), list[int]()
-    proper = batched_evaluation.Crew
+    proper = batched_evaluation.LaneGroup
 
-    def noted(kept: bytes, code: batched_evaluation.Code, width: int) -> batched_evaluation.Crew:
+    def noted(kept: bytes, code: batched_evaluation.Code, width: int) -> batched_evaluation.LaneGroup:
         made.append(width)
         return proper(kept, code, width)
 
-    monkeypatch.setattr(batched_evaluation, "Crew", noted)
+    monkeypatch.setattr(batched_evaluation, "LaneGroup", noted)
     assert dynamics.ensemble(scene(members=6), {}, silent).identical(known)
     assert made == ([lanes] if stacks.supported() and not INTERPRETED else [])
 

@@ -283,7 +283,7 @@ def test_the_page_says_which_quantities_can_be_had_when_not_all_can():
 def test_the_page_says_how_far_it_holds_and_what_to_refine():
     found, *_ = study(horizon=0.5)
     fractions = {"slider.position": {"mesh": 1e-3, "time integration": 1e-6}, "pin.impact_times": {}}
-    split_up = causes.beside(found, fractions)
+    split_up = causes.with_causes(found, fractions)
     text = written(split_up, ("**Beyond the horizon: x**",))
     assert "holds up to t = 0.5 s of 1 s; beyond that nothing but the means of an ensemble, below" in text
     assert "more elements (mesh limits slider.position)" in text

@@ -49,13 +49,13 @@ def assert_same(found: Sequence[Point], known: Sequence[Point]) -> None:
 @pytest.fixture
 def evaluations_abreast(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many engines each crew lets step side by side."""
-    proper, made = batched_evaluation.Crew, list[int]()
+    proper, made = batched_evaluation.LaneGroup, list[int]()
 
-    def noted(kept: bytes, code: batched_evaluation.Code, lanes: int) -> batched_evaluation.Crew:
+    def noted(kept: bytes, code: batched_evaluation.Code, lanes: int) -> batched_evaluation.LaneGroup:
         made.append(lanes)
         return proper(kept, code, lanes)
 
-    monkeypatch.setattr(batched_evaluation, "Crew", noted)
+    monkeypatch.setattr(batched_evaluation, "LaneGroup", noted)
     return made
 
 

@@ -19,7 +19,7 @@ from flexclear.pipeline.core.workflow.task import Task
 
 def one(width: int = 1) -> tuple[int, int]:
     """Number of the process that does something for a crew of that width, and of the one that keeps its queue."""
-    with workers.crew(width) as crew:
+    with workers.team(width) as crew:
         return crew.pool.submit(os.getpid).result(), crew.server._process.pid
 
 
@@ -32,12 +32,12 @@ def alive(process: int) -> bool:
 
 
 def fail() -> None:
-    with pytest.raises(KeyError), workers.crew(1):
+    with pytest.raises(KeyError), workers.team(1):
         raise KeyError
 
 
 def stop() -> None:
-    with stopping.until(-1.0, "time is over"), workers.crew(1):
+    with stopping.until(-1.0, "time is over"), workers.team(1):
         assert stopping.requested()
 
 

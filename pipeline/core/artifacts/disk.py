@@ -93,14 +93,14 @@ def settle(made: Path, path: Path) -> str:
         except OSError as error:
             failed.append(error)
 
-    beside = Thread(target=write)
-    if not system.started(beside):
+    writer = Thread(target=write)
+    if not system.started(writer):
         write()
     try:
         digest = digest_of(made)
     finally:
-        if beside.ident is not None:
-            beside.join()
+        if writer.ident is not None:
+            writer.join()
     if failed:
         raise failed[0]
     system.replace(made, path)
@@ -152,8 +152,8 @@ def is_copy(source: Path, target: Path) -> bool:
         old, new = source.stat(), target.stat()
     except OSError:
         return False
-    apart = (old.st_dev, old.st_ino) != (new.st_dev, new.st_ino)
-    return apart and (old.st_size, old.st_mtime_ns) == (new.st_size, new.st_mtime_ns)
+    separate = (old.st_dev, old.st_ino) != (new.st_dev, new.st_ino)
+    return separate and (old.st_size, old.st_mtime_ns) == (new.st_size, new.st_mtime_ns)
 
 
 @contextlib.contextmanager

@@ -88,12 +88,12 @@ def _set_attribute(file: Any, name: str, value: Any) -> None:
 
 def _listed(data: LabelledArrays) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
     """The attribute `coordinates` of each array, and that of the file for those that no array has all dimensions of."""
-    beside = sorted(data.coords - data.sizes.keys())
-    attributes, left = dict[str, dict[str, str]](), set(beside)
+    additional = sorted(data.coords - data.sizes.keys())
+    attributes, left = dict[str, dict[str, str]](), set(additional)
     for name, array in data.variables.items():
-        if name in beside or name in array.dims:
+        if name in additional or name in array.dims:
             continue
-        own = [other for other in beside if set(data[other].dims) <= set(array.dims)]
+        own = [other for other in additional if set(data[other].dims) <= set(array.dims)]
         if own:
             attributes[name] = {_COORDINATES: " ".join(own)}
             left -= set(own)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.external_files import apart
+from flexclear.pipeline.core.external_files import isolated
 from flexclear.pipeline.core.workflow import file_dependencies
 
 #: what meshio keeps among the sets of cells of a Gmsh 4 file, but numbers of curves and points
@@ -48,8 +48,8 @@ class Mesh:
 
 
 def read(path: Path) -> Mesh:
-    """The mesh in a file.  Raises `apart.UnreadableError`, and as `apart.read` does."""
-    mesh = apart.read(parse, path)
+    """The mesh in a file.  Raises `isolated.UnreadableError`, and as `isolated.read` does."""
+    mesh = isolated.read(parse, path)
     cells = tuple(Block(**block) for block in mesh.pop("cells"))
     return Mesh(cells=cells, **mesh)
 

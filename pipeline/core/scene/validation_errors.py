@@ -81,10 +81,10 @@ def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputE
     keys, known, types = _place(model, error["loc"])
     message, remedy = EXPECTED.get(kind) or _reworded(error), None
     if kind == "extra_forbidden":
-        near = [key for key in known if key != keys[-1]]
+        candidates = [key for key in known if key != keys[-1]]
         if len(keys) == 1 and isinstance(value, dict):
-            near = [key for key in near if key not in ("title", "description", "source")]  # no tables
-        remedy = suggestion(str(keys[-1]), near)
+            candidates = [key for key in candidates if key not in ("title", "description", "source")]  # no tables
+        remedy = suggestion(str(keys[-1]), candidates)
     elif not keys and kind == "value_error" and (named := _NAMED.match(message)):
         keys, message = [named[1]], message[named.end() :]
     elif kind == "union_tag_not_found":
@@ -118,18 +118,18 @@ def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], lis
 
     pydantic puts the type by which it chose a part's model into the place; the file has no such key.
     """
-    keys, here, beside = list[Any](), [model], list[str]()
+    keys, here, known_keys = list[Any](), [model], list[str]()
     for key in loc:
         inner = [candidate for a in here for candidate in _inside(a, key)]
         if inner:
             keys.append(key)
-            beside, here = _keys(here), inner
+            known_keys, here = _keys(here), inner
         elif any(_chosen_by(a, key) for a in here):
             here = [a for a in here if _chosen_by(a, key)]
         elif any(_is_model(a) for a in here) and not str(key).startswith(VALIDATORS):
             keys.append(key)
-            beside, here = _keys(here), []
-    return keys, beside, [kind for a in here for kind in _types(a)]
+            known_keys, here = _keys(here), []
+    return keys, known_keys, [kind for a in here for kind in _types(a)]
 
 
 def _alternatives(annotation: Any) -> Iterator[Any]:

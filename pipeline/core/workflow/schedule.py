@@ -150,13 +150,13 @@ def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> Non
 def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
     """In worker processes."""
     running: dict[Future[Record | Failure], _Running] = {}
-    with workers.crew(width) as crew, stopping.heeded():
+    with workers.team(width) as team, stopping.heeded():
         while (plan.waiting or running) and not stopping.requested():
-            _submit(plan, running, crew.pool, width, (store, sources, crew.reports), monitor)
+            _submit(plan, running, team.pool, width, (store, sources, team.reports), monitor)
             _collect(plan, running, monitor)
-            _relay(crew.reports, monitor)
+            _relay(team.reports, monitor)
         if stopping.requested():
-            _end_in_good_order(plan, running, crew.bell, monitor)
+            _end_in_good_order(plan, running, team.bell, monitor)
 
 
 def _end_in_good_order(

@@ -68,7 +68,7 @@ def response(
     bundles: Mapping[str, xr.Dataset],
     chosen: Sequence[Quantity],
 ) -> Response:
-    """The response of flexible bodies to the ideal motion of their mechanism, the run of its rigid twin.
+    """The response of flexible bodies to the ideal motion of their mechanism, the run of its rigid version.
 
     bundles: the reduced bodies.
     """

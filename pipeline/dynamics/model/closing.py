@@ -158,7 +158,7 @@ def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> li
     return moved
 
 
-def apart(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputError | None:
+def far_apart(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputError | None:
     """What is wrong about joints whose frames are far from fitting, if some are."""
     for joint in joints:
         A, B = joint.frames(poses)

@@ -49,8 +49,8 @@ class Miss:
     @property
     def size(self) -> float:
         """How far apart the two are; angles that differ by whole turns are one."""
-        apart = self.now - self.value
-        return abs((apart + np.pi) % (2.0 * np.pi) - np.pi) if self.turning else abs(apart)
+        difference = self.now - self.value
+        return abs((difference + np.pi) % (2.0 * np.pi) - np.pi) if self.turning else abs(difference)
 
     def text(self) -> str:
         """What is given, and what the law says."""
@@ -101,11 +101,13 @@ def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Miss]:
     A, B = joint.frames(poses)
     relative, declared = A.inverse().of(B), joint_class(joint.edge.kind)
     now = declared.coordinates(relative.R, relative.p)
-    for (k, value), apart in zip(joint.values.items(), prescribed(joint.edge.kind, A, B, joint.values)[0], strict=True):
+    for (k, value), difference in zip(
+        joint.values.items(), prescribed(joint.edge.kind, A, B, joint.values)[0], strict=True
+    ):
         coordinate, drive = declared.COORDINATES[k], joint.edge.drives[k] if joint.edge.drives else None
         what = f"joint '{joint.name}'" if len(declared.COORDINATES) == 1 else f"'{joint.name}.{coordinate.name}'"
         # the angle nearest to the law's, where turns are counted
-        start = value + float(apart) if coordinate.turning else float(now[k])
+        start = value + float(difference) if coordinate.turning else float(now[k])
         named = joint.name if len(declared.COORDINATES) == 1 else f"{joint.name}.{coordinate.name}"
         path = f"[drive.{drive}.law]" if drive else f"[start.joint.{named}.position]"
         rule = f"the law of drive '{drive}'" if drive else "its own start"
@@ -119,10 +121,10 @@ def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str,
     requested = [None if name is None else laws[name].value(t) for name in edge.drives]
     if edge.vector:
         turn = rotation_vector_to_matrix(np.array(requested[3:6], dtype=float))
-        apart = float(rotation_between(matrix_to_quaternion(turn), matrix_to_quaternion(G.R)))
+        angle = float(rotation_between(matrix_to_quaternion(turn), matrix_to_quaternion(G.R)))
         drive, what = str(edge.drives[3]), f"the turn of '{edge.frame_b}'"
         path = f"[drive.{drive.partition('.')[0]}.rotation]"
-        yield Miss(drive, path, f"the law of drive '{drive}'", what, apart, 0.0, True, True)
+        yield Miss(drive, path, f"the law of drive '{drive}'", what, angle, 0.0, True, True)
     for k, (name, value) in enumerate(zip(edge.drives, requested, strict=True)):
         if name is None or value is None or (edge.vector and k >= 3):
             continue
@@ -180,13 +182,13 @@ def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
     corrections = []
     for i in sorted(given_links(mechanism) - {0}):
         before, after = mechanism.placed[i], now[i]
-        apart = float(np.linalg.norm(after.p - before.p)) / mechanism.length
+        distance = float(np.linalg.norm(after.p - before.p)) / mechanism.length
         turned = float(rotation_between(matrix_to_quaternion(before.R), matrix_to_quaternion(after.R)))
-        amounts = [f"moved by {apart * mechanism.length:.3g} m"] if apart > WRITTEN else []
+        amounts = [f"moved by {distance * mechanism.length:.3g} m"] if distance > WRITTEN else []
         amounts += [f"turned by {turned:.3g} rad ({np.degrees(turned):.3g} deg)"] if turned > WRITTEN else []
         if amounts:
             corrections.append(
-                (apart + turned, f"{', '.join(mechanism.links[i].group.places)} {' and '.join(amounts)}")
+                (distance + turned, f"{', '.join(mechanism.links[i].group.places)} {' and '.join(amounts)}")
             )
     if not corrections:
         return []

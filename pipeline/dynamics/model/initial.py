@@ -163,18 +163,18 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
     given = _given(requested)
     limit = WRITTEN * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
     for name, row in zip(requested, given, strict=True):
-        apart = np.abs(centre_of(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
-        if np.nanmax(apart / unit) > limit:
-            turning, moving = np.fmax.reduce(apart.reshape(2, 3), axis=1, initial=0.0)
+        change = np.abs(centre_of(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
+        if np.nanmax(change / unit) > limit:
+            turning, moving = np.fmax.reduce(change.reshape(2, 3), axis=1, initial=0.0)
             changes.append(
                 f"the start velocities given for {name} were mended so that joints and drives allow them: by up to "
                 f"{moving:.3g} m/s and {turning:.3g} rad/s"
             )
     for rate in given_rates(model):
-        apart = abs(rate.of(sites, y[model.speeds]) - rate.requested)
-        if apart > WRITTEN * (_slow(model) * rate.size + abs(rate.requested)):
+        change = abs(rate.of(sites, y[model.speeds]) - rate.requested)
+        if change > WRITTEN * (_slow(model) * rate.size + abs(rate.requested)):
             changes.append(
-                f"the start velocity {rate.place} was mended so that joints and drives allow it: by {apart:.3g}"
+                f"the start velocity {rate.place} was mended so that joints and drives allow it: by {change:.3g}"
             )
     return changes
 
@@ -187,18 +187,18 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
     changes = []
     for i, q in model.mechanism.deformation.items():
         mine, name = model.numbering.modal_positions[i], model.links[i].flexible
-        apart, largest = float(np.max(np.abs(z[mine] - y[mine]))), float(np.max(np.abs(q), initial=0.0))
+        change, largest = float(np.max(np.abs(z[mine] - y[mine]))), float(np.max(np.abs(q), initial=0.0))
         unit = model.length * model.links[i].mass ** 0.5
-        if apart > max(WRITTEN * unit, WRONG * largest):
+        if change > max(WRITTEN * unit, WRONG * largest):
             raise InputError(
                 f"[start.modal.{name}.coordinate]",
-                f"joints and drives do not allow this deformation: they change it by {apart:.3g} m",
+                f"joints and drives do not allow this deformation: they change it by {change:.3g} m",
                 "give another one, or replace a joint by one that leaves more motion",
             )
-        if apart > WRITTEN * max(largest, WRITTEN * unit):
+        if change > WRITTEN * max(largest, WRITTEN * unit):
             changes.append(
-                f"the deformation given for {name} was mended so that joints and drives allow it: by up to {apart:.3g} "
-                "m"
+                f"the deformation given for {name} was mended so that joints and drives allow it: "
+                f"by up to {change:.3g} m"
             )
     return changes
 

@@ -87,8 +87,8 @@ def chosen(
     if hints and distances[1] - distances[0] > SAME:
         return ""
     units = {(j.name, k): c for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
-    apart = {key: abs(first.coordinates[key] - candidates[1].coordinates[key]) for key in first.coordinates}
-    name, k = max(apart, key=lambda key: apart[key])
+    differences = {key: abs(first.coordinates[key] - candidates[1].coordinates[key]) for key in first.coordinates}
+    name, k = max(differences, key=lambda key: differences[key])
     coordinate, several = units[name, k], len([key for key in units if key[0] == name]) > 1
     label = f"{name}.{coordinate.name}" if several else name
     values = ", ".join(f"{one.coordinates[name, k]:.4g}" for one in candidates[1:])
@@ -155,11 +155,11 @@ def _coordinates(joints: Sequence[Constraint], poses: Sequence[Placement]) -> di
 def _distance(mechanism: Mechanism, joints: Sequence[Constraint], one: Hints, other: Hints) -> float:
     """Largest difference of coordinates that both have, in radians or fractions of the mechanism's size."""
     turning = {(j.name, k): c.turning for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
-    apart = [0.0]
+    differences = [0.0]
     for key in one.keys() & other.keys():
         way = one[key] - other[key]
-        apart.append(abs((way + np.pi) % (2.0 * np.pi) - np.pi) if turning[key] else abs(way) / mechanism.length)
-    return max(apart)
+        differences.append(abs((way + np.pi) % (2.0 * np.pi) - np.pi) if turning[key] else abs(way) / mechanism.length)
+    return max(differences)
 
 
 def _isolated(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> bool:

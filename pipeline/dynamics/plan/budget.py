@@ -83,15 +83,15 @@ class Search:
         small: bool,
         why: str,
         most: Mapping[str, float],
-        apart: Mapping[str, Influence],
+        effect_sizes: Mapping[str, Influence],
         besides: str = "",
     ) -> None:
         """Write down what short runs say. why: it may go, if it is small.  most, apart: what it does there.
 
         besides: said before the reason why it is kept.
         """
-        difference = {name: influence.difference for name, influence in apart.items()}
-        uncertainty = {name: influence.uncertainty for name, influence in apart.items()}
+        difference = {name: influence.difference for name, influence in effect_sizes.items()}
+        uncertainty = {name: influence.uncertainty for name, influence in effect_sizes.items()}
         self.decide(
             effect,
             not small,
@@ -102,11 +102,13 @@ class Search:
         )
 
 
-def with_doubt(search: Search, apart: Mapping[str, Influence], soft: bool, more: float = 0.0) -> dict[str, Influence]:
+def with_doubt(
+    search: Search, effect_sizes: Mapping[str, Influence], soft: bool, more: float = 0.0
+) -> dict[str, Influence]:
     """With what pilots may be wrong by, what flexible bodies may change of the impacts, and a fraction `more`."""
     kinds = {q.name: q.kind for q in search.pilots.chosen}
     doubled = {}
-    for name, i in apart.items():
+    for name, i in effect_sizes.items():
         fraction = more + OF_PILOT + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
         doubled[name] = Influence(i.difference, i.uncertainty + fraction * i.difference)
     return doubled

@@ -44,14 +44,14 @@ def bent(search: Search, soft: Sequence[Effect]) -> None:
     fraction = pilots.part(gone)
     whole = pilots.must_run(gone, fraction)
     rigid = [*soft, *(e for e in every if e.within in {s.name for s in soft})]
-    apart = pilots.between(pilots.point([*gone, *rigid], fraction=fraction), whole)
-    apart = with_doubt(search, apart, False, _more(fraction))
-    most = {name: i.most for name, i in apart.items()}
+    effect_sizes = pilots.between(pilots.point([*gone, *rigid], fraction=fraction), whole)
+    effect_sizes = with_doubt(search, effect_sizes, False, _more(fraction))
+    most = {name: i.most for name, i in effect_sizes.items()}
     small = search.fits(most)
     if small:
         search.spend(most)
     for effect in soft:
-        search.judge(effect, small, "with or without bending the loose joints do the same", most, apart)
+        search.judge(effect, small, "with or without bending the loose joints do the same", most, effect_sizes)
 
 
 def quickest(search: Search, usual: str) -> Chosen:
@@ -67,22 +67,22 @@ def quickest(search: Search, usual: str) -> Chosen:
         for rtol in sorted({QUICK_RTOL, loose}, reverse=True):
             if pilots.work > MOST_WORK:
                 return unknown
-            apart = pilots.between(_tried(search, level, fraction, rtol, whole), whole)
-            most = {name: (1.0 + _more(fraction)) * i.difference for name, i in apart.items()}
+            effect_sizes = pilots.between(_tried(search, level, fraction, rtol, whole), whole)
+            most = {name: (1.0 + _more(fraction)) * i.difference for name, i in effect_sizes.items()}
             if search.fits(most):
                 search.spend(most)
                 if level is not None:
-                    _tell(search, level, apart)
+                    _tell(search, level, effect_sizes)
                 return Chosen(QUICK, rtol, most, level, LEDGER)
-            if level is not None and _by_modes(search, most, apart):
+            if level is not None and _by_modes(search, most, effect_sizes):
                 break
     return unknown
 
 
-def _by_modes(search: Search, most: Mapping[str, float], apart: Mapping[str, Influence]) -> bool:
+def _by_modes(search: Search, most: Mapping[str, float], effect_sizes: Mapping[str, Influence]) -> bool:
     """Whether a difference is rather due to the modes than to the tolerance: it is large, or members part anyway."""
     return any(
-        NEAR * BUDGET * requested < most[name] < np.inf or apart[name].uncertainty > requested
+        NEAR * BUDGET * requested < most[name] < np.inf or effect_sizes[name].uncertainty > requested
         for name, requested in search.requested.items()
     )
 
@@ -117,9 +117,9 @@ def _tried(search: Search, level: int | None, fraction: float, rtol: float, whol
     return pilots.point(search.gone, level=level, fraction=fraction, integrator=QUICK, rtol=rtol, **limits)
 
 
-def _tell(search: Search, level: int, apart: dict[str, Influence]) -> None:
+def _tell(search: Search, level: int, effect_sizes: dict[str, Influence]) -> None:
     """Say of bodies with fewer modes why the others go."""
-    beyond = [name for name, i in apart.items() if i.uncertainty > search.requested[name]]
+    beyond = [name for name, i in effect_sizes.items() if i.uncertainty > search.requested[name]]
     loose = next((d.effect.owner for d in search.decisions.values() if d.kept and d.effect.kind == CLEARANCE), "")
     for body, count in search.pilots.modes(level, search.pilots.bundles).items():
         decision = search.decisions.get(f"body.{body}.modes")

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.effect_size import Influence, influence, members_apart, recorded
+from flexclear.pipeline.core.effect_size import Influence, influence, recorded, with_members
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.load import edited
@@ -139,7 +139,7 @@ class Pilots:
         if key not in self.points:
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
             starts = members if scene.contacts() or scene.stop else 0
-            measured = Runner(mine, recorded(scene.owners(), self.chosen), starts).run(members_apart(scene))
+            measured = Runner(mine, recorded(scene.owners(), self.chosen), starts).run(with_members(scene))
             self.points[key] = measured
             self.evaluations += measured.evaluations
             self.work += measured.evaluations * self._variables(mine)

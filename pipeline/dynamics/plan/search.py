@@ -60,8 +60,8 @@ def plan(
     """
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
-    apart = uncoupled(scene, {q.owner.partition(".")[0] for q in quantities})
-    bare = lessened(_plain(scene), apart)
+    uncoupled_parts = uncoupled(scene, {q.owner.partition(".")[0] for q in quantities})
+    bare = lessened(_plain(scene), uncoupled_parts)
     mine, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
     pilots = Pilots(bare, mine, less, filled, quantities, progress)
     _ = pilots.extent  # a scene that cannot be built is refused before anything is run
@@ -79,7 +79,7 @@ def plan(
     _flexibilities(search, soft, loose, inner, rigid)
     _confirm(search, soft, inner)
     _others(search, [e for e in every if e.kind not in (CLEARANCE, FLEXIBILITY)], every)
-    return _finished(search, effects(scene), apart, meshes)
+    return _finished(search, effects(scene), uncoupled_parts, meshes)
 
 
 def _plain(scene: Scene) -> Scene:
@@ -119,12 +119,12 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
     for effect in sorted(free, key=lambda e: max(reach[e.name].values(), default=np.inf)):
         trial = [*dropped, effect]
         variant = _rigid_without(search, trial, soft)
-        apart = with_doubt(search, search.pilots.between(variant, there), bool(soft))
-        most = {name: i.most for name, i in apart.items()}
+        effect_sizes = with_doubt(search, search.pilots.between(variant, there), bool(soft))
+        most = {name: i.most for name, i in effect_sizes.items()}
         for name, bound in summed([reach[e.name] for e in trial], search.requested).items():
             most[name] = min(most[name], bound)
         small = search.fits(most)
-        search.judge(effect, small, "its impacts change what is asked for by less", most, apart)
+        search.judge(effect, small, "its impacts change what is asked for by less", most, effect_sizes)
         if small:
             dropped = trial
             left = most
@@ -144,15 +144,15 @@ def _interactions(search: Search, soft: Sequence[Effect], inner: Sequence[Effect
     fraction = pilots.part(())
     names = {effect.name for effect in dropped}
     lacking = pilots.point([*dropped, *(e for e in inner if e.within in names)], fraction=fraction)
-    apart = with_doubt(
+    effect_sizes = with_doubt(
         search, pilots.between(lacking, pilots.point((), fraction=fraction)), False, 0.0 if fraction == 1.0 else WHOLE
     )
-    most = {name: i.most for name, i in apart.items()}
+    most = {name: i.most for name, i in effect_sizes.items()}
     if all(most[name] <= BUDGET * requested for name, requested in search.requested.items()):
         return
     search.used = {}
     for effect in dropped:
-        search.judge(effect, False, "", most, apart)
+        search.judge(effect, False, "", most, effect_sizes)
 
 
 def _rigid_without(search: Search, trial: Sequence[Effect], soft: Sequence[Effect]) -> Point:
@@ -199,10 +199,10 @@ def _flexibilities(
         trial = [*dropped, effect]
         names = {e.name for e in trial}
         variant = search.pilots.point([*gone, *trial, *(e for e in inner if e.within in names)])
-        apart = with_doubt(search, search.pilots.between(variant, there), False)
-        most = {name: i.most for name, i in apart.items()}
+        effect_sizes = with_doubt(search, search.pilots.between(variant, there), False)
+        most = {name: i.most for name, i in effect_sizes.items()}
         small = search.fits(most)
-        search.judge(effect, small, "its deformation changes what is asked for by less", most, apart)
+        search.judge(effect, small, "its deformation changes what is asked for by less", most, effect_sizes)
         if small:
             dropped, left = trial, most
     if dropped:
@@ -240,12 +240,12 @@ def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) ->
     fraction = min(1.0, MEMBERS * pilots.part(()))
     names = {effect.name for effect in search.gone}
     lacking = pilots.point([*search.gone, *(e for e in inner if e.within in names)], fraction=fraction)
-    apart = pilots.between(lacking, pilots.must_run((), fraction, 0))
-    most = {name: (1.0 if fraction == 1.0 else 1.0 + WHOLE) * i.difference for name, i in apart.items()}
+    effect_sizes = pilots.between(lacking, pilots.must_run((), fraction, 0))
+    most = {name: (1.0 if fraction == 1.0 else 1.0 + WHOLE) * i.difference for name, i in effect_sizes.items()}
     if all(most[name] <= requested for name, requested in search.requested.items()):
         return
     for effect in dropped:
-        search.judge(effect, False, "", most, apart)
+        search.judge(effect, False, "", most, effect_sizes)
 
 
 def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -> None:
@@ -267,17 +267,17 @@ def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -
             search.decide(effect, True, NONE, NOT_WORTH)
             continue
         there, lost = search.pilots.point(gone), search.pilots.point([*gone, effect])
-        apart = search.pilots.between(lost, there)
-        most = {name: i.most for name, i in apart.items()}
+        effect_sizes = search.pilots.between(lost, there)
+        most = {name: i.most for name, i in effect_sizes.items()}
         small = search.fits(most)
         free = effect.kind in FREE or bool(effect.within)  # friction of a contact goes along with it
         if small and free and not search.fits(most, NEGLIGIBLE + max(search.used.values(), default=0.0)):
-            search.judge(effect, False, "", most, apart, "it costs no time, and ")
+            search.judge(effect, False, "", most, effect_sizes, "it costs no time, and ")
             continue
         if small:
             search.spend(most)
             gone.append(effect)
-        search.judge(effect, small, "what it does is small", most, apart)
+        search.judge(effect, small, "what it does is small", most, effect_sizes)
 
 
 def _chosen(search: Search) -> Chosen:
@@ -289,8 +289,8 @@ def _chosen(search: Search) -> Chosen:
     for level in range(len(pilots.fewer)):
         if not pilots.modes(level, scene.flexible()):
             continue
-        apart = with_doubt(search, pilots.between(pilots.point(gone, level=level), pilots.point(gone)), False)
-        most = {name: i.most for name, i in apart.items()}
+        effect_sizes = with_doubt(search, pilots.between(pilots.point(gone, level=level), pilots.point(gone)), False)
+        most = {name: i.most for name, i in effect_sizes.items()}
         if search.fits(most):
             search.spend(most)
             return smooth(pilots, gone, search.requested, level)
@@ -312,7 +312,7 @@ def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dic
 def _finished(
     search: Search,
     every: Sequence[Effect],
-    apart: tuple[str, ...],
+    uncoupled_parts: tuple[str, ...],
     meshes: Mapping[str, tuple[int, xr.Dataset]],
 ) -> Plan:
     order = {effect.name: k for k, effect in enumerate(every)}
@@ -320,7 +320,7 @@ def _finished(
     left = search.pilots.variant(search.gone).flexible()
     modes = {} if chosen.level is None else search.pilots.modes(chosen.level, left)
     for effect in every:
-        if ".".join(effect.name.split(".")[:2]) in apart:
+        if ".".join(effect.name.split(".")[:2]) in uncoupled_parts:
             search.decide(effect, False, BOUND, UNCOUPLED, dict.fromkeys(search.requested, 0.0))
     decisions = sorted(search.decisions.values(), key=lambda d: order[d.effect.name])
     pilots = search.pilots
@@ -333,7 +333,7 @@ def _finished(
         modes,
         pilots.evaluations,
         len(pilots.points),
-        apart,
+        uncoupled_parts,
         _meshes(search, meshes),
         chosen.ledger_tolerance,
         chosen.dearer,

@@ -64,15 +64,19 @@ def no_dearer(search: Search, chosen: Chosen) -> Chosen:
     mine = pilots.point(gone, level=chosen.level, fraction=fraction, integrator=own[0], rtol=own[1], **most)
     if mine.refused or (not there.refused and mine.evaluations >= there.evaluations):
         return chosen
-    apart = {name: i.difference for name, i in pilots.between(mine, there).items()}
+    differences = {name: i.difference for name, i in pilots.between(mine, there).items()}
     known = all(np.isfinite(error) for error in chosen.error.values())
-    if known and not there.refused and not (search.fits(apart) if loose else _within(apart, search.requested)):
+    if (
+        known
+        and not there.refused
+        and not (search.fits(differences) if loose else _within(differences, search.requested))
+    ):
         return replace(
             chosen,
             dearer=f"With the scene's own {own[0]} at {own[1]:.0e} the planned run would take {mine.evaluations:,} "
             f"evaluations instead of {there.evaluations:,}, and err by more than the plan allows",
         )
-    return Chosen(*own, apart if known else chosen.error, chosen.level)
+    return Chosen(*own, differences if known else chosen.error, chosen.level)
 
 
 def _within(error: Mapping[str, float], requested: Mapping[str, float]) -> bool:
@@ -93,8 +97,8 @@ def _loosest(
     error = dict.fromkeys(requested, np.nan)
     tried = [rtol for rtol in tried if rtol > reference]
     for rtol in tried:
-        apart = pilots.between(pilots.point(gone, level=level, integrator=integrator, rtol=rtol), there)
-        error = {name: i.difference for name, i in apart.items()}
+        effect_sizes = pilots.between(pilots.point(gone, level=level, integrator=integrator, rtol=rtol), there)
+        error = {name: i.difference for name, i in effect_sizes.items()}
         if _within(error, requested):
             return Chosen(integrator, rtol, error, level)
     if not tried:

@@ -65,16 +65,16 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
     def done(k: int) -> None:
         progress(k / requested.members, f"member {k} of {requested.members}")
 
-    with abreast(engine, requested.members, width(), progress) as crews:
-        if crews is None:
+    with abreast(engine, requested.members, width(), progress) as groups:
+        if groups is None:
             runs = side_by_side(alone, requested.members, done)
         else:
 
             def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
-                with crews.place() as lane:
+                with groups.place() as lane:
                     return alone(k, alive, lane)
 
-            runs = side_by_side(member, requested.members, done, crews.lanes)
+            runs = side_by_side(member, requested.members, done, groups.lanes)
     members, reasons = [one for one, _ in runs], [switched for _, switched in runs if switched]
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(requested.members))
     facts = {"switched": f"{len(reasons)} of {requested.members} members, the first {reasons[0]}"} if reasons else {}

@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.alike import engines_alike
-from flexclear.pipeline.dynamics.run.batched_evaluation import Crews, Place, crews
+from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroups, Place, groups
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed
@@ -81,12 +81,12 @@ class Runner:
         return Point(values, {name: np.abs(better[name] - v) for name, v in values.items()}, deviation, count + more)
 
     @contextmanager
-    def abreast(self, scene: Scene, points: int) -> Iterator[Crews | None]:
+    def abreast(self, scene: Scene, points: int) -> Iterator[LaneGroups | None]:
         """Where so many points like that of a scene may step side by side; None where each is to be run alone."""
         if points < FEWEST or not self._steps_abreast(scene):
             yield None
             return
-        with crews(ABREAST, threads=1) as made:
+        with groups(ABREAST, threads=1) as made:
             yield made
 
     def _steps_abreast(self, scene: Scene) -> bool:

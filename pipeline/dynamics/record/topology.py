@@ -36,10 +36,10 @@ def topology(run: Run) -> tuple[Variables, dict[str, object]]:
     if indicators.shape[1]:
         least = np.maximum(indicators[:, -1], indicators[:, 0] / INFINITE)
         condition = variables["condition"] = (("time",), np.minimum(indicators[:, 0] / least, INFINITE))
-        near = condition[1] > WELL
-        if near.any():
-            values = _singular_values(engine, trajectory, seen, singular.natural)[near]
-            rank[near] = np.sum(values > ZERO * values[:, :1], axis=1)
+        singular_rows = condition[1] > WELL
+        if singular_rows.any():
+            values = _singular_values(engine, trajectory, seen, singular.natural)[singular_rows]
+            rank[singular_rows] = np.sum(values > ZERO * values[:, :1], axis=1)
     variables["rank"] = (("time",), rank)
     variables["mobility"] = (("time",), (nv - rank).astype(np.int32))
     if not indicators.shape[1]:

@@ -152,8 +152,8 @@ def _far_side(model: Model, name: str, tree: list[str]) -> tuple[set[str], float
         while stack:
             body = stack.pop()
             for x, y in others:
-                for near, far in ((x, y), (y, x)):
-                    if near == body and far not in reached:
+                for inner, far in ((x, y), (y, x)):
+                    if inner == body and far not in reached:
                         reached.add(far)
                         stack.append(far)
         return reached

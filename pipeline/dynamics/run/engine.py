@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.batched_evaluation import Crew, Place
+from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroup, Place
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 
 #: two breaks nearer than this fraction of the run are the same instant, written or summed up in two ways
@@ -37,7 +37,7 @@ class Straight:
     requested: whether all integrations shall use it.  used: whether the present one does.
     exact: whether it is to give the same bits for one state as for several at once.
     place: where it may step together with others; by default each engine takes its own steps.
-    crew: who takes the steps there, for the closure rows that it is for.
+    group: who takes the steps there, for the closure rows that it is for.
     addresses: where it is, by the closure rows that it solves for; 0: nowhere.
     rows: those for which the present integration uses it.  They are its own, since what other integrations of this
     engine have met must not change a bit of this one.
@@ -47,7 +47,7 @@ class Straight:
     used: bool = False
     exact: bool = False
     place: Place | None = None
-    crew: Crew | None = None
+    group: LaneGroup | None = None
     addresses: dict[bytes, int] = field(default_factory=dict)
     rows: list[bytes] = field(default_factory=list)
 
@@ -123,13 +123,13 @@ class Engine:
         rows, known = self.selected.tobytes(), self.straight
         compiled = None
         if known.used and rows in known.rows:
-            compiled = known.crew.wait if known.crew and known.crew.rows == rows else known.addresses.get(rows)
+            compiled = known.group.wait if known.group and known.group.rows == rows else known.addresses.get(rows)
         self.h[m.RATES] = compiled or self.h[m.EVALUATE]
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
-        """Step to the end of the segment or of the budget, in this thread or by the crew."""
-        crew = self.straight.crew
-        by = crew.advance if crew is not None and self.h[m.RATES] == crew.wait else None
+        """Step to the end of the segment or of the budget, in this thread or by the group."""
+        group = self.straight.group
+        by = group.advance if group is not None and self.h[m.RATES] == group.wait else None
         self.entry.advance(self.h, self.model.arrays.f, self.w, self.n, outputs, rows, events, by)
 
     def view(self, index: int) -> np.ndarray:

@@ -188,7 +188,7 @@ class Suit:
         return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, takes no more than {most}"
 
     def judges(self, rtol: float) -> Judges:
-        """Who looks whether a run goes as foreseen, and its twin, of which nothing is remembered afterwards."""
+        """Judges of whether a run goes as expected, and the same for its perturbed run, of which nothing is stored."""
         self.expected.clear()
         return Judges(self._panel(rtol), replace(self, expected={}, left=(0.0, 0.0))._panel(rtol))
 

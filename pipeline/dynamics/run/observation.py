@@ -79,7 +79,7 @@ def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
     return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear
 
 
-def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -> Blocks | None:
+def observe_around(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -> Blocks | None:
     """What is observed of such a row: the limit from both sides, of each block one row; None without one.
 
     In the pose the closures' multipliers are not unique, and a smooth motion makes them continuous across it: the mean
@@ -91,9 +91,9 @@ def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -
     pieces = np.tile(engine.pieces[engine.segments(0.5 * (motion.start + motion.end), after=True)], (len(SIDES), 1))
     for k in range(TRIES):
         rows = np.tile(row, (len(SIDES), 1))
-        near = m.record(rows, len(engine.model.contacts))
-        near.time[:] += NEAREST * motion.span * WIDER**k * SIDES
-        near.state[:] = motion.states(near.time)
+        rows_around = m.record(rows, len(engine.model.contacts))
+        rows_around.time[:] += NEAREST * motion.span * WIDER**k * SIDES
+        rows_around.state[:] = motion.states(rows_around.time)
         if not any(blurred(engine, side, clear) for side in rows):
             seen = observe_with(engine, rows, pieces, ROUNDING)
             if not np.any(seen["status"]):

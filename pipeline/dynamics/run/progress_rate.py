@@ -41,10 +41,10 @@ Panel = Mapping[str, tuple[Judge, str]]
 
 
 class Judges(NamedTuple):
-    """Who looks at a run, and who at its twin; two panels, since judges may remember what they have seen."""
+    """Judges of a run and of its perturbed run; two panels, since judges may store what they have seen."""
 
     run: Panel
-    twin: Panel
+    perturbed: Panel
 
 
 def look(engine: Engine) -> Look:

@@ -28,7 +28,7 @@ from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run import trajectory as stepping
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_blocks
+from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, blurred, observe_around, observe_blocks
 from flexclear.pipeline.dynamics.run.progress_rate import Judges, Panel
 from flexclear.pipeline.dynamics.run.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
@@ -233,9 +233,9 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
         out = observe_blocks(engine, trajectory.rows[part])
         for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
             row, lost = trajectory.rows[part][k], out["status"][k, 0]
-            limit = beside(engine, row, motion, CLEAR)
+            limit = observe_around(engine, row, motion, CLEAR)
             if limit is None and lost:
-                limit = beside(engine, row, motion, NEARLY_CLEAR)
+                limit = observe_around(engine, row, motion, NEARLY_CLEAR)
             for name, values in (limit or {}).items():
                 out[name][k] = values
         parts.append(out)

@@ -94,9 +94,9 @@ def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) 
             scene = engine.model.scene
             joint, k, _ = coordinate_of(scene, choice.joint, choice.coordinate, path)
             requested = [choice.sign * change[label(joint, scene.joint[joint].type, k)] for change in changes]
-            near = [max(requested) - value <= ALIKE * max(map(abs, requested)) for value in requested]
-            ways = [way for way, best in zip(ways, near, strict=True) if best]
-            changes = [change for change, best in zip(changes, near, strict=True) if best]
+            best_ways = [max(requested) - value <= ALIKE * max(map(abs, requested)) for value in requested]
+            ways = [way for way, best in zip(ways, best_ways, strict=True) if best]
+            changes = [change for change, best in zip(changes, best_ways, strict=True) if best]
         if len(ways) > 1:
             _refuse_open(engine, changes, choices)
     return ways

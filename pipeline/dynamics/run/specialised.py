@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.compile import functions, stacks
 from flexclear.pipeline.dynamics.effects import Parts
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.model import selection
-from flexclear.pipeline.dynamics.run.batched_evaluation import Code, Crew, Crews, Place, crews
+from flexclear.pipeline.dynamics.run.batched_evaluation import Code, LaneGroup, LaneGroups, Place, groups
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring, wiring
@@ -59,15 +59,15 @@ def specialise(engine: Engine, progress: Progress = silent) -> None:
 
 
 @contextmanager
-def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> Iterator[Crews | None]:
-    """Crews for so many engines like this one, in so many threads; None where each is to take its own steps.
+def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> Iterator[LaneGroups | None]:
+    """LaneGroups for so many engines like this one, in so many threads; None where each is to take its own steps.
 
     Either way they, as `another` makes them of it, use straight code with the same bits.
     """
     engine.straight.requested = engine.straight.exact = True
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
     if members >= FEW * threads and side_by_side(engine) and _code(engine, engine.selected.tobytes(), progress, lanes):
-        with crews(lanes, threads) as made:
+        with groups(lanes, threads) as made:
             yield made
     else:
         settle(engine, progress)
@@ -92,22 +92,22 @@ def _make(engine: Engine, progress: Progress) -> None:
     straight, rows_of_engine = engine.straight, engine.selected.tobytes()
     if not suited(engine):
         return
-    if straight.place is not None and straight.crew is None:
-        straight.crew = _crew(engine, rows_of_engine, straight.place, progress)
+    if straight.place is not None and straight.group is None:
+        straight.group = _group(engine, rows_of_engine, straight.place, progress)
     if rows_of_engine not in straight.rows and len(straight.rows) < SELECTIONS:
         straight.rows.append(rows_of_engine)
     for rows in straight.rows:
-        if rows not in straight.addresses and not (straight.crew and straight.crew.rows == rows):
+        if rows not in straight.addresses and not (straight.group and straight.group.rows == rows):
             straight.addresses[rows] = _code(engine, rows, progress, lanes=int(straight.exact))
 
 
-def _crew(engine: Engine, rows: bytes, lane: Place, progress: Progress) -> Crew | None:
+def _group(engine: Engine, rows: bytes, lane: Place, progress: Progress) -> LaneGroup | None:
     """Who takes the steps at a place, with the closure rows that the first integration there begins with."""
-    several = _code(engine, rows, progress, lane.crews.width)
+    several = _code(engine, rows, progress, lane.groups.width)
     if not several:
         return None
     code = Code(several, _code(engine, rows, progress, lanes=1), len(engine.model.arrays.f))
-    return lane.crews.crew(lane.thread, rows, code)
+    return lane.groups.group(lane.thread, rows, code)
 
 
 def _code(engine: Engine, rows: bytes, progress: Progress, lanes: int) -> int:

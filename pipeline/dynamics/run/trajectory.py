@@ -112,8 +112,8 @@ def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
     span = breaks[-1] - breaks[0]
     regular = breaks[0] + interval * np.arange(int(np.floor(span / interval * (1 + 1e-12))) + 1)
     after = np.clip(np.searchsorted(breaks, regular), 1, len(breaks) - 1)
-    apart = np.minimum(np.abs(regular - breaks[after - 1]), np.abs(regular - breaks[after])) > 1e-9 * interval
-    return np.union1d(regular[apart], breaks)
+    distinct = np.minimum(np.abs(regular - breaks[after - 1]), np.abs(regular - breaks[after])) > 1e-9 * interval
+    return np.union1d(regular[distinct], breaks)
 
 
 def integrate(

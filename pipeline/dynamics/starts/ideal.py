@@ -1,6 +1,6 @@
 """A run with clearance that begins as its ideal mechanism does: its pose and velocities, pins at rest in their sockets.
 
-The twin has ideal joints instead of pins and balls with clearance. The force that such a joint carries at the
+The ideal_scene has ideal joints instead of pins and balls with clearance. The force that such a joint carries at the
 start presses the pin onto one side of its socket, and so deep into it that the contact carries that force. Slots and
 planes have no ideal joint in their place: they stay as they are, and what touches them where the poses put it.
 """
@@ -39,12 +39,13 @@ RANK = 1e-9
 
 
 def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, str]:
-    """The scene as its ideal mechanism starts, and how that was assembled; one without clearance is its own twin.
+    """The scene as its ideal mechanism starts, and how that was assembled; one without clearance is its own.
 
-    Raises InputError for a twin that cannot be built, SolverError when the pins cannot be put where they are pressed.
+    Raises InputError for an ideal scene that cannot be built, SolverError when the pins cannot be put
+    where they are pressed.
     """
-    twin, t = placed(scene), scene.time.start
-    engine, y = _started(twin, bundles, progress)
+    ideal_scene, t = placed(scene), scene.time.start
+    engine, y = _started(ideal_scene, bundles, progress)
     forces = _forces(scene, engine, y)
     concentric, choice = moving(scene, engine, y, t), engine.model.mechanism.choice
     if not scene.contacts():

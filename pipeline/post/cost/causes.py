@@ -29,7 +29,7 @@ LETTERS = 52
 COLORS = ("#332288", "#88CCEE", "#44AA99", "#DDCC77", "#999933", "#AA4499", "#882255")
 
 
-def beside(study: xr.Dataset, split: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
+def with_causes(study: xr.Dataset, split: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
     """A study's dataset with ``error_by_cause(quantity, cause)``, NaN where a scene has no such cause."""
     names = [str(name) for name in study["quantity"].values]
     values = np.array([[split[name].get(cause, np.nan) for cause in CAUSES] for name in names])

@@ -40,7 +40,7 @@ def sizes(data: Data, ideal_model: Model = IDEAL) -> Deviation:
 def effects(data: Data, model: Model) -> dict[str, float]:
     """Largest differences from the ideal model, that of the force at A1 [N] among them."""
     most = moved(data, model)
-    newtons = float(np.linalg.norm(apart(data, model, force), axis=1).max())
+    newtons = float(np.linalg.norm(difference(data, model, force), axis=1).max())
     return {"angle": most.angle, "displacement": most.displacement, "velocity": most.velocity, "force": newtons}
 
 
@@ -59,7 +59,7 @@ def acceleration(data: Data, model: Model) -> float:
     return float(data[f"{model.scene}:post"].peak_acceleration.sel(body=PLATFORM, axis="z"))
 
 
-def apart(data: Data, model: Model, of: Callable[[xr.Dataset], np.ndarray]) -> np.ndarray:
+def difference(data: Data, model: Model, of: Callable[[xr.Dataset], np.ndarray]) -> np.ndarray:
     """Sizes of the differences from the ideal model at the outputs that both have."""
     run, ideal = data[f"{model.scene}:run"], data[f"{IDEAL.scene}:run"]
     i, j = common_times(run.time.values, ideal.time.values)

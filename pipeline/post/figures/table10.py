@@ -163,11 +163,11 @@ def _which(timing: xr.Dataset) -> str:
     """Which of the paper's ratios come out of counting the steps of a damped method at its tolerance."""
     steps = {s: _steps(timing, s) for s in TABLE10 if s in timing.scene.values and s != REFERENCE}
     text = ", ".join(f"{scene} {_number(ratio)} (paper {TABLE10[scene]:g})" for scene, ratio in steps.items())
-    near = [s for s, ratio in steps.items() if 1.0 / NEAR < ratio / TABLE10[s] < NEAR]
+    similar = [s for s, ratio in steps.items() if 1.0 / NEAR < ratio / TABLE10[s] < NEAR]
     other = ", ".join(f"{scene} {_number(_steps(timing, scene, 'size'))}" for scene in steps)
     return (
         f"Steps at the paper's tolerance over the ideal model's: {text}. Within a factor of {NEAR:g} of the paper's "
-        f"ratio: {', '.join(near) or 'none'}. Read as a fraction of the mechanism's size (rtol "
+        f"ratio: {', '.join(similar) or 'none'}. Read as a fraction of the mechanism's size (rtol "
         f"{float(timing.size_rtol.median()):.1e}) the same tolerance gives {other}: where the method begins to follow "
         "the rod's vibrations, these ratios are a matter of the reading."
     )

@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.paths import TREE
 from flexclear.pipeline.post.figures import measured
-from flexclear.pipeline.post.figures.measured import SEPARATION, SLIGHT, Data, apart, mode_set
+from flexclear.pipeline.post.figures.measured import SEPARATION, SLIGHT, Data, difference, mode_set
 from flexclear.pipeline.post.figures.table10 import ratios
 from flexclear.pipeline.post.models import (
     CSJ,
@@ -116,7 +116,7 @@ def _same_motion(data: Data) -> Outcome:
 
 def _same_acceleration(data: Data) -> Outcome:
     largest = measured.acceleration(data, IDEAL)
-    fractions = {model: apart(data, model, measured.vertical).max() / largest for model in FAR}
+    fractions = {model: difference(data, model, measured.vertical).max() / largest for model in FAR}
     text = ", ".join(
         f"{100 * fraction:.2g} % ({mode_set(model)})" for model, fraction in fractions.items() if fraction > ROUNDING
     )
@@ -131,7 +131,7 @@ def _same_path(*models: Model) -> Callable[[Data], Outcome]:
     def outcome(data: Data) -> Outcome:
         ideal = measured.centre(data[f"{IDEAL.scene}:run"])
         stroke = float(np.linalg.norm(ideal - ideal[0], axis=1).max())
-        off = {model: float(np.linalg.norm(apart(data, model, measured.centre), axis=1).max()) for model in models}
+        off = {model: float(np.linalg.norm(difference(data, model, measured.centre), axis=1).max()) for model in models}
         words = ", ".join(f"{mode_set(model) or model.label} {_length(far)}" for model, far in off.items())
         return _verdict(*(far < SMALL * stroke for far in off.values())), (
             f"off by {words} at most, of a path that goes {1e3 * stroke:.0f} mm far"
@@ -250,7 +250,7 @@ def _paths_differ(data: Data) -> Outcome:
 def _dashpot(data: Data) -> Outcome:
     """Vibration as the root mean square of the platform's acceleration minus the ideal one, at the outputs."""
     ideal = measured.vertical(data[f"{IDEAL.scene}:run"])
-    rigid = float(np.sqrt(np.mean(apart(data, CSJ, measured.vertical) ** 2)))
+    rigid = float(np.sqrt(np.mean(difference(data, CSJ, measured.vertical) ** 2)))
     rows = {}
     for model in FAR_CSJ:
         members = data[f"{model.scene}:ensemble"].acceleration.sel(body=PLATFORM, axis="z").values
@@ -266,10 +266,10 @@ def _dashpot(data: Data) -> Outcome:
 def _sets_differ(data: Data) -> Outcome:
     force = [measured.reaction(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
     acceleration = [measured.acceleration(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
-    apart = [abs(a / b - 1.0) for a, b in (force, acceleration)]
+    differences = [abs(a / b - 1.0) for a, b in (force, acceleration)]
     return _verdict(
-        *(a > SLIGHT for a in apart)
-    ), f"by {100 * apart[0]:.0f} % in force, {100 * apart[1]:.0f} % in acceleration"
+        *(a > SLIGHT for a in differences)
+    ), f"by {100 * differences[0]:.0f} % in force, {100 * differences[1]:.0f} % in acceleration"
 
 
 def _fixed_right(data: Data) -> Outcome:

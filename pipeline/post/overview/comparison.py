@@ -88,10 +88,10 @@ def _difference_of(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -
 
     For vectors a, b over time, max |a - b| >= | max |a| - max |b| |, taken at the time of the larger one.
     """
-    apart = quantities.error(run, reference, quantity)
+    difference = quantities.error(run, reference, quantity)
     if not quantities.is_series(quantity) or quantity.kind in FROM_THE_START:
-        return apart
-    return max(apart, abs(quantities.scale(run, quantity) - quantities.scale(reference, quantity)))
+        return difference
+    return max(difference, abs(quantities.scale(run, quantity) - quantities.scale(reference, quantity)))
 
 
 def _unit(runs: Mapping[str, xr.Dataset], quantity: Quantity) -> str:
@@ -158,8 +158,8 @@ def table(compared: xr.Dataset) -> Table:
                 rows.append((str(name), label, "–", "–", "–"))
                 continue
             error = float(part["error"])
-            apart = "reference" if i == 0 else _difference(compared, i, j, unit)
-            rows.append((str(name), label, _number(float(part["largest"]), unit), _own(error, unit), apart))
+            against = "reference" if i == 0 else _difference(compared, i, j, unit)
+            rows.append((str(name), label, _number(float(part["largest"]), unit), _own(error, unit), against))
     notes = [
         "Own error: the largest difference between this run and the same run at a hundred times tighter tolerance "
         "(with fixed steps: at half the step). Difference: the largest difference from the reference run at the output "

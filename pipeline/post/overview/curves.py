@@ -128,8 +128,8 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
 
 def rounded(value: float, digits: int) -> str:
     """A number to so many significant digits; no exponent where up to seven digits before the point do without it."""
-    near = float(f"{value:.{digits}g}")
-    return f"{near:.0f}" if 10.0**digits <= abs(near) < 1e7 else f"{value:.{digits}g}"
+    written = float(f"{value:.{digits}g}")
+    return f"{written:.0f}" if 10.0**digits <= abs(written) < 1e7 else f"{value:.{digits}g}"
 
 
 def measured(value: float, error: float, unit: str) -> str:

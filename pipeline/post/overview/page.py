@@ -58,10 +58,10 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
 
 def viewer_page(title: str, views: Sequence[str], below: str = "") -> bytes:
     """A page with views that can be turned (`pipeline.post.pages.viewer`), and what is below them as HTML."""
-    return page(title, "", [Part("view", "View" if len(views) == 1 else "Views", beside(views) + below)])
+    return page(title, "", [Part("view", "View" if len(views) == 1 else "Views", in_columns(views) + below)])
 
 
-def beside(figures: Sequence[str]) -> str:
+def in_columns(figures: Sequence[str]) -> str:
     """Figures next to each other where there is room for that."""
     return "".join(figures) if len(figures) < 2 else f"<div class='side-by-side'>{''.join(figures)}</div>\n"
 

@@ -35,10 +35,10 @@ class View:
 
 def view(towards: np.ndarray, up: np.ndarray) -> View:
     """The view of an observer in direction `towards`; `up` is upwards on the paper."""
-    near = towards / np.linalg.norm(towards)
-    right = np.cross(up, near)
+    towards_eye = towards / np.linalg.norm(towards)
+    right = np.cross(up, towards_eye)
     right /= np.linalg.norm(right)
-    return View(np.array([right, np.cross(near, right), near]))
+    return View(np.array([right, np.cross(towards_eye, right), towards_eye]))
 
 
 def shell(

@@ -167,8 +167,8 @@ def ball_deviation(axes: Axes, reference: Motion, others: Sequence[Motion], clea
         axes.plot(edge * np.cos(turn), edge * np.sin(turn), color=style.SOFT, lw=0.9, ls=":")
         axes.annotate("clearance", (0.0, edge), ha="center", va="bottom", fontsize=7.6, color=style.SOFT)
     for motion in sorted(others, key=lambda m: not m.model.ours):
-        time, apart = paths[motion.model.scene]
-        x, _, z = factor * apart.T
+        time, deviation_of_ball = paths[motion.model.scene]
+        x, _, z = factor * deviation_of_ball.T
         inside = time <= motion.horizon
         axes.plot(x, z, color=motion.model.color, lw=0.6, alpha=PALE)
         axes.plot(x[inside], z[inside], color=motion.model.color, lw=1.1, alpha=FIRM)
@@ -183,8 +183,8 @@ def ball_distance(axes: Axes, reference: Motion, others: Sequence[Motion]) -> No
     """Distance of the ball's centre from where the ideal model has it, over time."""
     paths = [_ball_apart(motion, reference) for motion in others]
     factor, unit = _short(0.0, paths)
-    for motion, (time, apart) in zip(others, paths, strict=True):
-        _curve(axes, motion, factor * np.linalg.norm(apart, axis=1), 0.9, time)
+    for motion, (time, deviation_of_ball) in zip(others, paths, strict=True):
+        _curve(axes, motion, factor * np.linalg.norm(deviation_of_ball, axis=1), 0.9, time)
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("time (s)")
@@ -199,7 +199,7 @@ def _ball_apart(motion: Motion, reference: Motion) -> tuple[np.ndarray, np.ndarr
 
 def _short(least: float, paths: Iterable[tuple[np.ndarray, np.ndarray]]) -> tuple[float, str]:
     """Factor and unit of lengths [mm] that are drawn: micrometres where all are below a tenth of a millimetre."""
-    largest = max([least, *(float(np.abs(apart).max()) for _, apart in paths)])
+    largest = max([least, *(float(np.abs(deviation_of_ball).max()) for _, deviation_of_ball in paths)])
     return (1e3, "µm") if largest < 0.1 else (1.0, "mm")
 
 

@@ -36,8 +36,8 @@ def pace(run: xr.Dataset, seconds: float | None = None, slower: float | None = N
     factor = SLOWER if slower is None else slower
     for when in strong:
         # a smooth bump: the film slows down and speeds up again, it does not jump
-        near = np.clip(1.0 - np.abs(way - (when - start) / span) / (2.0 * AROUND), 0.0, 1.0)
-        weight = np.maximum(weight, 1.0 + (factor - 1.0) * np.minimum(2.0 * near, 1.0))
+        closeness = np.clip(1.0 - np.abs(way - (when - start) / span) / (2.0 * AROUND), 0.0, 1.0)
+        weight = np.maximum(weight, 1.0 + (factor - 1.0) * np.minimum(2.0 * closeness, 1.0))
     passed = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * np.diff(way))])
     total = max(round(seconds * rate * min(1.4, passed[-1])), 2)
     fraction = np.interp(np.linspace(0.0, passed[-1], total), passed, way)

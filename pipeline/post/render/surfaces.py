@@ -114,8 +114,8 @@ def bar(start: np.ndarray, end: np.ndarray, radius: float) -> Surface:
 
 def tube(places: np.ndarray, radius: float, corners: int = 6) -> Surface:
     """A thin round tube through places, shape (n, 3), open at its ends; places that repeat are left out."""
-    apart = np.concatenate([[True], np.linalg.norm(np.diff(places, axis=0), axis=1) > 1e-3 * radius])
-    places = places[apart]
+    distinct = np.concatenate([[True], np.linalg.norm(np.diff(places, axis=0), axis=1) > 1e-3 * radius])
+    places = places[distinct]
     if len(places) < 2:
         return moved(sphere(radius), places[0])
     way = np.gradient(places, axis=0)

@@ -56,16 +56,16 @@ def eye(seen: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tupl
 
     aspect: width of the picture over its height; the angle of vision is ANGLE upright.
     """
-    near = seen.direction / np.linalg.norm(seen.direction)
-    up = _across(seen.up, near)
-    axes = np.array([np.cross(up, near), up, near])
+    towards_eye = seen.direction / np.linalg.norm(seen.direction)
+    up = _across(seen.up, towards_eye)
+    axes = np.array([np.cross(up, towards_eye), up, towards_eye])
     local = cloud @ axes.T
     middle = 0.5 * (local.min(axis=0) + local.max(axis=0))
     slope = np.tan(0.5 * np.radians(ANGLE))
     x, y, z = (local - middle).T
     distance = float(np.max(z + np.maximum(np.abs(y), np.abs(x) / aspect) / slope, initial=0.0))
     focus = middle @ axes
-    return focus + MARGIN * distance / zoom * near, focus
+    return focus + MARGIN * distance / zoom * towards_eye, focus
 
 
 def _spatial(up: np.ndarray) -> View:

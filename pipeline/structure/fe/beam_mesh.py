@@ -149,8 +149,8 @@ def _node_at(x: np.ndarray, position: float, where: str) -> int:
     nearest = int(np.argmin(np.abs(x - position)))
     if abs(x[nearest] - position) <= SAME_PLACE * x[-1]:
         return nearest
-    near = sorted(np.argsort(np.abs(x - position))[:2])
-    shown = " and ".join(f"{x[k] * 1e3:.6g} mm" for k in near)
+    neighbours = sorted(np.argsort(np.abs(x - position))[:2])
+    shown = " and ".join(f"{x[k] * 1e3:.6g} mm" for k in neighbours)
     raise InputError(
         where,
         f"{position * 1e3:.6g} mm lies on no node; {len(x) - 1} elements over {x[-1] * 1e3:.6g} mm "

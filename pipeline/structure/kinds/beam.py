@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.structure.closed_form import beside
+from flexclear.pipeline.structure.closed_form import comparison
 from flexclear.pipeline.structure.fe import beam as beams
 from flexclear.pipeline.structure.fe import mesh as meshes
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
@@ -93,4 +93,4 @@ def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
     return [name.partition("_")[0] for name in families]
 
 
-KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=beside.columns)
+KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=comparison.columns)

@@ -106,8 +106,8 @@ def _frequencies(flexibility: Flexibility, vectors: np.ndarray, progress: Progre
     full = eigen.frequency(normal.lowest(model, none, count, lambda: flexibility, progress, rough=True).values)
     shapes = flexibility.relieved(vectors)
     values, _ = eigen.rediagonalise(model.stiffness, model.mass, shapes)
-    near = np.abs(eigen.frequency(values)[:count] / full - 1.0) <= RESOLVED
-    whole = count if near.all() else int(np.argmin(near))
+    resolved = np.abs(eigen.frequency(values)[:count] / full - 1.0) <= RESOLVED
+    whole = count if resolved.all() else int(np.argmin(resolved))
     return float(full[0]), float(full[whole - 1]) if whole else 0.0
 
 

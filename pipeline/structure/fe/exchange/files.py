@@ -13,8 +13,8 @@ import scipy.sparse as sp
 
 from flexclear.pipeline.core.errors import FlexclearError, InputError, shown
 from flexclear.pipeline.core.external_files import archive
-from flexclear.pipeline.core.external_files.apart import UnreadableError
 from flexclear.pipeline.core.external_files.checks import require_file
+from flexclear.pipeline.core.external_files.isolated import UnreadableError
 from flexclear.pipeline.structure.fe.exchange import market
 from flexclear.pipeline.structure.fe.exchange.market import COPIES, SMALLER
 from flexclear.pipeline.structure.fe.model import Model

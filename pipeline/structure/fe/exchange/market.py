@@ -22,7 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexclear.pipeline.core import machine
-from flexclear.pipeline.core.external_files import apart
+from flexclear.pipeline.core.external_files import isolated
 
 #: what a file holds is in memory so many times while it is checked and brought into SI units
 COPIES = 4.0
@@ -35,11 +35,11 @@ OPENERS: dict[str, Callable[..., TextIO]] = {".gz": gzip.open, ".bz2": bz2.open}
 
 
 def read(path: Path, where: str) -> sp.coo_array:
-    """A real matrix, coordinates or array, general or symmetric; `apart.UnreadableError` in words when it is not.
+    """A real matrix, coordinates or array, general or symmetric; `isolated.UnreadableError` in words when it is not.
 
-    Raises ResourceError when its header promises more than memory can hold, and as `apart.read` does.
+    Raises ResourceError when its header promises more than memory can hold, and as `isolated.read` does.
     """
-    matrix = apart.read(entries, path, where, apart.allowed())
+    matrix = isolated.read(entries, path, where, isolated.allowed())
     return sp.coo_array((matrix["value"], (matrix["row"], matrix["column"])), shape=tuple(matrix["shape"]))
 
 
@@ -61,9 +61,9 @@ def entries(path: Path, where: str, allowed: float) -> dict[str, Any]:
 def read_unknowns(path: Path, count: int) -> dict[str, Any]:
     """A table of unknowns, of so many rows at most and one more, which shows that it is longer.
 
-    node: numbers.  component: texts.  position: shape (rows, 3).  Raises `apart.UnreadableError`.
+    node: numbers.  component: texts.  position: shape (rows, 3).  Raises `isolated.UnreadableError`.
     """
-    table: dict[str, Any] = apart.read(unknowns, path, count)
+    table: dict[str, Any] = isolated.read(unknowns, path, count)
     return table
 
 

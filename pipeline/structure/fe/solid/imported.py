@@ -8,8 +8,8 @@ import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.external_files import mesh as foreign_mesh
-from flexclear.pipeline.core.external_files.apart import UnreadableError
 from flexclear.pipeline.core.external_files.checks import require_mesh
+from flexclear.pipeline.core.external_files.isolated import UnreadableError
 from flexclear.pipeline.core.external_files.mesh import Mesh
 from flexclear.pipeline.core.units import UNITS
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
