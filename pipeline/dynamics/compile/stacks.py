@@ -35,8 +35,8 @@ READY, WAITING, DONE, IDLE = 0, 1, 2, 3
 STATUS = Path("/proc/self/status")
 #: of mprotect, on every Linux
 NO_ACCESS = 0
-#: words of a group's table: whether its thread shall return, the address of what evaluates one state or 0, and the first
-#: of the addresses of its records
+#: words of a group's table: whether its thread shall return, the address of what evaluates one state or 0, and the
+#: first of the addresses of its records
 WANTED, ALONE, HEAD = 0, 1, 2
 #: words of a record, and those that a stack holds before its function has begun
 RECORD, BEGIN = 32, 9

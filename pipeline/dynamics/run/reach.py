@@ -119,7 +119,7 @@ def _too_fast(engine: Engine, t: float, where: str) -> str:
         return ""
     return (
         f"at t = {t:.6g} s: the mechanism passes a singular pose ({where}), where it can go on in several ways, and "
-        f"{' and '.join(causes)} is too fast there for its branch to be reported: {', or '.join(remedies)}"
+        f"{' and '.join(causes)} is too fast there for its branch to be determined: {', or '.join(remedies)}"
     )
 
 
