@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, mo
 from flexclear.pipeline.core.scene.fields import Angle, Part, Rate, Time
 from flexclear.pipeline.core.units import UNITS, any_quantity, quantity, unit
 
-_TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits where the law is"}
+_TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits the quantity"}
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]
 
 
