@@ -39,7 +39,7 @@ COMMANDS = {
     "schema": "JSON schema of scene files",
     "cite": "sources of the methods and data that a scene uses",
     "completion": "completion for bash and zsh",
-    "cache": "what is kept: size, check, explain, prune",
+    "cache": "stored results: size, check, explain, prune",
     "doctor": "is all here that is needed, and does it compute; one file to repeat a failure",
 }
 
@@ -65,7 +65,7 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"flexclear: {error}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        print("\nflexclear: interrupted; what was finished is kept", file=sys.stderr)
+        print("\nflexclear: interrupted; finished results are stored", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # the reader (`| head`) has gone; keep the interpreter from complaining about it at exit

@@ -29,7 +29,7 @@ from flexclear.stages.sweep_points import source_digest
 
 #: entries of the file: what it is about, what was said; the scene's files stand below the folder
 FACTS, LOG, FILES = "facts.json", "log.txt", "files"
-#: bytes that are unpacked at most, and characters of a log that are kept
+#: bytes that are unpacked at most, and characters of a log that are stored
 LARGEST, LONGEST = 1 << 30, 200_000
 #: last lines of what was said that are shown of each
 REPORTED = 5
@@ -42,7 +42,7 @@ DATE = (1980, 1, 1, 0, 0, 0)
 def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: Path | None) -> Path:
     """Run a scene and write all about it into one file (zip); its path.
 
-    No path of this machine is in it: files are called by their places relative to each other, folders in what was said
+    No path of this machine is in it: files are called by their paths relative to each other, folders in what was said
     by words.  Raises InputError for a scene that is not there.
     """
     scene = run.find_scene(name).resolve()
@@ -172,7 +172,7 @@ def _without(text: str, hidden: Mapping[str, str]) -> str:
 
 
 def _bytes(path: Path, files: Sequence[Path]) -> bytes:
-    """Content of a file; of a text of ours with the others' places relative to it."""
+    """Content of a file; of a text of ours with the others' paths relative to it."""
     content = path.read_bytes()
     if path.suffix != ".toml":
         return content

@@ -14,12 +14,12 @@ from flexclear.pipeline.core.errors import InputError, ResourceError, shown
 from flexclear.stages.workplace import open_workplace
 
 ACTIONS = {
-    "size": "how much is kept, by stage",
+    "size": "stored bytes by stage",
     "check": "read everything and compare it with its digest; exit code 4 when something is damaged",
     "explain": "what an artifact was made from",
     "prune": "remove what is damaged and what nothing shows any more",
 }
-#: artifacts that nothing shows are kept for so many days: going back to an earlier value costs nothing then
+#: artifacts that nothing shows are stored for so many days: going back to an earlier value costs nothing then
 KEPT = 30.0
 #: faults that `check` lists one by one
 SHOWN = 20

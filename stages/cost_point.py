@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The kept part of the run with ``cpu_repeat(repeat)`` of the integration and the other costs as attributes, the
-    median time of the recording among them.
+    """The recorded part of the run with ``cpu_repeat(repeat)`` of the integration and the other costs as attributes,
+    the median time of the recording among them.
 
     params: `simulate`, as of the simulate stage, the `quantities` of the study, and whether the point is `brief`, as of
     `dynamics.cost`.  inputs: bundles, and `kernels`, the artifact of `stages.kernels`.  A run that the solver refuses

@@ -137,7 +137,7 @@ class Planned:
         return self.stored("plan.md").read_text(encoding="utf-8")
 
     def file(self, target: Path) -> bytes:
-        """The planned scene's file as it is at a place; it extends the full scene's."""
+        """The planned scene's file for a given path; it extends the full scene's."""
         assert self.scene.path is not None
         head = (
             "written by flexclear plan",

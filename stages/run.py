@@ -101,7 +101,7 @@ def joined(names: Sequence[str]) -> str:
 
 
 class MissedAccuracyError(SolverError):
-    """Runs are not as accurate as their scenes ask; what there is is kept, and says so."""
+    """Runs are not as accurate as their scenes ask; the runs are stored, with their verdicts."""
 
 
 def find_scene(name: str) -> Path:
@@ -243,7 +243,7 @@ def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, pl
             workplace.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
         verdict, requested = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
         if verdict != "met" and requested is not None:
-            text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is kept"
+            text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is stored"
             if requested.allow_missed:
                 workplace.monitor.say(text)
             else:
@@ -313,7 +313,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
 
 @contextmanager
 def in_file(path: Path | None) -> Iterator[None]:
-    """Errors whose place names no file are placed in this one."""
+    """Errors without a file in their location get this one."""
     try:
         yield
     except InputError as error:

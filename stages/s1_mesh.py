@@ -46,7 +46,7 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
 
 
 def sources(recipe: Path, where: str = "") -> dict[str, str]:
-    """Where the values of a recipe come from: place of the part or value -> text; InputError for what is no text."""
+    """Where the values of a recipe come from: path of the part or value -> text; InputError for what is no text."""
     table = read_toml(recipe)
     wrong = provenance.mistaken(table)
     if wrong is not None:

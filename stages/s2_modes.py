@@ -19,7 +19,7 @@ CONDITIONS = "flexclear.pipeline.structure.modes.reference"
 
 
 def params(body: FlexibleBody) -> dict[str, Any]:
-    """Which coordinates are kept; nothing else of the body."""
+    """The selected coordinates; nothing else of the body."""
     return body.modes.model_dump(mode="json", exclude={"source"}, exclude_none=True)
 
 

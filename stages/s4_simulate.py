@@ -24,7 +24,7 @@ JUDGED = {"rows": sys.maxsize, "members": sys.maxsize}
 
 
 def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles, views, shapes, limits, sources, and places and names of files are not
+    """What the engine sees of a scene. Titles, views, shapes, limits, sources, and paths of files are not
     part of it, nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run,
     nor whether that may be missed."""
     unseen = ("title", "description", "view", "limits", "accuracy" if ensemble else "ensemble")
@@ -97,7 +97,7 @@ def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 
 def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None = None) -> Scene:
-    """The scene again, from what `params` kept of it; its title is its name, where that is reported.
+    """The scene again, from `params`; its title is its name, where that is reported.
 
     inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
     """

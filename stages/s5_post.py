@@ -38,7 +38,7 @@ def origins(scene: Scene) -> dict[str, str]:
 
 
 def sources(scene: Scene) -> dict[str, str]:
-    """Where values come from, those of mesh recipes included: place -> text."""
+    """Where values come from, those of mesh recipes included: path -> text."""
     by_path = scene.sources()
     for body, recipe in scene.recipes().items():
         by_path |= s1_mesh.sources(Path(recipe), f"body.{body}.recipe")

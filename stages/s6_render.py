@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
 
-#: what can be shown, as what; kept here, too, because asking the modules that draw takes their import
+#: what can be shown, as what; repeated here, because asking the modules that draw takes their import
 FORMATS: dict[str, tuple[str, ...]] = {
     "motion": ("png", "gif", "mp4", "html", "gltf", "pvd"),
     "modes": ("png", "gif", "mp4", "html", "gltf", "pvd"),

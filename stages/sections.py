@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
 
 #: options and the keys of `[sections]` that they replace
-COUNTS = {"periods": "periods that are kept", "transient": "periods before them that are not"}
+COUNTS = {"periods": "recorded periods", "transient": "periods before them that are not"}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -1,4 +1,4 @@
-"""``flexclear sweep``: many points of one scene, each kept as soon as it is done."""
+"""``flexclear sweep``: many points of one scene, each stored as soon as it is done."""
 
 from __future__ import annotations
 

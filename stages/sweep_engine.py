@@ -207,7 +207,7 @@ def _cluster(address: str) -> Iterator[Engine]:
         text = f"{where}: workers died again and again over a task ({error}); is their memory full?"
         raise ResourceError(text) from None
     except (CancelledError, FutureCancelledError):
-        raise ResourceError(f"{where}: the scheduler has gone; what was finished is kept") from None
+        raise ResourceError(f"{where}: the scheduler has gone; finished results are stored") from None
     except ImportError as error:  # of a worker that has joined since
         raise InputError(where, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
     finally:

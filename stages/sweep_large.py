@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 SUFFIX = ".zarr"
 #: a dataset in one file is in memory so many times: points, arrays, the bytes of the file, and what is read back
 HELD = 4.0
-#: bytes of a slab; batches of points that are kept while slabs are put together
+#: bytes of a slab; batches of points in memory while slabs are put together
 SLAB, BATCHES = 1 << 26, 8
 INSTALL = "pip install 'flexclear[zarr]'"
 
@@ -57,7 +57,7 @@ def require_small(plan: Plan) -> None:
 
 
 def plan_size(plan: Plan) -> float:
-    """Bytes of all that is kept."""
+    """Bytes of all recorded values."""
     lengths = dimensions(plan.time, plan.sections)
     each = sum(prod(lengths[dim] for dim in one.dims) for one in plan.recorded) * len(plan.statistics)
     return 8.0 * each * prod(plan.design.shape)

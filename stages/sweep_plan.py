@@ -70,7 +70,7 @@ class Family:
         store.put(self.folder[0], name, {"nc": batch(points, recorded)}, self.facts)
 
     def find(self, store: Store, recorded: Sequence[Recorded]) -> dict[str, Point]:
-        """All points of the family that are stored and sound, with their values of what is `kept`."""
+        """All points of the family that are stored and sound, with their values of the `recorded` quantities."""
         from flexclear.pipeline.core.artifacts.points import unpacked
 
         points: dict[str, Point] = {}
@@ -88,7 +88,7 @@ class Family:
 
 @dataclass(frozen=True)
 class Plan:
-    """A sweep whose places, values and quantities are known to fit its scene.
+    """A sweep whose paths, values and quantities are known to fit its scene.
 
     scene: with what is set, at the first point.  turning: names of the quantities that are about an axis, not along.
     families, jobs: once the flexible bodies are there; see `prepare`.
@@ -132,14 +132,14 @@ class Plan:
 
     @property
     def time(self) -> np.ndarray:
-        """Of the series that are kept [s]."""
+        """Of the recorded series [s]."""
         from flexclear.pipeline.core.quantities import regular_times
 
         return regular_times(self.scene.time, self.scene.output)
 
     @property
     def sections(self) -> int:
-        """How many there are of each point, where they are kept."""
+        """How many there are of each point, where they are recorded."""
         return (self.scene.sections or Sections()).periods
 
     @property
@@ -152,7 +152,7 @@ class Plan:
 def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     """The plan of a sweep, all of it checked before anything is run.
 
-    where: the sweep's file, for messages.  Raises InputError for places that the scene does not have, values that it
+    where: the sweep's file, for messages.  Raises InputError for paths that the scene does not have, values that it
     refuses, and quantities that nothing of it has.
     """
     try:

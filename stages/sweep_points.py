@@ -42,7 +42,7 @@ class Family:
 
 @lru_cache(maxsize=RUNNERS)
 def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
-    """The scene of a family and what runs its points; kept by a worker, since it holds the compiled functions."""
+    """The scene of a family and what runs its points; stored by a worker, since it holds the compiled functions."""
     import pickle
 
     from flexclear.pipeline.core.scene.output_quantities import parse_recorded
@@ -115,7 +115,7 @@ def _point(
     where: Place | None = None,
     alive: Progress = silent,
 ) -> Point:
-    """A point; what it has done so far, also when it is done, is kept where it has a journal."""
+    """A point; what it has done so far, also when it is done, is stored where it has a journal."""
     from flexclear.pipeline.core.errors import InputError
     from flexclear.pipeline.core.scene.load import with_numbers
 

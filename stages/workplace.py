@@ -53,7 +53,7 @@ def relative(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Workplace:
-    """Where artifacts are kept, where the source lies, and the monitor of progress.
+    """Where artifacts are stored, where the source lies, and the monitor of progress.
 
     end: when the command is to stop, by the monotonic clock [s], and the message printed then.
     """

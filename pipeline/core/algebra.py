@@ -90,7 +90,7 @@ def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
 
 
 def continued(q: np.ndarray) -> np.ndarray:
-    """Unit quaternions (time, ..., 4) without jumps of sign; the first one's is kept."""
+    """Unit quaternions (time, ..., 4) without jumps of sign; the first one's sign stays."""
     flips = np.einsum("t...i,t...i->t...", q[1:], q[:-1]) < 0.0
     if flips.any():
         q = q.copy()

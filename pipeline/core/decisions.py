@@ -1,4 +1,4 @@
-"""What a plan decides: of each effect whether it is kept, by what evidence, and how the planned scene is integrated."""
+"""What a plan decides: of each effect whether it stays, by what evidence, and how the planned scene is integrated."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EVIDENCE = {
     PILOT: "short runs with and without it",
     NONE: "not looked into",
 }
-#: why an effect is kept of which no run was made
+#: why an effect stays for which no run was made
 NOT_WORTH = "to leave it out would save no time worth the look"
 
 
@@ -36,7 +36,7 @@ class Decision:
 class Mesh:
     """The finite elements of a body. given: how many it has.  called_for: how many what is requested calls for.
 
-    frequency, compliance: largest errors of its mesh, as fractions, of its kept frequencies and of its frames'
+    frequency, compliance: largest errors of its mesh, as fractions, of its retained frequencies and of its frames'
     compliance.
     error: estimated error that the mesh makes in each quantity, at most [SI].
     """
@@ -52,7 +52,7 @@ class Mesh:
 class Plan:
     """All decisions. requested: by quantity [SI].  integrator, rtol: of the planned run.
 
-    modes: elastic coordinates of kept flexible bodies that need fewer than they have.
+    modes: elastic coordinates of flexible bodies that stay that need fewer than they have.
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
     the plan has run.  runs: how many.  uncoupled: names of parts that nothing couples to the requested quantities.
     meshes: finite elements of flexible bodies whose recipes tell them.  ledger_tolerance: of the planned run, where it

@@ -31,7 +31,7 @@ class FlexclearError(Exception):
 
 
 class InputError(FlexclearError):
-    """The user's input is wrong: names place, value, rule and remedy.
+    """The user's input is wrong: names location, value, rule and remedy.
 
     place: file and key, e.g. ``scenes/a.toml [joint.A1.clearance]``.
     problem: what is wrong, with the offending value and the rule it breaks.

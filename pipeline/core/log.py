@@ -2,7 +2,7 @@
 
 Warnings are WARNING, progress is INFO, every step of it DEBUG. The command's -q and -v choose among these; from Python,
 ``logging.getLogger("flexclear").setLevel(logging.WARNING)`` does. Records go to stderr by the handler here, and to the
-root logger only where ``propagate`` is set; another handler may take its place.
+root logger only where ``propagate`` is set; another handler may replace it.
 """
 
 from __future__ import annotations

@@ -21,7 +21,8 @@ from typing import Any
 FICLONE = 0x40049409
 #: the request that the system send a signal when the parent dies (linux/prctl.h)
 PR_SET_PDEATHSIG = 1
-#: what the GNU C library calls the sizes from which on memory is given back, and when (malloc.h); how much is kept [B]
+#: what the GNU C library calls the sizes from which on memory is given back, and when (malloc.h); how much is retained
+#: [B]
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, KEPT = -1, -3, 64 << 20
 #: where Windows keeps whether paths may be long, and characters of a path when they may and when not
 FILE_SYSTEM, LONG_PATH, SHORT_PATH = r"SYSTEM\CurrentControlSet\Control\FileSystem", 32767, 259

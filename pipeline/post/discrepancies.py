@@ -40,8 +40,8 @@ DISCREPANCIES = (
     ),
     Discrepancy(
         "eqs. (28), (29)",
-        "STEP is called with its first place above its second, for which its definition gives a constant.",
-        "The places are put in ascending order: the coefficient falls from the static to the dynamic one "
+        "STEP is called with its first argument above its second, for which its definition gives a constant.",
+        "The arguments are put in ascending order: the coefficient falls from the static to the dynamic one "
         "between the two velocities.",
     ),
     Discrepancy(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
 
-#: fractions of the members below the quantiles that are kept: of so few, the middle and the bulk
+#: fractions of the members below the recorded quantiles: of so few, the middle and the bulk
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]

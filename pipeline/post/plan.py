@@ -79,7 +79,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         "integration": "estimated error of the planned run's integration, and of the modes that it leaves out",
         "elements": "finite elements of the body",
         "elements_called_for": "finite elements that the requested accuracy calls for",
-        "mesh_frequency_error": "largest error of a kept frequency due to the mesh, as a fraction",
+        "mesh_frequency_error": "largest error of a retained frequency due to the mesh, as a fraction",
         "mesh_compliance_error": "largest error of the frames' compliance due to the mesh, as a fraction",
         "mesh_error": "estimated error of the quantity due to the body's mesh, at most, in the quantity's unit",
     }
@@ -161,8 +161,8 @@ def words(planned: xr.Dataset) -> str:
     if not needed and not unseen:
         return f"For {asked} as requested nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
     left = f"{listed(gone)} may be left out" if gone else "nothing may be left out" if not unseen else ""
-    parts = [f"{listed(needed)} must be kept" if needed else "", left]
-    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} kept without a look" if unseen else ""]
+    parts = [f"{listed(needed)} must stay" if needed else "", left]
+    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} unchanged without a run" if unseen else ""]
     return f"For {asked} as requested {'; '.join(filter(None, parts))}."
 
 
@@ -229,7 +229,7 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
         rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
     return Table(
         "What accuracy calls for",
-        ("of each size", "needed", "kept without a look", "may be left out", "modes", "integrated by"),
+        ("of each size", "needed", "unchanged without a run", "may be left out", "modes", "integrated by"),
         tuple(rows),
         (
             "Each accuracy is that of all watched quantities; name one in [accuracy] to get its planned scene. "
@@ -239,7 +239,7 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
 
 
 def _sorted(result: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
-    """Effects in words: those that are needed, those that are kept without evidence, and those that may be left out."""
+    """Effects in words: those that are needed, those that stay without evidence, and those that may be left out."""
     rows = list(zip(result["words"].values, result["kept"].values, result["reason"].values, strict=True))
     return (
         [str(w) for w, recorded, reason in rows if recorded and reason != NOT_WORTH],

@@ -87,7 +87,7 @@ def run_attributes(paths: Mapping[str, Path]) -> dict[str, dict[str, object]]:
 
 
 def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[str, tuple[str, tuple[str, ...]]]:
-    """Each assumption once, with the scenes that make it; places in alphabetical order."""
+    """Each assumption once, with the scenes that make it; paths in alphabetical order."""
     scenes: dict[tuple[str, str], list[str]] = {}
     for scene, facts in attributes.items():
         for where, text in json.loads(str(facts.get("assumptions", "{}"))).items():
@@ -124,7 +124,7 @@ def paper_markdown(content: Content) -> str:
         _pipe(("value", "assumption", "scenes"), assumption_rows(content)),
         "## Discrepancies\n",
         "What the paper leaves open or prints in conflict with itself. Differences in numbers stand below each "
-        "table. Which of its statements on mode sets hold, and at which place of the prismatic joint: "
+        "table. Which of its statements on mode sets hold, and for which position of the prismatic joint: "
         "[reference-conditions.md](reference-conditions.md).\n",
         _pipe(("place", "matter", "here"), [(d.place, d.matter, d.here) for d in DISCREPANCIES]),
     ]

@@ -163,7 +163,7 @@ MESH: Schema = {
 
 #: stage 2: frequencies and shapes under one reference condition, all FE degrees of freedom
 MODES: Schema = DEFICITS | {
-    "frequency": _V(("mode",), "Hz", "natural frequency of the kept coordinate in the reduced basis"),
+    "frequency": _V(("mode",), "Hz", "natural frequency of the retained coordinate in the reduced basis"),
     "shape": _V(("node", "dof", "mode"), "1", "mass-normalised shape: ux uy uz rx ry rz per unit modal coordinate"),
     "node_position": _V(("node", "axis"), "m", "node position in the mesh frame"),
     "cell_node": _V(("cell", "corner"), "1", "node indices of each drawn cell"),

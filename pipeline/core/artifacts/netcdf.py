@@ -1,7 +1,7 @@
 """NetCDF-4 files of labelled arrays, with all that xarray writes into them: the one writer and the one reader.
 
 What xarray keeps next to NetCDF's own types is here, too: coordinates are listed in attributes `coordinates`, truth is
-kept as bytes with the attribute `dtype`, and floats have NaN for what was never written.
+stored as bytes with the attribute `dtype`, and floats have NaN for what was never written.
 """
 
 from __future__ import annotations

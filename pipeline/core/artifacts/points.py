@@ -28,7 +28,8 @@ STATISTICS = ("values", "error", "deviation")
 class Point:
     """What is left of one point.
 
-    values: by the names of what is kept, in SI; with members their mean.  error: distance from the values at a tighter
+    values: by the names of the recorded quantities, in SI; with members their mean.  error: distance from the values at
+    a tighter
     tolerance.  deviation: standard deviation over the members.  Both are empty where nobody asked.
     evaluations: of the right-hand side, all runs of the point together.
     refused: why there are no values; else empty.
@@ -70,7 +71,8 @@ def variable(one: Recorded, statistic: str) -> str:
 
 
 def unit(one: Recorded, turning: Collection[str]) -> str:
-    """Unit of what is kept, as UDUNITS reads it. turning: names of the quantities that are about an axis, not along."""
+    """Unit of a recorded quantity, as UDUNITS reads it. turning: names of the quantities that are about an axis, not
+    along."""
     declared = RUN[KINDS[one.quantity.kind].variable]
     along = declared.turning if one.quantity.name in turning else declared.units
     return "1" if one.reduction == "count" else along
@@ -89,7 +91,7 @@ def dataset(
 ) -> xr.Dataset:
     """All points of a sweep on its own dimensions; nan where there is no value.
 
-    keys: of the points, in their order.  points: the finished ones.  time: of the series that are kept [s].
+    keys: of the points, in their order.  points: the finished ones.  time: of the recorded series [s].
     sections: how many there are of each point.  turning: as of `unit`.  shares: of `SHARES`, those that are asked for.
     """
     dims, shape = design.dims, design.shape

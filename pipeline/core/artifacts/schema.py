@@ -260,7 +260,7 @@ _OF_SECTION = {
     name: _V(("section", *ENSEMBLE[name].dims[2:]), ENSEMBLE[name].units, ENSEMBLE[name].long_name)
     for name in ("position", "quaternion", "velocity", "angular_velocity", "acceleration")
 }
-#: sections of a periodic motion: the state once in each period, and the impacts of all kept periods
+#: sections of a periodic motion: the state once in each period, and the impacts of all recorded periods
 SECTIONS: Schema = _OF_SECTION | {
     "orbit_position": _V(("waypoint", "body", "axis"), "m", "centre of mass at waypoints of the last period"),
     "orbit_quaternion": _V(("waypoint", "body", "quat"), "1", "unit quaternion at waypoints of the last period"),

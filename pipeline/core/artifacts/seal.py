@@ -29,7 +29,7 @@ def same(one: str, other: str) -> bool:
 
 @cache
 def _secret() -> bytes:
-    """The user's; where none can be kept, one of this process, whose work no other one goes on with."""
+    """The user's; where none can be stored, one of this process, whose work no other one goes on with."""
     path = kernel_root() / NAME
     try:
         if not path.is_file() or path.stat().st_size != BYTES:

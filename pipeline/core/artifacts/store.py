@@ -161,7 +161,7 @@ class Store:
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
         """Make the current artifact visible: read-only copies in `folder`, and its facts in ``folder/.facts``.
 
-        An empty `folder` shows nothing.  A shown file that somebody has edited is kept under another name, and
+        An empty `folder` shows nothing.  A shown file that somebody has edited is renamed, and
         reported.
         """
         if not folder:
@@ -188,7 +188,9 @@ class Store:
         if digest_of(target) != known if known else target.stat().st_mode & 0o222:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
             system.replace(target, aside)
-            self.say(f"{self._shown(target)} was edited; the edit is kept as {aside.name}, and the result shown again")
+            self.say(
+                f"{self._shown(target)} was edited; the edit is stored as {aside.name}, and the result shown again"
+            )
 
     def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:
         """Put what is left of work that was stopped next to what is shown; its path, where anything is shown.

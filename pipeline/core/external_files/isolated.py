@@ -1,7 +1,7 @@
 """Files of others are read by a child process, with limits of memory, of time and of what it may answer.
 
 Readers are large, and parts of them are written in C: a file that was damaged, or made to harm, ends or hangs the
-child, and is refused here in words. The child is started when the first such file is read, and kept for the next.
+child, and is refused here in words. The child is started when the first such file is read, and reused for the next.
 """
 
 from __future__ import annotations

@@ -148,7 +148,7 @@ LONGEST_NAME, LONGEST_BYTES = 100, 200
 
 
 def part_name(name: str) -> str:
-    """A part's name that may stand in places such as ``body.FRAME`` and in names of files; ValueError otherwise."""
+    """A part's name that may be part of paths such as ``body.FRAME`` and in names of files; ValueError otherwise."""
     if len(name) > LONGEST_NAME or not re.fullmatch(_NAME, name):
         raise ValueError(f"'{name}' is no name: it is made of up to {LONGEST_NAME} letters, digits, _ and -")
     if len(name.encode()) > LONGEST_BYTES:

@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 
 #: effects that can be taken away, and how a scene without them is called
 EFFECTS = {"clearance": "without clearance", "flexibility": "rigid"}
-#: joint with clearance -> the joint that holds the same places together without; slots and planes have none
+#: joint with clearance -> the joint that connects the same frames without; slots and planes have none
 WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
 #: keys of a flexible body that a rigid one from the same recipe has, too
 KEPT = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)

@@ -32,7 +32,7 @@ def scene_schema() -> dict[str, Any]:
     properties["remove"] = {
         "type": "array",
         "items": {"type": "string"},
-        "description": 'places that are taken away, such as "joint.A1"',
+        "description": 'paths that are taken away, such as "joint.A1"',
     }
     schema |= {
         "if": {"not": {"required": ["extends"]}},

@@ -1,6 +1,6 @@
 """Laws of time: what a prescribed coordinate, or the size of a load, does. One language for drives and loads.
 
-The values of a law are lengths, angles, forces or torques, as the place where it is demands;
+The values of a law are lengths, angles, forces or torques, as the quantity that it prescribes demands;
 a bare number is in SI units. How a law of type 'step' goes is in `pipeline.dynamics.drives.step`.
 """
 
@@ -185,7 +185,7 @@ class Table(Part):
     @model_validator(mode="before")
     @classmethod
     def _read(cls, data: Any) -> Any:
-        """Read the file unless its numbers are there; afterwards only its name is kept."""
+        """Read the file unless its numbers are there; afterwards only its name is stored."""
         if not isinstance(data, dict) or "points" in data or not isinstance(data.get("file"), str):
             return data
         if not isinstance(data.get("time"), dict) or not isinstance(data.get("value"), dict):

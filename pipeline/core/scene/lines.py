@@ -1,4 +1,4 @@
-"""Where in a TOML file a place like ``body.rod.mesh`` is written: errors then name the line.
+"""Where in a TOML file a path like ``body.rod.mesh`` is written: errors then name the line.
 
 The reader of the standard library gives no line numbers, so that keys are searched for in the text.
 """
@@ -17,12 +17,12 @@ _DOTTED = rf"{_KEY}(?:[ \t]*\.[ \t]*{_KEY})*"
 _HEADER = re.compile(rf"^[ \t]*\[\[?[ \t]*({_DOTTED})[ \t]*\]\]?[ \t]*(?:#.*)?$")
 _VALUE = re.compile(rf"^[ \t]*({_DOTTED})[ \t]*=")
 _PLACE = re.compile(r"^(?P<file>.+\.toml) \[(?P<keys>[^\[\]]+)\]$")
-#: tables of edits that a place may stand below
+#: tables of edits that a path may stand below
 EDITS: tuple[tuple[str, ...], ...] = ((), ("replace",), ("set",))
 
 
 def located(error: InputError) -> InputError:
-    """The error with the line of its place behind the place, where a file has it; of several, each."""
+    """The error with the line of its path behind the path, where a file has it; of several, each."""
     if isinstance(error, InputErrors):
         return InputErrors([located(one) for one in error.errors])
     position = where(error)
@@ -35,7 +35,7 @@ def located(error: InputError) -> InputError:
 
 
 def where(error: InputError) -> tuple[Path, int] | None:
-    """File and line of an error's place; the place may be written in a scene that its file extends."""
+    """File and line of an error's path; the path may be written in a scene that its file extends."""
     said = _PLACE.match(error.place)
     if said is None:
         return None
@@ -47,7 +47,7 @@ def _found(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[
         extends, lines = _read(file.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return None
-    # the part itself: of a place below it, the nearest key that is written out
+    # the part itself: of a path below it, the nearest key that is written out
     for length in range(len(keys), min(len(keys), 2) - 1, -1):
         for edit in EDITS:
             if (*edit, *keys[:length]) in lines:

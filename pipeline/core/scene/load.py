@@ -40,7 +40,7 @@ EDITS = ("extends", "replace", "set", "remove")
 def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
     """The scene in a TOML file, with everything that it extends.
 
-    override: dotted path -> value, e.g. ``{"joint.A1.clearance": "0.2 mm"}``; the place's parent
+    override: dotted path -> value, e.g. ``{"joint.A1.clearance": "0.2 mm"}``; the path's parent
     must be there.  Raises InputError (all mistakes at once).
     """
     path = Path(path)
@@ -98,7 +98,7 @@ def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
 
 def _read(table: dict[str, Any], where: Path) -> Scene:
     """The scene that a table says; mistakes, and what asks for more than `[limits]` allows, are reported of this
-    place."""
+    path."""
     try:
         return Scene.model_validate(table)
     except ValidationError as error:
@@ -221,7 +221,7 @@ def _require_tables(table: dict[str, Any], path: Path) -> None:
                 )
     removed = table.get("remove", [])
     if not isinstance(removed, list) or not all(isinstance(where, str) for where in removed):
-        raise InputError(f"{path} [remove]", f"is a list of places, not {removed!r}", 'write remove = ["joint.A1"]')
+        raise InputError(f"{path} [remove]", f"is a list of paths, not {removed!r}", 'write remove = ["joint.A1"]')
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -334,7 +334,7 @@ def _add_parts(result: dict[str, Any], family: str, parts: dict[str, Any], path:
 
 
 def _find(table: Any, path: object, where: str) -> tuple[Any, Any]:
-    """The table or list that holds a place, and its last key; entries of lists are numbered from 0."""
+    """The table or list that holds a path, and its last key; entries of lists are numbered from 0."""
     keys = str(path).split(".")
     for depth, name in enumerate(keys):
         key = _entry(table, name)

@@ -55,7 +55,7 @@ def _guessed(line: str) -> tuple[str, str] | None:
 
 
 def _said(message: str, line: str) -> tuple[str, str | None]:
-    """The reader's own message without its place, and a hint where it needs one."""
+    """The reader's own message without its path, and a hint where it needs one."""
     text = _PLACE.sub("", message)
     twice = re.match(r"Cannot declare \((.*?),?\) twice", text)
     if twice:

@@ -41,7 +41,7 @@ SCALARS = ("drive_force",)
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """A quantity and the reduction of it that is kept."""
+    """A quantity and the reduction of it that is recorded."""
 
     quantity: Quantity
     reduction: str

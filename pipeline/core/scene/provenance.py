@@ -1,4 +1,4 @@
-"""Where values come from: what scenes and recipes say of that in `source`, reported by place, or left out."""
+"""Where values come from: what scenes and recipes say of that in `source`, reported by path, or left out."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def sources(table: Mapping[str, Any], path: str = "") -> dict[str, str]:
-    """Place -> text of every `source` at and below a table; of the table itself by its place, or by that of its key."""
+    """Place -> text of every `source` at and below a table; of the table itself by its path, or by that of its key."""
     sources: dict[str, str] = {}
     for where, source in _sources(table, path):
         sources |= {where: source} if isinstance(source, str) else {_below(where, key): t for key, t in source.items()}
@@ -24,7 +24,7 @@ def mistaken(table: Mapping[str, Any]) -> str | None:
 
 
 def _sources(node: Any, where: str) -> Iterator[tuple[str, Any]]:
-    """Every `source` that is there, with the place of what it is about."""
+    """Every `source` that is there, with the path of what it is about."""
     if isinstance(node, Mapping):
         if node.get("source") is not None:
             yield where, node["source"]

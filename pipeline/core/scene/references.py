@@ -16,7 +16,7 @@ Recipe = Callable[[str], Collection[str] | None]
 
 
 def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputError]:
-    """Every name in a composed scene table that leads nowhere; `path` opens each place."""
+    """Every name in a composed scene table that leads nowhere; `path` opens each location."""
     frames = {name: _frames(body, recipe) for name, body in _tables(table.get("body"))}
     joints = [name for name, _ in _tables(table.get("joint"))]
     errors: list[InputError] = []

@@ -12,7 +12,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 ALWAYS, BODY, JOINT, CONTACT, LOAD, MODE = 200, 160, 100, 350, 100, 24
 #: a run is in memory so many times at its end, measured 3.5 to 4.4; and on disk, in the cache and shown
 HELD, KEPT = 4.5, 2.0
-#: of a member of an ensemble only some bodies' motion is kept, at most as often as this
+#: of a member of an ensemble only some bodies' motion is recorded, at most as often as this
 MEMBER_ROWS = 2000
 SPEND = "choose a longer output.interval, or say more in [limits]"
 

@@ -61,7 +61,7 @@ class TimeSpan(Part):
 class Ensemble(Part):
     """Members that start with the ball of every clearance joint offset in a random direction.
 
-    bodies: whose motion is kept; default: the bodies that carry the clearance joints.
+    bodies: whose motion is recorded; default: the bodies that carry the clearance joints.
     members: how many runs.  perturbation: by which length the balls are offset.  seed: of the random directions.
     """
 
@@ -75,10 +75,11 @@ class Sections(Part):
     """A motion that its laws repeat, looked at once in each period: see ``flexclear sections``.
 
     period: of the laws of drives and loads, from the run's start on; without it the run is one period.
-    phase: when in the period the motion is examined [s].  transient: periods that are not kept, before the `periods`
+    phase: when in the period the motion is examined [s].  transient: periods that are not recorded, before the
+    `periods`
     that are.  exponent_periods: how many of these are followed by a neighbour too, which gives the rate at which
-    motions part.  bodies: whose motion is kept; default: as of an ensemble, or all without clearance.
-    periods: that are kept.
+    motions part.  bodies: whose motion is recorded; default: as of an ensemble, or all without clearance.
+    periods: that are recorded.
     """
 
     period: Annotated[Time, Field(gt=0.0)] | None = None
@@ -106,7 +107,8 @@ class Accuracy(Part):
     ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities:
     `pipeline.core.scene.requested_accuracy`.
     quantities: a file writes them without this key.
-    allow_missed: what is missed is reported either way, and the run kept; without this the command ends with an error.
+    allow_missed: what is missed is reported either way, and the run is stored; without this the command ends with an
+    error.
     by_need: whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step.
     """
 

@@ -1,4 +1,5 @@
-"""What is wrong with a scene file, in words: pydantic's findings as input errors with place, value, rule and remedy."""
+"""What is wrong with a scene file, in words: pydantic's findings as input errors with location, value, rule and
+remedy."""
 
 from __future__ import annotations
 
@@ -37,13 +38,13 @@ CHOOSING = ("type", "law")
 #: bounds of numbers, whose messages hold the bound
 BOUNDS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 
-#: a message of a whole scene that opens with the place that it is about
+#: a message of a whole scene that opens with the path that it is about
 _NAMED = re.compile(r"([a-z_]+(?:\.[\w-]+)+): ")
 
-#: how pydantic calls, in a place, the alternative of a number or text that a validator reads
+#: how pydantic calls, in a path, the alternative of a number or text that a validator reads
 VALIDATORS = ("function-", "constrained-", "literal[")
 
-#: models that are chosen otherwise than by their type -> how pydantic calls them in a place
+#: models that are chosen otherwise than by their type -> how pydantic calls them in a path
 TAGS = {
     "MeshedRigidBody": ("meshed",),
     "JointDrive": ("joint-drive",),
@@ -114,9 +115,9 @@ def _reworded(error: Any) -> str:
 
 
 def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], list[str], list[str]]:
-    """Keys of a place as the file has them, the keys that are known next to its last one, and the types it may have.
+    """Keys of a path as the file has them, the keys that are known next to its last one, and the types it may have.
 
-    pydantic puts the type by which it chose a part's model into the place; the file has no such key.
+    pydantic puts the type by which it chose a part's model into the path; the file has no such key.
     """
     keys, here, known_keys = list[Any](), [model], list[str]()
     for key in loc:

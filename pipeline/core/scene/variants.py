@@ -1,6 +1,6 @@
 """Variants of a scene: which of its effects can be taken away, the scene without some of them, and that as a file.
 
-An effect is named by the place that goes with it: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
+An effect is named by the path that goes with it: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
 ``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant differs from its scene by parts
 replaced and removed only, so that it can be written as a file that extends the scene's.
 """
@@ -30,7 +30,7 @@ BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One effect of a scene. name: the place that goes with it.  kind: what it is.  within: the effect without which
+    """One effect of a scene. name: the path that goes with it.  kind: what it is.  within: the effect without which
     it is nothing, as friction is without its clearance; else empty."""
 
     name: str

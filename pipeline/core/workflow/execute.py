@@ -111,7 +111,8 @@ def _with_files(task: Task, known: Mapping[str, str], store: Store) -> tuple[Map
 
 
 def _noted(task: Task, plain: str, read: Mapping[str, str], store: Store) -> dict[str, str]:
-    """Facts of the files that were opened now, and of others that once were; their names are kept for the next time."""
+    """Facts of the files that were opened now, and of others that once were; their names are stored for the next
+    time."""
     names = set(store.names(task.stage, plain))
     if not names >= read.keys():
         store.keep_names(task.stage, plain, sorted(names | read.keys()))

@@ -147,7 +147,7 @@ def _place(name: str, base: Path) -> str:
 
 
 def digests(names: Iterable[str], base: Path) -> dict[str, str]:
-    """What the files of these places hold now, as `watched` gives it."""
+    """Content of the files in these folders, as `watched` gives it."""
     return {name: digest(os.path.normpath(base / name)) for name in names}
 
 

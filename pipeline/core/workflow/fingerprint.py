@@ -259,7 +259,7 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def _parsed(source: bytes) -> ast.Module:
-    """The syntax tree. CPython counts in one place how deep all threads are in theirs, and may find that it is wrong.
+    """The syntax tree. CPython has one counter of how deep all threads are in theirs, and may find that it is wrong.
 
     That is so in 3.11 and 3.12 at least (its issue 106905); runs, perturbed runs and members of ensembles are threads.
     """

@@ -197,7 +197,7 @@ _current: ContextVar[Journal | None] = ContextVar("journal", default=None)
 
 
 def current() -> Journal | None:
-    """The journal of the task that is worked on; None where nothing is kept."""
+    """The journal of the task that is worked on; None where nothing is stored."""
     return _current.get()
 
 
@@ -213,6 +213,6 @@ def storage(folder: Path, key: str) -> Iterator[Journal]:
 
 
 def seconds() -> float:
-    """Processor time of this process [s], as if the work had never been interrupted, and nothing were kept of it."""
+    """Processor time of this process [s], as if the work had never been interrupted, and nothing of it were stored."""
     mine = _current.get()
     return time.process_time() + (mine.restored - mine.aside if mine is not None else 0.0)

@@ -105,7 +105,7 @@ def flatten(node: Any, where: str = "") -> list[tuple[str, str]]:
     """Dotted path -> canonical text of every leaf of a JSON tree; floats by repr.
 
     Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
-    date or a nan that somebody wrote into a recipe) is kept as text; the stage will refuse it.
+    date or a nan that somebody wrote into a recipe) is stored as text; the stage will refuse it.
     """
     leaves: list[tuple[str, str]] = []
     _gather(node, where, leaves)

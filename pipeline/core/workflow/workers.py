@@ -126,7 +126,7 @@ def reused() -> Iterator[None]:
 
 
 def of_a_command() -> bool:
-    """Whether this process is a command's own: inside of `kept`."""
+    """Whether this process is a command's own: inside of `reused`."""
     return _keeping > 0
 
 
@@ -136,7 +136,7 @@ def team(width: int) -> Iterator[Team]:
     with ExitStack() as stack:
         while _idle and _idle[-1].width < width:
             _idle.pop().end()
-        # one that is kept may serve a wider call next; who is never needed is never started
+        # a reused one may serve a wider call next; who is never needed is never started
         mine = _idle.pop() if _idle else Team.begun(max(width, cores.cores()) if _keeping else width)
         stack.callback(mine.kill)
         while not mine.reports.empty():  # of the last call

@@ -88,7 +88,7 @@ def with_reference(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chos
 def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
     """The study's dataset; `runs` holds what each point left, by key.
 
-    A run that was refused has no values: its place is NaN and its reason is in `refused`.
+    A run that was refused has no values: its entry is NaN and its reason is in `refused`.
     Raises SolverError when that is the reference.
     """
     reference = runs[next(p.key for p in points if p.group == "reference")]

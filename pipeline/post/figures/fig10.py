@@ -14,7 +14,7 @@ NEEDS = ("sps4/far_csj_cb:run",)
 STRUCTURE = (
     ("recipe → mesh of beam elements", ""),
     ("modes under a reference condition,\nstatic shapes", "1"),
-    ("inertia invariants and stiffness\nof the modes, kept in a bundle", "1"),
+    ("inertia invariants and stiffness\nof the modes, stored in a bundle", "1"),
 )
 START = (
     ("joints → tree and closures,\nrigidly joined bodies merged", "2"),

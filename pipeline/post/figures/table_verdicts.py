@@ -88,7 +88,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         f"{SEPARATION:g} standard deviations. Costs agree within a factor of {NEAR:g}. In brackets: numbers of the "
         "layout assumed before one was identified from Table 8; the verdict is on the others. The prismatic joint is "
         "at the rod's lower end here; [reference-conditions.md](reference-conditions.md) judges mode sets at other "
-        "places, over layouts of the mechanism, and against the full rod, [chaos.md](chaos.md) the motion under a "
+        "positions, over layouts of the mechanism, and against the full rod, [chaos.md](chaos.md) the motion under a "
         "repeated stroke, [geometry.md](geometry.md) what Table 8 says of the joint coordinates. Tables 4 "
         "and 5 have verdicts of their own below them.",
     )

@@ -144,11 +144,11 @@ def measured(value: float, error: float, unit: str) -> str:
         return f"{rounded(value, 4)} {written}"
     if error <= 0.0 or np.isinf(error):
         return f"{rounded(value, 4)} ± {error:g} {written}"
-    places = 1 - int(np.floor(np.log10(error)))
-    if places > 6 or error < 1e-4 * abs(value):
+    decimals = 1 - int(np.floor(np.log10(error)))
+    if decimals > 6 or error < 1e-4 * abs(value):
         return f"{rounded(value, 4)} ± {rounded(error, 2)} {written}"
-    shown = max(places, 0)
-    return f"{round(value, places):.{shown}f} ± {round(error, places):.{shown}f} {written}"
+    shown = max(decimals, 0)
+    return f"{round(value, decimals):.{shown}f} ± {round(error, decimals):.{shown}f} {written}"
 
 
 def impacts(count: int) -> str:

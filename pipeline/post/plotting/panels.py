@@ -80,7 +80,7 @@ def six_panels(
     axes[4, 1].set_title("(f) centre of ball A1, minus ideal, global frame")
     ball_distance(axes[5, 1], reference, others)
     for panel in axes.flat:
-        # the same place in every panel; aligning by the tick labels' sizes takes seconds
+        # the same position in every panel; aligning by the tick labels' sizes takes seconds
         panel.yaxis.set_label_coords(-0.105, 0.5)
     return figure, axes[0, 0]
 
@@ -155,7 +155,7 @@ def deviation(quantity: Quantity, motion: Motion, reference: Motion) -> tuple[np
 
 
 def ball_deviation(axes: Axes, reference: Motion, others: Sequence[Motion], clearance: float = 0.0) -> None:
-    """Where the ball's centre is next to its place in the ideal model, x-z plane of the world, equal scales.
+    """Where the ball's centre is relative to its position in the ideal model, x-z plane of the world, equal scales.
 
     The path itself is 60 mm long: nothing is seen on it.
     """

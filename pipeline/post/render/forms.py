@@ -24,7 +24,7 @@ from flexclear.pipeline.post.render.surfaces import Surface
 WIDTH, WIDEST = 0.016, 0.2
 #: thickness of flat links, in half widths
 FLAT = 0.9
-#: places nearer to each other than this many half widths are one
+#: points closer to each other than this many half widths are one
 NEAR = 0.3
 #: a solid is slender where it is so many times longer than thick
 SLENDER = 2.5
@@ -38,7 +38,7 @@ BALLS = ("spherical", "clearance-spherical", "ball-on-plane")
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """A joint's place on a body: frame name, its origin and axes in the body's, type of the joint, which side it is."""
+    """A joint's frame on a body: frame name, its origin and axes in the body's, type of the joint, which side it is."""
 
     frame: str
     origin: np.ndarray
@@ -96,7 +96,7 @@ def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
 
 
 def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
-    """A body whose joints are all in one place, or that has none."""
+    """A body whose joints are all at one point, or that has none."""
     width = WIDTH * size
     point = places[0] if len(places) else com
     arm = com - point
@@ -174,20 +174,20 @@ def _common_axis(seats: Sequence[Seat]) -> np.ndarray | None:
 
 
 def _line(places: np.ndarray, width: float) -> np.ndarray | None:
-    """Direction of a line on which all places lie."""
+    """Direction of a line on which all points lie."""
     way = places - places.mean(axis=0)
     _, size, axes = np.linalg.svd(way, full_matrices=False)
     return axes[0] if len(size) < 2 or size[1] < 0.5 * width else None
 
 
 def _plane(places: np.ndarray, width: float) -> np.ndarray | None:
-    """Normal of a plane in which all places lie."""
+    """Normal of a plane in which all points lie."""
     _, size, axes = np.linalg.svd(places - places.mean(axis=0))
     return axes[2] if len(size) < 3 or size[2] < 0.5 * width else None
 
 
 def _apart(places: Sequence[np.ndarray], same: float) -> np.ndarray:
-    """The places, those closer than `same` to an earlier one left out, shape (n, 3)."""
+    """The points, those closer than `same` to an earlier one left out, shape (n, 3)."""
     offsets: list[np.ndarray] = []
     for point in places:
         if all(np.linalg.norm(point - other) > same for other in offsets):

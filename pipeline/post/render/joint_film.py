@@ -37,7 +37,7 @@ def frames(
         (trail,) = left.plot([], [], color="#D55E00", lw=1.8, animated=True)
         (dot,) = left.plot([], [], "o", color=style.INK, ms=8, animated=True)
         (mark,) = right.plot([], [], "o", color=style.INK, ms=6, animated=True)
-        figure.suptitle(" ", fontsize=12)  # keeps the place of the clock
+        figure.suptitle(" ", fontsize=12)  # reserves the area of the clock
         clock = figure.text(0.5, 0.965, "", ha="center", va="center", fontsize=12, fontweight="bold", animated=True)
         canvas.draw()
         still = canvas.copy_from_bbox(figure.bbox)

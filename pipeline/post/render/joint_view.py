@@ -12,7 +12,7 @@ from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View
 from flexclear.pipeline.post.series import parameters
 
-#: colour of a path, as in the plots of orbits; most places of it that are drawn
+#: colour of a path, as in the plots of orbits; most points of it that are drawn
 PATH_COLOR, PLACES = "#009E73", 1500
 #: radius of the mark at the centre and of the path, as fractions of the room's size
 MARK, PATH = 0.05, 0.006

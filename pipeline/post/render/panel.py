@@ -27,7 +27,7 @@ MARGIN = 6.0
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A figure whose still part is kept as pixels; `cursors` are (dot, x, y) and `clock` shows the time."""
+    """A figure whose still part is stored as pixels; `cursors` are (dot, x, y) and `clock` shows the time."""
 
     canvas: FigureCanvasAgg
     background: Any
@@ -70,7 +70,7 @@ def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Seque
         axes[2].set_title(f"{run['contact'].values[number]} {centre(run, number).removeprefix('centre ')}")
         cursors.append((_dot(axes[2], 7), x, y))
     titles = [panel.set_title(panel.get_title(loc="left"), loc="left", fontsize=8.2) for panel in axes]
-    figure.suptitle(" ", fontsize=13)  # keeps the place of the clock
+    figure.suptitle(" ", fontsize=13)  # reserves the area of the clock
     clock = figure.text(
         0.5, 0.972, "", ha="center", va="center", fontsize=13, fontweight="bold", color=style.INK, animated=True
     )

@@ -93,7 +93,7 @@ def _arrows(drawn: Mechanism, step: int, largest: float) -> bytes:
 
 
 def arrow(point: np.ndarray, way: np.ndarray, thick: float) -> Surface:
-    """An arrow that begins at a place, as long and directed as `way`."""
+    """An arrow that begins at a point, as long and directed as `way`."""
     length = float(np.linalg.norm(way))
     head = min(6.0 * thick, 0.4 * length)
     shaft = surfaces.moved(surfaces.cylinder(thick, length - head), np.array([0.0, 0.0, 0.5 * (length - head)]))
@@ -109,7 +109,7 @@ def arrow(point: np.ndarray, way: np.ndarray, thick: float) -> Surface:
 
 
 def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Forces on bodies with the places where they act: kind, (time, n, 3) [m], (time, n, 3) [N], world axes."""
+    """Forces on bodies with the points where they act: kind, (time, n, 3) [m], (time, n, 3) [N], world axes."""
     given, frames = (
         parameters(run),
         {str(name): k for k, name in enumerate(run["frame"].values)} if "frame" in run.coords else {},

@@ -38,7 +38,7 @@ def columns(
 ) -> dict[str, np.ndarray]:
     """Exact frequencies [Hz] by theory, each of shape (mode,); empty where no closed form applies.
 
-    families: of the kept modes in ascending order, without gaps within a family.
+    families: of the retained modes in ascending order, without gaps within a family.
     interfaces: frames that the reference condition holds, in its order.
     """
     rod, ends = uniform(mesh), _ends(mesh, reference, interfaces)

@@ -1,4 +1,4 @@
-r"""Spatial beams of two nodes: stiffness and mass of a rod of any section, in any theory and place.
+r"""Spatial beams of two nodes: stiffness and mass of a rod of any section, in any theory and position.
 
 .. math:: 2U = \int EA\,u'^2 + GJ\,\varphi'^2 + E(I_z \psi_v'^2 + I_y \psi_w'^2 + 2I_{yz}\psi_v'\psi_w')
                + \kappa_y GA\gamma_y^2 + \kappa_z GA\gamma_z^2 ,\qquad
@@ -182,7 +182,7 @@ def _basis(mesh: xr.Dataset, kinematics: Kinematics) -> Basis:
 
 
 def _unknowns(mesh: xr.Dataset, basis: Basis, kinematics: Kinematics) -> tuple[np.ndarray, np.ndarray, sp.csr_array]:
-    """Component and place of each unknown, and the signed permutation from vectors to scikit-fem's order."""
+    """Component and position of each unknown, and the signed permutation from vectors to scikit-fem's order."""
     x, cells = mesh["abscissa"].values, mesh["cell_node"].values
     by_node = np.argsort(NODE_COMPONENT)
     nodal = basis.nodal_dofs[by_node].T.ravel()

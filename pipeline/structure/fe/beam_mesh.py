@@ -145,7 +145,7 @@ def _types(types: Any) -> str:
 
 
 def _node_at(x: np.ndarray, position: float, where: str) -> int:
-    """Index of the node at `place` [m]; what lies between nodes would need interpolated constraints."""
+    """Index of the node at `position` [m]; what lies between nodes would need interpolated constraints."""
     nearest = int(np.argmin(np.abs(x - position)))
     if abs(x[nearest] - position) <= SAME_PLACE * x[-1]:
         return nearest

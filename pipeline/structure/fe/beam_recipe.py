@@ -14,7 +14,7 @@ from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, ch
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
-#: places along a rod that differ by less than this fraction of its length are the same; they come from decimal text
+#: positions along a rod that differ by less than this fraction of its length are the same; they come from decimal text
 SAME_PLACE = 1e-9
 
 
@@ -33,7 +33,7 @@ class Segment(Part):
 
     end_section: the section at `end` when it tapers linearly from `section`, of the same type.
     material: where it differs from the recipe's.
-    start, end: places along the rod.  elements: number of elements.  section: cross section.  inertia_section: gives
+    start, end: positions along the rod.  elements: number of elements.  section: cross section.  inertia_section: gives
     the second moments of the mass; default: `section`.
     """
 

@@ -38,7 +38,7 @@ def read_recipe(path: str | Path) -> dict[str, Any]:
 
 
 def parse(table: Mapping[str, Any], where: str) -> Recipe:
-    """The recipe that a table holds; `place` opens every message of an InputError."""
+    """The recipe that a table holds; `where` opens every message of an InputError."""
     model = _model(table, where)
     try:
         return model.model_validate(dict(table))

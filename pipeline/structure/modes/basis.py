@@ -102,7 +102,7 @@ def _static(body: Body) -> np.ndarray:
 def _joined(body: Body, static: np.ndarray, modes: Normal, count: int) -> Basis:
     shapes = modes.shapes[:, :count]
     if body.condition.residual and static.size:
-        # what the kept modes answer of a load: phi phi^T f / omega^2, with f = K u
+        # what the retained modes answer of a load: phi phi^T f / omega^2, with f = K u
         static = static - shapes @ (shapes.T @ (body.model.mass @ static))
     vectors = np.hstack([static, shapes])
     if body.condition.mean_axes and body.condition.held.shape[0]:

@@ -35,7 +35,7 @@ class Condition:
     held: functionals that vanish in every normal mode, shape (c, ndof).
     moved: rows of `held`; each gives a constraint mode, in which it is one and the others are zero.
     loaded: functionals whose unit loads give attachment modes, shape (s, ndof).
-    residual: whether the kept normal modes' share is taken out of the attachment modes.
+    residual: whether the retained normal modes' part is taken out of the attachment modes.
     mean_axes: whether rigid motion is taken out of every shape (Tisserand's condition: no momentum).
     note: which rigid-body motion was removed, and how.
     """

@@ -26,7 +26,7 @@ def orient(model: Model, values: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def _rank(model: Model) -> np.ndarray:
-    """A weight per local component that separates the families, and within one the places along the body."""
+    """A weight per local component that separates the families, and within one the positions along the body."""
     families = model.families
     return 0.25 * (1.0 - families.along) + (len(families.names) - 1 - families.member)
 

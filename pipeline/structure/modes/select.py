@@ -21,7 +21,7 @@ MARGIN = 8
 class ModeRequest:
     """What decides the number of coordinates; nothing at all means every one that the mesh has.
 
-    count: elastic coordinates, static ones included.  up_to: highest normal frequency kept [Hz].
+    count: elastic coordinates, static ones included.  up_to: highest normal retained frequency [Hz].
     compliance: least fraction of the static compliance between the interfaces, in each direction.
     mass: least fraction of the mass that moves with the basis, in each direction.
     """
@@ -68,7 +68,7 @@ def request(count: int | None, available: int, static: int = 0) -> Request:
 def whole(values: np.ndarray, requested: Request) -> int:
     """`requested.normal`, or InputError when it would keep a part of a cluster of equal frequencies.
 
-    values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are kept unless there are no more.
+    values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are retained unless there are no more.
     """
     n = requested.normal
     for start, stop in clusters(values):

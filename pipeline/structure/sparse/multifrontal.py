@@ -96,7 +96,7 @@ Runs = list[tuple[slice, slice]]
 
 
 def _runs(at: np.ndarray) -> Runs:
-    """Consecutive places, and which entries of `at` they are: to add slices is much quicker than to add by index."""
+    """Consecutive indices, and which entries of `at` they are: to add slices is much quicker than to add by index."""
     if not len(at):
         return []
     ends = np.concatenate([[0], np.flatnonzero(np.diff(at) != 1) + 1, [len(at)]]).tolist()

@@ -48,7 +48,7 @@ class Contents:
 
 
 def table(model: Model) -> Table:
-    """What the unknowns of a model are, read from its rigid motions; nodes are numbered by place."""
+    """What the unknowns of a model are, read from its rigid motions; nodes are numbered by position."""
     moved = np.abs(model.rigid) > 0.0
     component = np.where(moved[:, :3].any(axis=1), np.argmax(moved[:, :3], axis=1), 3 + np.argmax(moved[:, 3:], axis=1))
     component[~moved.any(axis=1)] = COMPONENTS.index("internal")

@@ -26,7 +26,7 @@ TET_FACES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 class Element:
     """One type of cell.
 
-    cell: meshio's name.  local: places of its nodes in the reference cell, shape (nodes, 3).
+    cell: meshio's name.  local: positions of its nodes in the reference cell, shape (nodes, 3).
     faces: corner nodes of each face.  between: corners whose mean is close to a node that is no corner, by node.
     stiffness_order, mass_order: degrees that the quadrature integrates; the mass of cells with curved sides is exact.
     """

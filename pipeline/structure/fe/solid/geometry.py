@@ -56,7 +56,7 @@ def boundary(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _faces(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
-    """Each face once: its first place among the faces of all cells in turn, and the number of cells that have it."""
+    """Each face once: its first index among the faces of all cells in turn, and the number of cells that have it."""
     faces = np.array(ELEMENTS[geometry.element].faces)
     corners = np.sort(geometry.cells[:, faces], axis=2).reshape(-1, faces.shape[1])
     _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)

@@ -99,7 +99,7 @@ def _extruded(section: np.ndarray, quads: np.ndarray, length: float, layers: int
     x = np.linspace(0.0, length, 2 * layers + 1)
     n = len(section)
     nodes = np.column_stack([np.repeat(x, n), np.tile(section, (len(x), 1))])
-    # VTK's order from places on the 3 by 3 by 3 lattice: first axis x, then the quad's own two
+    # VTK's order from points on the 3 by 3 by 3 lattice: first axis x, then the quad's own two
     lattice = (2.0 * ELEMENTS["hex27"].local).astype(int)
     i, j, k = lattice.T
     cells = [n * (2 * layer + i) + quads[:, j, k] for layer in range(layers)]

@@ -81,7 +81,7 @@ def areas(geometry: Geometry, nodes: np.ndarray) -> np.ndarray:
 
 
 def centre(x: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Weighted centre of places (n, 3)."""
+    """Weighted centre of points (n, 3)."""
     return weight @ x / weight.sum()
 
 

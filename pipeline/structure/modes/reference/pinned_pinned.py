@@ -17,7 +17,7 @@ WHERE = "modes.interfaces"
 
 
 def condition(model: Model, given: Given) -> Condition:
-    """Normal modes between two pins; InputError without two interfaces at different places."""
+    """Normal modes between two pins; InputError without two interfaces at different points."""
     if len(given.interfaces) < 2:
         raise InputError(WHERE, "a pinned-pinned basis needs two interfaces", "name two of the recipe's frames")
     first, second = given.interfaces[:2]
