@@ -74,7 +74,7 @@ def _compiled(function: Callable) -> Any:
 
 
 def row_reader(index: int, size: int) -> Any:
-    """row(h, i): h[place] + size i."""
+    """row(h, i): h[index] + size i."""
 
     def row(h, i):
         return h[index] + size * i
@@ -83,7 +83,7 @@ def row_reader(index: int, size: int) -> Any:
 
 
 def field_reader(index: int, size: int, field: int) -> Any:
-    """read(h, i): h[h[place] + size i + field]."""
+    """read(h, i): h[h[index] + size i + field]."""
 
     def read(h, i):
         return h[h[index] + size * i + field]

@@ -13,7 +13,7 @@ from numba.core.typing.templates import make_intrinsic_template
 
 
 class Lookup:
-    """h[place] + size i, or what is in h by `field` beyond that; h: a pointer to integers, or an array of them."""
+    """h[index] + size i, or what is in h by `field` beyond that; h: a pointer to integers, or an array of them."""
 
     def __init__(self, name: str, place: int, size: int, field: int | None) -> None:
         def typed(typing_context: Any, h: Any, i: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The memory through which scene and compiled kernels speak: every place, row and field is declared here, once.
+"""The memory through which scene and compiled kernels speak: every index, row and field is declared here, once.
 
 A kernel's code depends only on the kinds of parts present. Everything else, how many there
 are, what is joined to what, every number, is in four flat arrays that every kernel takes:
@@ -8,12 +8,13 @@ are, what is joined to what, every number, is in four flat arrays that every ker
 - ``w`` (floats): the work space, the integrator's state and stages included;
 - ``n`` (integers): what changes while a run goes on.
 
-Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the place in w where a stretch begins,
-``m.LINKS.parent(h, i)`` a field of row i of a wiring table, ``m.LINK_NUMBERS.row(h, i)`` the place of row i of a
+Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the index in w where a stretch begins,
+``m.LINKS.parent(h, i)`` a field of row i of a wiring table, ``m.LINK_NUMBERS.row(h, i)`` the index of row i of a
 table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.  Python reads the same rows by the
 names of their fields (`named`), and rows of the record by what they hold (`record`).
 
-Flat arrays, because a compiled call costs what its arguments cost, and compilation too.  No two of them share memory,
+Flat arrays, because a compiled call costs what its arguments cost, and compilation too.  No two of them overlap in
+memory,
 and the compiler knows: what a kernel has read from h stays read, whatever it writes into w.  So a kernel that writes is
 never given one of them twice.
 
@@ -23,7 +24,7 @@ speed; free ones come first, in the order of elimination (descendants before anc
 *column* is the twist (angular velocity; velocity of the point at the kernels' origin) per unit of a coordinate; every
 coordinate has one, and every port one more per moving shape of its body.
 
-Modes stand in X, U and the state as eigenmodes, in all else that has coordinates (DU, BIAS, COLUMNS, MASS, JACOBIAN,
+Modes are in X, U and the state as eigenmodes, in all else that has coordinates (DU, BIAS, COLUMNS, MASS, JACOBIAN,
 ...) in their body's interface basis (`bodies.interface`).
 """
 
@@ -48,7 +49,7 @@ from flexclear.pipeline.dynamics.kernels import field_reader, kernel, row_reader
 _place = count()
 #: tables in h, f and w, in their order there
 TABLES: dict[str, list[Any]] = {"h": [], "f": [], "w": []}
-#: places in the header of h by the names that kernels use (`fields`): of sizes, and of stretches of w
+#: indices in the header of h by the names that kernels use (`fields`): of sizes, and of stretches of w
 SIZES: dict[str, int] = {}
 STRETCHES: dict[str, int] = {}
 #: rows of tables and layouts as NumPy has them, by the class of what declares them
@@ -56,12 +57,12 @@ _ROWS: dict[type, np.dtype[Any]] = {}
 
 
 def _places(number: int) -> list[int]:
-    """The next places of the header of h."""
+    """The next indices of the header of h."""
     return [next(_place) for _ in range(number)]
 
 
 def _named(kind: dict[str, int], declared: str) -> list[int]:
-    """The next places of the header of h, which join those of their kind by name."""
+    """The next indices of the header of h, which join those of their kind by name."""
     names = declared.split()
     places = _places(len(names))
     kind.update(zip(names, places, strict=True))
@@ -103,12 +104,14 @@ def _table(array: str, declared: str, access: Callable[[int, int, int], Any]) ->
 
 
 def wiring(declared: str) -> Any:
-    """A table in h: its `place` in the header, `size` and `row(h, i)` of its rows, and for each field field(h, i)."""
+    """A table in h: its `place` (index) in the header, `size` and `row(h, i)` of its rows, and for each field field(h,
+    i)."""
     return _table("h", declared, field_reader)
 
 
 def numbers(declared: str) -> Any:
-    """A table in f: its `place` in the header, `size` and `row(h, i)` of its rows, and where each field begins."""
+    """A table in f: its `place` (index) in the header, `size` and `row(h, i)` of its rows, and where each field
+    begins."""
     return _table("f", declared, lambda path, size, begin: begin)
 
 
@@ -118,7 +121,7 @@ def work(declared: str) -> Any:
 
 
 def named(rows: Any, entries: np.ndarray) -> np.ndarray:
-    """Entries with named fields, a view; rows of a table or layout stand one after the other along the last axis."""
+    """Entries with named fields, a view; rows of a table or layout follow each other along the last axis."""
     return entries.view(_ROWS[type(rows)])
 
 
@@ -159,19 +162,20 @@ EVALUATE, PROJECT, RETRACT, RATES = ADDRESSES = _places(4)
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1
 LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by")
 SITES = wiring("link port")  # port: or -1
-#: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes share entries of
-#: the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0, n_basis: entries
-#: of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in that basis
+#: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes have common
+#: entries of the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0,
+#: n_basis: entries of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in
+#: that basis
 FLEXES = wiring("link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0")
 BASIS = wiring("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
 MOMENTS = wiring("mode")  # mode i of int rho S_ki S_lj, row after row
-MOMENT_ROWS = wiring("end")  # per body and row (3k + l) n + j of these: place in MOMENTS after its last one
+MOMENT_ROWS = wiring("end")  # per body and row (3k + l) n + j of these: index in MOMENTS after its last one
 PORTS = wiring("flex column shapes")  # column, shapes: first of them, those of moving shapes
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")
-#: rows of the mass matrix. first: column; origin: place of column 0, which may lie before that of the first
+#: rows of the mass matrix. first: column; origin: index of column 0, which may lie before that of the first
 ENVELOPE = wiring("first origin")
-#: threes: of rows that are solved for, which stand side by side in JACOBIAN and SPREAD and are worked on together; the
+#: threes: of rows that are solved for, which are adjacent in JACOBIAN and SPREAD and are worked on together; the
 #: last of them may end with zeros.  coupling: that this closure is, or -1
 CLOSURES = wiring(
     "site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept threes coupling"
@@ -184,7 +188,7 @@ COUPLINGS = wiring("first second")  # gauges of two joint coordinates, of which 
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
 CLOSURE_ENVELOPE = wiring("first origin")  # of the rows that are solved for
-#: outer, inner: sites; friction: its law or -1; bristle: place of the bristles' deflection in the state or -1
+#: outer, inner: sites; friction: its law or -1; bristle: index of the bristles' deflection in the state or -1
 CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: their kind; of a stop its gauge
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first
 PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
@@ -193,7 +197,7 @@ PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
 LOADS = wiring("a b law0 number0 gauge measured internal0 follows")
 LOAD_KINDS = wiring("load0 n_loads")
 #: how a joint coordinate is measured between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
-#: turns: place of the angle with its full turns among the internal states or -1
+#: turns: index of the angle with its full turns among the internal states or -1
 GAUGES = wiring("a b turns turning side axis sine_f sine_g cosine_f cosine_g")
 #: ideal joints with friction. site_a, site_b: of their frames; link: whose inboard joint it is, or -1; reversed:
 #: whether that link is on the side of the first frame; closure: that it is, or -1
@@ -258,13 +262,13 @@ BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = 
 )
 #: wrenches of the closure rows; then, of the couplings, those on their first joints
 ROWS = work("moment:3 force:3")
-#: ROW_SCALE: per kept row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
+#: ROW_SCALE: per selected row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
 #: room for all rows, that of the last evaluation, which may be a trial far away
 JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _named(
     STRETCHES, "jacobian spread schur row_scale pivot multiplier"
 )
-#: per kept row its distance from those before it, at the end of the step, at its start, and the most that it has been,
-#: each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
+#: per selected row its distance from those before it, at the end of the step, at its start, and the most that it has
+#: been, each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
 INDEPENDENCE, COLLOCATION = _named(STRETCHES, "independence collocation")
 COLLOCATION_ROWS = 13
 #: smallest pivot of J M^-1 J^T as fraction of its row's largest diagonal entry (1: rows at right angles, 0:

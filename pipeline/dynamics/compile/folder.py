@@ -1,4 +1,4 @@
-"""The folder of compiled kernels: whose it is, for which processor, and how it is kept small.
+"""The folder of compiled kernels: whose it is, for which processor, and how its size is limited.
 
 To load a kernel is to run code, so a folder in which anybody else could write is refused.
 """

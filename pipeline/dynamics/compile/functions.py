@@ -2,7 +2,7 @@
 
 Each is a generated file (`sources`) whose name is a digest of the sources of all kernels it can
 reach and of the versions of the compiler. The functions call each other by address (`calls`), so
-that mechanisms share those which are alike.
+that mechanisms use common ones.
 """
 
 from __future__ import annotations
@@ -179,7 +179,7 @@ class Late:
 
 
 def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
-    """The compiled functions for these parts; `tell` hears of what has to be compiled."""
+    """The compiled functions for these parts; `tell` receives what has to be compiled."""
     folder, began = writable(kernel_root(), tell), time.monotonic()
     files = {name: _file(folder, name, source) for name, source in sources.sources(parts, scheme).items()}
     with ExitStack() as helpers:

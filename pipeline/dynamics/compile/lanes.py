@@ -32,7 +32,7 @@ FEW = 4
 
 
 def _pointer(kind: Any) -> Any:
-    """What makes of an address [integer] a place in an array."""
+    """What makes of an address [integer] an address in an array."""
 
     @intrinsic
     def pointer(typingctx: Any, address: Any) -> Any:

@@ -1,9 +1,9 @@
 """Machine code of one compiled function as bytes, and as something that can be called: without the compiler.
 
-Numba's own cache needs Numba, which takes longer to import than many a run takes. What is kept here is the object file
-that it makes of a function, with the name of the function in it and those of what it refers to; LLVM alone loads that.
-Each has an engine of its own, so that names in it, which count functions of the process that compiled it, may be those
-of others.
+Numba's own cache needs Numba, which takes longer to import than many a run takes. What is stored here is the object
+file that it makes of a function, with the name of the function in it and those of what it refers to; LLVM alone loads
+that. Each has an engine of its own, so that names in it, which count functions of the process that compiled it, may be
+those of others.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Code:
 
 
 def image(function: Any) -> bytes:
-    """The code of a C function that Numba has compiled (`numba.cfunc`), to be kept."""
+    """The code of a C function that Numba has compiled (`numba.cfunc`), for storage."""
     library = function._library
     foreign = [used.name for used in library._final_module.functions if used.is_declaration]
     foreign += [used.name for used in library._final_module.global_variables if used.is_declaration]

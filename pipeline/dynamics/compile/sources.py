@@ -70,7 +70,7 @@ def _reached(source: str) -> frozenset[str]:
 
 
 def imported(source: str) -> set[str]:
-    """Modules and names that a generated file imports, as `fingerprint.imported` tells those of any other source."""
+    """Modules and names that a generated file imports, as `fingerprint.imported` returns those of any other source."""
     lines = re.findall(r"^from (\S+) import (\S+)", source, re.MULTILINE)
     return {name for module, part in lines for name in (module, f"{module}.{part}")}
 

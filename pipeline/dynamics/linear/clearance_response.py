@@ -6,7 +6,7 @@ Joints and drives hold the links: a small opening e of what they demand moves th
 
 where G holds the rates of all joints' residuals. Of what is asked for, s x, only the adjoint solution
 :math:`\lambda^T = s G^{+}` is needed, which is one solve for all openings of all joints: the reactions of the joints to
-a unit load there. Clearance lets two places part by up to its radius (and the depth to
+a unit load there. Clearance lets two points separate by up to its radius (and the depth to
 which the joint's force presses them), in any direction: its bound is the largest singular value of the map from there
 to the body that is asked for. That holds where joints and drives leave the body asked for no freedom; elsewhere masses
 decide, and there is no bound (infinite). A body that bends opens the joints by what its ends move (`openings`); what
@@ -97,7 +97,7 @@ def is_whole(model: Model) -> bool:
 
 
 def _play(joint: Clearance, force: float) -> float:
-    """How far the places may part [m]: the clearance, and how deep a force presses the surfaces."""
+    """How far the points may separate [m]: the clearance, and how deep a force presses the surfaces."""
     law = lookup(NORMAL_LAWS, joint.normal.law, where="[normal]")
     exponent = law.exponent if joint.normal.exponent is None else joint.normal.exponent
     stiffness = lookup(CONTACTS, joint.type, where="[joint]").stiffness(joint, exponent)
@@ -126,7 +126,7 @@ class Lever:
         return Adjoint(-rows.T, float(np.abs(shown - (self.gradient.T @ rows).T).max(initial=0.0)))
 
     def clearance(self, name: str, rows: np.ndarray) -> float:
-        """Largest motion of what an adjoint solution describes, per metre that the places of a joint part."""
+        """Largest motion of what an adjoint solution describes, per metre of separation of a joint's points."""
         constraint, mine = self.joints[name]
         count = 2 if constraint.edge.kind == "revolute" else 3
         first = rows[:, mine][:, :count] / self.length

@@ -71,7 +71,7 @@ def equilibrium(
 
 
 def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
-    """The equilibrium near positions q (loops closed); SolverError when there is none or none is found."""
+    """The equilibrium close to positions q (loops closed); SolverError when there is none, or the search fails."""
     at = tangent(bench, q)
     best, since = np.inf, 0
     for iteration in range(MOST):
@@ -87,8 +87,8 @@ def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
         at = _search(bench, at, step)
     loose = _leading(bench.model, at.Z @ at.unbalanced, at.mass)
     raise SolverError(
-        f"no static equilibrium was found near this pose in {MOST} iterations: a force of {residual(bench, at):.3g} N "
-        f"stays unbalanced, most of it at {loose}; hold that motion by a joint, a drive or a spring"
+        f"the search for a static equilibrium close to this pose failed in {MOST} iterations: "
+        f"a force of {residual(bench, at):.3g} N stays unbalanced, most of it at {loose}; hold that motion by a joint, a drive or a spring"
     )
 
 

@@ -1,4 +1,4 @@
-r"""What bending of bodies does to first order along the ideal motion: to places, rates and the forces of joints.
+r"""What bending of bodies does to first order along the ideal motion: to positions, rates and the forces of joints.
 
 Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that open no joint
 (`clearance_response`):
@@ -235,7 +235,7 @@ def first_excited(forces: np.ndarray, shapes: np.ndarray) -> int | None:
 
     forces: (rows, n).  shapes: (n, vibrations).  A vibration's force is a sum of n products; of one at right angles to
     all forces, as bending across the plane of a planar mechanism is, their rounding is left, and that of the loads: no
-    fraction of it tells anything.  By Schwarz' inequality the sum is at most the product of both lengths, so that what
+    fraction of it has any meaning.  By Schwarz' inequality the sum is at most the product of both lengths, so that what
     is below `FELT` of that, over all rows, is nothing.
     """
     size = float(np.linalg.norm(forces, axis=1).max(initial=0.0))

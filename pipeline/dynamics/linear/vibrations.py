@@ -66,7 +66,7 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
 
 
 def _limp(K: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Which motions have no stiffness as far as the differences can tell."""
+    """Which motions have no stiffness as far as the differences can show."""
     own = np.abs(np.diag(K))
     return own <= np.maximum(NOTHING * error, NOTHING_BESIDE**2 * own.max())
 

@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.loads.pid import numbers
 from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.vectors import scale
 
-#: places of the internal states
+#: indices of the internal states
 FORCE, INTEGRAL, ERROR = range(3)
 
 

@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics import memory as m
 class WorkSpace(NamedTuple):
     """What kernels of one run may change. h: wiring that knows where w keeps what; w, n: floats and integers.
 
-    lengths: of the stretches of w, by their places in the header.
+    lengths: of the stretches of w, by their indices in the header.
     """
 
     h: np.ndarray
@@ -49,7 +49,7 @@ class Arrays:
         return stretch.view(np.int64 if _neighbours()[table.place][0] else np.float64).reshape(-1, table.size)
 
     def work_space(self, room: Callable[[np.ndarray], m.Room]) -> WorkSpace:
-        """A work space with a copy of h, the ground in place and all else zero.
+        """A work space with a copy of h, the ground set and all else zero.
 
         room: what the integration method needs, from the header.
         """
@@ -68,7 +68,7 @@ class Arrays:
 
 @cache
 def _neighbours() -> dict[int, tuple[bool, int | None]]:
-    """Of each wiring or number table, by its place: whether it is wiring, and the place of the one after it."""
+    """Of each wiring or number table, by its index: whether it is wiring, and the index of the one after it."""
     neighbours: dict[int, tuple[bool, int | None]] = {}
     for array in ("h", "f"):
         places = [table.place for table in m.TABLES[array]]

@@ -27,10 +27,11 @@ SLIGHT = 1e-4
 
 
 def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
-    """The mechanism with links placed so that all joints fit and driven ones stand where their drives say.
+    """The mechanism with links placed so that all joints fit and driven ones are where their drives prescribe.
 
-    Raises InputError for joints whose frames start far apart or face each other the wrong way, for poses given that
-    contradict a drive, and for a mechanism that cannot be assembled, with the residual of every joint.  One with
+    Raises InputError for joints whose frames start at a large distance or face each other the wrong way, for poses
+    given that contradict a drive, and for a mechanism that cannot be assembled, with the residual of every joint.  One
+    with
     flexible bodies or paths is only checked: deformation and prescribed poses are part of its closing, which the
     engine does.
     given: laws that replace the scene's.
@@ -76,7 +77,7 @@ def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], 
 
 
 def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
-    """The mechanism with these starts; massless links within joints stand where the joints' coordinates put them."""
+    """The mechanism with these starts; massless links within joints are where the joints' coordinates put them."""
     links, settled_poses = [], list(poses)
     for i, link in enumerate(mechanism.links):
         if link.massless and i:

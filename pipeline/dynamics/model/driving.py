@@ -83,7 +83,7 @@ def named_coordinate(scene: Scene, text: str, path: str) -> tuple[str, Coordinat
     joint, _, coordinate = text.partition(".")
     try:
         return joint, coordinate_of(scene, joint, coordinate or None, path)[2]
-    except InputError as error:  # the joint and its coordinate stand in one text here
+    except InputError as error:  # the joint and its coordinate are in one text here
         raise InputError(path, error.problem, error.remedy) from None
 
 
@@ -100,7 +100,7 @@ def turns(scene: Scene, quantity: Quantity) -> bool:
 
 
 def unit_of(scene: Scene, quantity: Quantity) -> str:
-    """The SI unit of a quantity, forces along angles being torques; `core.quantities.unit` tells it of a run."""
+    """The SI unit of a quantity, forces along angles being torques; `core.quantities.unit` returns it for a run."""
     force = "N m" if turns(scene, quantity) else "N"
     return {"drive_force": force, "peak_force": force, "impulse": f"{force} s"}.get(quantity.kind, quantity.unit)
 

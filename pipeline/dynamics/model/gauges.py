@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 class Gauges:
     """Gauges and internal states given out so far.
 
-    rows: of the table GAUGES.  internal: number of internal states; they stand at the end of the state.
+    rows: of the table GAUGES.  internal: number of internal states; they are at the end of the state.
     """
 
     rows: list[tuple[int, ...]] = field(default_factory=list)

@@ -48,7 +48,7 @@ class Miss:
 
     @property
     def size(self) -> float:
-        """How far apart the two are; angles that differ by whole turns are one."""
+        """Difference of the two; angles that differ by whole turns are one."""
         difference = self.now - self.value
         return abs((difference + np.pi) % (2.0 * np.pi) - np.pi) if self.turning else abs(difference)
 
@@ -146,7 +146,7 @@ def refuse_far(mechanism: Mechanism, far: Sequence[Miss]) -> None:
             raise InputError(
                 miss.place,
                 f"{miss.text()} (more than {limit:.3g} {unit})",
-                "correct the poses or where the law starts, or leave out the poses of the bodies that the drive places"
+                "correct the poses or the start of the law, or leave out the poses of the bodies that the drive moves"
                 if miss.drive
                 else "correct the poses or the position, or leave out the poses of the bodies that follow from it",
             )

@@ -64,7 +64,7 @@ class Velocities:
     """Linear equations matrix @ speeds = target of the speeds at the start, all in natural units; (rows, nv), (rows,).
 
     asked: velocities that the target represents, before those of the drives are taken off, (rows,).
-    given: places of the velocities that the first `n_given` rows set; the other rows keep the loops closed.
+    given: paths of the velocities that the first `n_given` rows set; the other rows keep the loops closed.
     fastest: size of all these velocities, those of a slow motion at least.
     """
 
@@ -115,8 +115,8 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: flo
 
     Velocities of bodies are those of centres of mass, flexible or rigid.  Flexible bodies start without speeds of
     deformation if joints, drives and given velocities allow that.
-    share: of the largest velocity given, by which joints and drives may miss them; what is nearest is taken then.
-    Raises InputError when joints and drives do not allow the velocities.
+    fraction: of the largest velocity given, by which joints and drives may miss them; the nearest velocities are taken
+    then. Raises InputError when joints and drives do not allow the velocities.
     """
     elastic = np.zeros(model.nv, dtype=bool)
     for modes in model.numbering.modal_coordinates.values():
@@ -231,7 +231,7 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
 
 @dataclass(frozen=True)
 class Centre:
-    """Centre of mass of a body: its place in the frame of its link, undeformed.
+    """Centre of mass of a body: its position in the frame of its link, undeformed.
 
     shape, bow: its shift with the modal coordinates, as in `flexible_bodies.shift`; these are at `positions` and
     `speeds` among the free ones.
@@ -283,6 +283,6 @@ def check_loads(model: Model, loads: np.ndarray) -> None:
         if has_direction and value <= SHORTEST * model.length:
             raise InputError(
                 f"[load.{name}.between]",
-                "its two ends start in one place, so that it pulls in no direction",
+                "its two ends coincide at the start, so that it pulls in no direction",
                 "move an end; only a spring of no free length and no damping may start so",
             )

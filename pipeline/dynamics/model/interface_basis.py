@@ -61,7 +61,7 @@ def interface_basis(mechanism: Mechanism, link: int) -> InterfaceBasis:
 
 
 def mass_coupled(bundle: xr.Dataset) -> bool:
-    """Whether modes share entries of the modal mass."""
+    """Whether modes have common entries of the modal mass."""
     mass = bundle["modal_mass"].values
     return bool(np.any(np.abs(mass - np.diag(np.diag(mass))) > UNCOUPLED))
 

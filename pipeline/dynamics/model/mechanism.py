@@ -324,7 +324,7 @@ def size_of(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> flo
     cloud = np.array(points) if points else np.zeros((1, 3))
     size = float(np.max(np.linalg.norm(cloud - cloud.mean(axis=0), axis=1)))
     size = max(size, *(joint.clearance for joint in scene.contacts().values()), 0.0)
-    # of a body held at its centre of mass, only rounding of its place is left
+    # of a body held at its centre of mass, only rounding of its position is left
     gyration = max((np.sqrt(np.trace(J) / (2.0 * mass)) for mass, _, J in _inertias(links)), default=0.0)
     return size if size > NOTHING * gyration else float(gyration) or 1.0
 

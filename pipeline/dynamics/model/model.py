@@ -61,7 +61,7 @@ class Model:
 
     @property
     def speeds(self) -> slice:
-        """Speeds of the free coordinates in the state; the positions stand before, the ledger after them."""
+        """Speeds of the free coordinates in the state; the positions come before, the ledger after them."""
         return slice(self.nq, self.nq + self.nv)
 
     @property

@@ -1,8 +1,8 @@
 """Assembly from joints alone: where links without poses go, of several ways the one nearest to what the scene hints.
 
-The joints place what has no pose one link after the other, their coordinates at the values that drives, starts and
-hints give, else at zero or, to find other assemblies, anywhere. Loops are then closed (`closing.close`), with the links
-that have a pose held still as long as that is possible.
+The joints determine the poses that are missing, one link after the other, their coordinates at the values that drives,
+starts and hints give, else at zero or, to find other assemblies, anywhere. Loops are then closed (`closing.close`),
+with the links that have a pose held still as long as that is possible.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ GUESSES = 16
 SLIDE = 0.3
 #: assemblies are one if no coordinate differs by more than this, in radians or fractions of the mechanism's size
 SAME = 1e-4
-#: a mechanism that can move, and is so near to all hints, is searched for no further
+#: a mechanism that can move, and is so close to all hints, is searched for no further
 NEAR = 0.5
 #: singular values of naturally sized rows below this fraction of the largest leave a motion free
 LOOSE = 1e-6
@@ -95,7 +95,7 @@ def chosen(
     return (
         f"the joints can be assembled in {len(candidates)} ways, and the scene does not say in which: it starts with "
         f"{label} at {first.coordinates[name, k]:.4g} {coordinate.unit}, elsewhere it is at {values}; "
-        f"[start.joint.{label}] near = ... chooses"
+        f"[start.joint.{label}] near = ... selects one"
     )
 
 
@@ -109,7 +109,7 @@ def _guess(
 ) -> list[Placement]:
     """Poses of all links, those not placed each put where a joint to a known one has it."""
     poses, known = [link.start for link in mechanism.links], set(placed)
-    # joints with little freedom place best
+    # joints with few degrees of freedom are best
     order = sorted(joints, key=lambda joint: len(joint_class(joint.edge.kind).SPEEDS) - len(joint.values))
     while True:
         joint = next((j for j in order if (j.link_a in known) != (j.link_b in known)), None)

@@ -31,7 +31,8 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
-#: a turn counts as having at least this arm, in units of the mechanism's size: places are no more exact for being near
+#: a turn counts as having at least this arm, in units of the mechanism's size: positions are not more exact at smaller
+#: distances
 LEAST_ARM = 1e-3
 #: singular values of naturally sized rows below this are zero.  It is above what is left of a zero: an entry is a
 #: sum of some ten products whose factors, frames along a chain, are right to some ten roundings of 1e-16, in all

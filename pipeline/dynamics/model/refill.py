@@ -142,7 +142,7 @@ def _drives_alike(new: Any, was: Any) -> bool:
 
 
 def _same_start(model: Model, scene: Scene) -> bool:
-    """Whether the drives stand at the start where they stood: then the links stand there, too."""
+    """Whether the drives start where they started before: then the links do, too."""
     pairs = zip(prescribed(model.scene), prescribed(scene), strict=True)
     changed = [(was, new) for was, new in pairs if was.law is not new.law]
     try:

@@ -27,8 +27,8 @@ def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray
     spread: J L^-T, shape (rows, nv), a row each in the metric of the mass, M = L L^T.  scale: what a row's
     length is compared with, so that one that has shrunk to nothing is not mistaken for a good one; a row of the scale 0
     moves nothing.  QR decomposition with column pivoting (Golub & Van Loan, *Matrix Computations*, sec. 5.4.2): each
-    row kept is the one that is out most from those before.  Of rows that are no numbers the first ones are kept,
-    with the pivot 0.
+    row selected is the one that is most independent from those before.  Of rows that are no numbers the first ones are
+    selected, with the pivot 0.
     """
     from scipy.linalg import qr  # slow to import, and most mechanisms have nothing to choose
 
@@ -108,9 +108,9 @@ def _coupling_length(
 
 
 def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
-    """Write into h, a copy of the model's wiring, that the `kept` rows are solved for.
+    """Write into h, a copy of the model's wiring, that the `selected` rows are solved for.
 
-    kept: per row of the closure table.  No size and no offset changes except the number of rows solved for.
+    selected: per row of the closure table.  No size and no offset changes except the number of rows solved for.
     """
     all_rows = model.arrays.table(m.CLOSURES)
     closures, rows = model.arrays.table(m.CLOSURES, h), model.arrays.table(m.CLOSURE_ROWS, h)
@@ -131,7 +131,7 @@ def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
 
 
 def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
-    """Kept rows against free coordinates, shape (..., kept, nv), from what the kernels store on the supports.
+    """Selected rows against free coordinates, shape (..., kept, nv), from what the kernels store on the supports.
 
     stored: JACOBIAN or SPREAD of the work space, shape (..., size).
     """
@@ -148,13 +148,13 @@ def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
 
 
 def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
-    """Place of each kept row among all, as residuals and their rates are stored."""
+    """Place of each selected row among all, as residuals and their rates are stored."""
     spans = (range(c["row0"], c["row0"] + c["n_kept"]) for c in model.arrays.table(m.CLOSURES, h))
     return np.array([k for span in spans for k in span], dtype=np.int64)
 
 
 def coordinates_of_rows(model: Model, h: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Which free coordinates the closures of the chosen kept rows depend on; masks (kept rows,) -> (nv,)."""
+    """Which free coordinates the closures of the selected rows depend on; masks (selected rows,) -> (nv,)."""
     support, mask = model.arrays.table(m.SUPPORT)["coordinate"], np.zeros(model.nv, dtype=bool)
     for c in model.arrays.table(m.CLOSURES, h):
         if np.any(chosen[c["kept0"] : c["kept0"] + c["n_kept"]]):
@@ -166,6 +166,6 @@ def coordinates_of_rows(model: Model, h: np.ndarray, chosen: np.ndarray) -> np.n
 
 
 def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:
-    """Name of the joint to which each kept row belongs."""
+    """Name of the joint to which each selected row belongs."""
     counts = model.arrays.table(m.CLOSURES, h)["n_kept"]
     return [closure.name for closure, count in zip(model.closures, counts, strict=True) for _ in range(count)]

@@ -86,9 +86,10 @@ class Search:
         effect_sizes: Mapping[str, Influence],
         besides: str = "",
     ) -> None:
-        """Write down what short runs say. why: it may go, if it is small.  most, apart: what it does there.
+        """Record the results of short runs. why: reason to drop it, if it is small.  most, effect_sizes: its effect
+        there.
 
-        besides: said before the reason why it is kept.
+        besides: text before the reason why it stays.
         """
         difference = {name: influence.difference for name, influence in effect_sizes.items()}
         uncertainty = {name: influence.uncertainty for name, influence in effect_sizes.items()}
@@ -115,7 +116,7 @@ def with_doubt(
 
 
 def too_much(most: Mapping[str, float], requested: Mapping[str, float]) -> str:
-    """Why an effect is kept: what it may change most, in words."""
+    """Why an effect stays: what it may change most, in words."""
     name = max(requested, key=lambda n: most[n] / requested[n])
     if not np.isfinite(most[name]):
         return f"without it {name} cannot be determined, or has other events"

@@ -1,7 +1,7 @@
 """How many finite elements a flexible body calls for, from its reduction on a finer mesh.
 
 A run does not know the elements: they cost time once, when the body is reduced, and decide how right its frequencies
-and its compliance are. So the reduction on twice as many elements tells all there is: by how much frequencies and
+and its compliance are. So the reduction on twice as many elements is enough: by how much frequencies and
 compliance change, and by how much at most what bending does to a quantity changes with them. Errors of beam elements
 fall as the fourth power of their length (Strang and Fix, *An Analysis of the Finite Element Method*, ch. 1.6 and 6),
 so the number that an accuracy calls for follows.

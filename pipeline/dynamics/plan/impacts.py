@@ -102,7 +102,7 @@ def _levels(search: Search, fraction: float) -> Iterator[int]:
         soft = [e for e in every if e.kind == FLEXIBILITY or e.within.startswith("body.")]
         rigid = pilots.point(list({e.name: e for e in [*search.gone, *soft]}.values()))
         if any(i.uncertainty > search.requested[name] for name, i in pilots.between(rigid, rigid).items()):
-            return  # members of rigid bodies part later, and the beginning does not tell what modes do then
+            return  # members of rigid bodies diverge later, and the beginning does not show what modes do then
     yield from mine
 
 

@@ -28,7 +28,7 @@ MEMBERS = 3
 #: second
 RTOL, SMOOTH_RTOL, SMOOTH = 1e-7, 1e-5, "radau"
 #: tolerance of pilots with contacts: this fraction of the least clearance over the mechanism's size, between two limits
-#: (errors of places are the tolerance times that size, and must stay small next to the clearance)
+#: (errors of positions are the tolerance times that size, and must stay small next to the clearance)
 OF_CLEARANCE, TIGHTEST, LOOSEST = 0.05, 1e-7, 1e-5
 #: evaluations times variables that pilots of one variant with contacts may take, all members together: measured, some
 #: 0.2 s on one core.  What takes longer is run over a part of the time, at least so much of it
@@ -172,7 +172,7 @@ class Pilots:
         return point
 
     def between(self, a: Point, b: Point) -> dict[str, Influence]:
-        """How far two of them are apart in each quantity; infinitely where one of them was refused."""
+        """Difference of two of them in each quantity; infinitely where one of them was refused."""
         if a.refused or b.refused:
             return {q.name: Influence(np.inf) for q in self.chosen}
         return {q.name: influence(a, b, q, MEMBERS) for q in self.chosen}

@@ -4,7 +4,7 @@ Order of the evidence: bounds and first-order responses along the ideal motion (
 which cost one run of the ideal mechanism; then runs of variants, rigid ones with clearance and flexible ones without,
 which are cheap;
 then, where clearance stays, a loose run of the whole scene to see whether flexible bodies change what it does.
-What is not shown to be small is kept.
+Effects that are not shown to be small stay.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
 def _interactions(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
     """Clearances that rigid bodies may do without stay where flexible ones, shaken by impacts, may not.
 
-    Rates and forces only: vibrations that impacts excite are small in places and large in these.
+    Rates and forces only: vibrations that impacts excite are small in positions and large in these.
     """
     pilots = search.pilots
     dropped = [e for e in search.gone if e.kind == CLEARANCE and search.decisions[e.name].evidence == PILOT]
@@ -229,7 +229,7 @@ def _vibrating(estimated: Response) -> str:
 
 
 def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
-    """Clearances that go next to bodies that stay flexible: one run of all tells whether they do as was estimated.
+    """Clearances that go next to bodies that stay flexible: one run of all shows whether the estimate holds.
 
     Bounds hold along the motion of rigid bodies, and flexible ones may go elsewhere.
     """
@@ -249,7 +249,7 @@ def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) ->
 
 
 def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -> None:
-    """Gravity, friction, damping, stiffening, stops: kept unless a cheap run shows that they do little."""
+    """Gravity, friction, damping, stiffening, stops: they stay unless a cheap run shows that they do little."""
     remaining = {d.effect.name for d in search.decisions.values() if d.kept}
     gone = list(search.gone)
     dear = any(d.kept and d.effect.kind == FLEXIBILITY for d in search.decisions.values()) and any(

@@ -91,7 +91,7 @@ def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np
 
 
 def kept_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> list[str]:
-    """Bodies whose motion is kept: those asked for, else those that have contacts, without contacts all."""
+    """Bodies whose motion is recorded: those requested, else those that have contacts, without contacts all."""
     known = [n for n, b in model.scene.body.items() if b.type != "ground"]
     if requested is None:
         frames = model.mechanism.frames

@@ -39,7 +39,7 @@ class Motion:
         return Motion(self.p + r, self.R if turn is None else self.R @ turn, self.v + swing, self.omega, a, self.alpha)
 
     def moving(self, arm: np.ndarray, rate: np.ndarray, second: np.ndarray) -> Motion:
-        """Motion of a point that moves in the body: its place, rate and second rate there, (time, 3)."""
+        """Motion of a point that moves in the body: its position, rate and second rate there, (time, 3)."""
         r, s, t = (turned(self.R, x) for x in (arm, rate, second))
         swing = cross(self.omega, r)
         a = self.a + cross(self.alpha, r) + cross(self.omega, swing + 2.0 * s) + t
@@ -188,7 +188,7 @@ class Motions:
         return velocities
 
     def _place(self, name: str) -> tuple[int, Placement]:
-        """Link of a named frame, and the frame's undeformed place there."""
+        """Link of a named frame, and the frame's undeformed placement there."""
         frame = self.model.mechanism.frames[name]
         i = self.model.mechanism.link_of[frame.body]
         return i, self.model.links[i].places[frame.body].of(frame.place)

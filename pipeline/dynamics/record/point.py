@@ -1,4 +1,4 @@
-"""One point of a sweep: a run of which nothing is made but the numbers that are kept."""
+"""One point of a sweep: a run of which only the recorded numbers are made."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
-#: where nothing is kept of the way, the ledger of energy is examined so often
+#: where only final values are recorded, the ledger of energy is examined so often
 LOOKS = 50
 #: how much tighter the tolerance of the run is by which the error is estimated
 TIGHTER = 1e-2
@@ -50,7 +50,7 @@ ABREAST, FEWEST = 8, 3
 class Runner:
     """Runs points of one family, all edits of one scene with the same bundles; keeps the engine that it made first.
 
-    kept: what is kept.  members: starts of each point that differ by a hair; 0: the one of the scene.
+    recorded: the quantities.  members: starts of each point that differ by a hair; 0: the one of the scene.
     error: whether each point is run at a tighter tolerance as well.
     """
 
@@ -93,7 +93,7 @@ class Runner:
         try:
             self._engines(thinned(scene, self.recorded))
         except (SolverError, InputError):
-            return False  # as the points will tell, each by itself
+            return False  # as each point reports by itself
         return self.engine is not None and side_by_side(self.engine)
 
     def _values(self, scene: Scene, lane: Place | None, alive: Progress) -> tuple[Values, Values, int]:
@@ -143,7 +143,7 @@ def in_sections(recorded: Sequence[Recorded]) -> bool:
 
 
 def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
-    """The scene with no more regular outputs than what is kept needs."""
+    """The scene with no more regular outputs than the recorded quantities need."""
     if in_sections(recorded):
         # only the states between the stretches of a period are examined
         return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": section_period(scene)})})
@@ -176,7 +176,7 @@ def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> V
 
 
 def _sections(engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> tuple[Values, int]:
-    """What is kept once in each period, after the transient, and the evaluations that all periods took."""
+    """Recorded values, once in each period, after the transient, and the evaluations that all periods took."""
     scene = engine.model.scene
     requested, period = scene.sections or Sections(), section_period(scene)
     start, parts = consistent_start(engine), stretches(engine, period, requested.phase)

@@ -93,7 +93,7 @@ def section_period(scene: Scene) -> float:
     if period > span * (1.0 + 1e-12):
         raise InputError(
             "[sections.period]",
-            f"a period of {period:.6g} s is longer than the run, which tells the laws for {span:.6g} s",
+            f"a period of {period:.6g} s is longer than the run, which defines the laws for {span:.6g} s",
             "let the run last a period at least",
         )
     if not requested.phase < period:
@@ -116,7 +116,7 @@ class _Recorder:
 
     @staticmethod
     def of(engine: Engine, start: np.ndarray) -> _Recorder | None:
-        """None where nothing is kept."""
+        """None where nothing is recorded."""
         current, begun = journal.current(), journal.seconds()
         if current is None:
             return None
@@ -131,7 +131,7 @@ class _Recorder:
 
 @dataclass
 class _Tape:
-    """What is kept, one entry per period, and per impact."""
+    """Recorded values, one entry per period, and per impact."""
 
     names: list[str]
     at: float
@@ -153,7 +153,7 @@ class _Tape:
                 self._note(part, trajectory, number, parts[0].start)
 
     def motion_at_waypoints(self, parts: list[Engine], done: Period) -> Variables:
-        """Motion of the kept bodies where the stretches of a period begin."""
+        """Motion of the recorded bodies where the stretches of a period begin."""
         first = np.array([0])
         motions = [self._motion(part, trajectory, first) for part, trajectory in zip(parts, done.parts, strict=True)]
         return {
@@ -161,7 +161,7 @@ class _Tape:
         }
 
     def _motion(self, part: Engine, trajectory: Trajectory, rows: np.ndarray) -> Variables:
-        """Motion of the kept bodies, and the contacts' offsets, at some rows."""
+        """Motion of the recorded bodies, and the contacts' offsets, at some rows."""
         at_rows = replace(trajectory, rows=trajectory.rows[rows])
         seen, model = observed(part, at_rows), part.model
         series = motion_series(Motions(model, seen).several(self.names), model.mechanism.origin)

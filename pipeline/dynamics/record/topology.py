@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
-#: singular values of the kept closure rows below this fraction of the largest count as zero in the rank
+#: singular values of the selected closure rows below this fraction of the largest count as zero in the rank
 ZERO = 1e-9
 #: condition numbers below which no row's rank is in doubt, in whatever units, and with which eigenvalues of J J^T, the
 #: squares of the singular values, still have ten of their digits: their roundings are 1e-16 of the largest one

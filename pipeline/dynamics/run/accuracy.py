@@ -167,7 +167,7 @@ def deliver(
         accuracy_verdict=verdict,
         accuracy_rtol=best.rtol,
         accuracy_runs=len(search.runs),
-        accuracy_meaning="largest error of the time integration, estimated by two runs at tolerances 100 times apart",
+        accuracy_meaning="largest error of the time integration, estimated by two runs with a tolerance ratio of 100",
     )
 
 

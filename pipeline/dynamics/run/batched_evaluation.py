@@ -44,7 +44,7 @@ class Code:
 class LaneGroup:
     """A thread that lets steppers run while it is open.
 
-    kept: closure rows that its code solves for.
+    rows: closure rows that its code solves for.
     """
 
     def __init__(self, rows: bytes, code: Code, lanes: int) -> None:

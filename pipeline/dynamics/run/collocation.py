@@ -3,7 +3,7 @@
 In the pose the equations have no unique solution, and next to it what a method errs is blown up, so that no method's
 stages can be there. The motion itself is smooth, on its branch. So it is a polynomial through a state at which all is
 well, with the slopes of the equations at points each of which is closed first (collocation, by Picard's iteration);
-points too near to the pose are left out. What is closed on both sides and smooth between them is the motion that keeps
+points too close to the pose are left out. What is closed on both sides and smooth between them is the motion that keeps
 its branch. That there is one shows: the iteration converges, closing changes nothing, the loops are closed between the
 points as well, and one point less gives the same end. It depends on no method and on no tolerance.
 
@@ -143,7 +143,8 @@ def collocate(
     """The motion over a span from a closed state; None where there is no smooth one, or none that is resolved.
 
     slope: at the start; None in a singular pose, where there is none.  lead: what to begin with there; without it the
-    state's own speeds lead.  share: what a closure row has left of its most at the ends; rounding follows its square.
+    state's own speeds lead.  fraction: what a closure row has left of its most at the ends; rounding follows its
+    square.
     """
     began = sampler.evaluations
     samples = _march(sampler, t, y, span, slope, lead)
@@ -233,7 +234,7 @@ def _march(
 
 
 def _share(sample: Sample, samples: list[Sample]) -> float:
-    """Least share that a row has of the most independence that it has at any sample."""
+    """Least fraction that a row has of the most independence that it has at any sample."""
     if not len(sample.independence):
         return 1.0
     best = np.max([s.independence for s in samples if s.sound], axis=0)

@@ -57,7 +57,7 @@ class Engine:
     """One per run: the work space is not shared.
 
     h: wiring with the rows solved for.  w, n: floats and integers of the work space.  lengths: of the stretches of w.
-    kept: per closure row, whether it is solved for.  mobility: counts at the start.  start, end: of the run [s].
+    selected: per closure row, whether it is solved for.  mobility: counts at the start.  start, end: of the run [s].
     straight: code for this wiring alone.
     """
 
@@ -77,7 +77,8 @@ class Engine:
 
     @cached_property
     def breaks(self) -> np.ndarray:
-        """Start, breaks of drives and loads and samples in between, end [s]; what only rounding sets apart is one."""
+        """Start, breaks of drives and loads and samples in between, end [s]; times that differ by rounding only are
+        one."""
         starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
         for first, count in self.model.arrays.table(m.LAWS):
             inner |= {float(t) for t in starts[first + 1 : first + count]}
@@ -143,7 +144,7 @@ class Engine:
 
     @property
     def control(self) -> np.ndarray:
-        """The stepper's floats, not copied; m.TIME is the place of the time."""
+        """The stepper's floats, not copied; m.TIME is the index of the time."""
         return self.view(m.CONTROL)
 
     @property
@@ -189,13 +190,13 @@ class Engine:
         return L
 
     def independence(self) -> np.ndarray:
-        """How far each kept closure row is from depending on those before it, at the last evaluated state."""
+        """How far each selected closure row is from depending on those before it, at the last evaluated state."""
         envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
         diagonal = envelope["origin"] + np.arange(len(envelope))
         return 1.0 / np.abs(self.view(m.SCHUR)[diagonal])
 
     def rows(self, stored: int) -> np.ndarray:
-        """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""
+        """JACOBIAN or SPREAD of the last evaluation, shape (selected rows, free coordinates)."""
         return selection.dense(self.model, self.h, self.view(stored))
 
 

@@ -219,7 +219,7 @@ class _Metric:
     """The motion of all bodies as entries whose squares add up to twice their kinetic energies.
 
     Of a body: its centre of mass's velocity times the root of its mass, its angular velocity in its own axes times the
-    root of its inertia, and the rates of its modes, which have unit mass. Of flexible bodies the deformation's share in
+    root of its inertia, and the rates of its modes, which have unit mass. Of flexible bodies the deformation's part of
     the first two is left out: this is a measure of separation, not an energy balance.
     """
 

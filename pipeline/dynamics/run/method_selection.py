@@ -1,9 +1,9 @@
 """Which integrator suits a scene that asks for accuracy alone, by what reason, and who looks whether it was right.
 
 Costs are counted in evaluations of the right-hand side. What stability will cost the explicit method follows from the
-fastest rate of the equations, linearised at the start; what accuracy will cost, a run tells: it is taken over to other
-tolerances by the order of the error estimate. So the first run is a guess, which runs to come and, while it goes on,
-its judge correct.
+fastest rate of the equations, linearised at the start; the cost of accuracy comes from a run: it is extrapolated to
+other tolerances by the order of the error estimate. So the first run is a guess, which runs to come and, while it goes
+on, its judge correct.
 
 Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.2 (stability limits).
 """
@@ -36,7 +36,7 @@ DEARER = {DEFAULT: 1.0, VIBRATING: 1.4, STIFF: 2.0}
 #: of a scene with contacts, evaluations of the default method where the modes limit it, as a fraction of what it needs
 #: to be stable: it begins again at each contact, and steps more strictly there (measured: 1.45 and more)
 TOUCHING = 1.5
-#: least and largest power of the tolerance with which evaluations grow, as two runs tell
+#: least and largest power of the tolerance with which evaluations grow, according to two runs
 LEAST_POWER, LARGEST_POWER = 0.02, 0.4
 #: the vibrations must be so much faster than all else, for nothing else limits the exponential method
 SEPARATION = 2.0
@@ -104,7 +104,7 @@ class Suit:
         at = min(seen, key=lambda known: abs(np.log(known / rtol)))
         # half of them are spent on finding and beginning contacts, whatever the tolerance
         power = (0.5 if self.touching or name == DEFAULT else 1.0) / (ORDERS[name] + 1.0)
-        if len(seen) > 1 and name != DEFAULT:  # of the default method two runs may only tell where it is stable
+        if len(seen) > 1 and name != DEFAULT:  # of the default method two runs may only show where it is stable
             other = min((one for one in seen if one != at), key=lambda known: abs(np.log(known / at)))
             slope = float(np.log(seen[other] / seen[at]) / np.log(at / other))
             power = float(np.clip(slope, LEAST_POWER, LARGEST_POWER))
@@ -113,7 +113,8 @@ class Suit:
         return max(expected, min(self.least, seen[at])) if name == DEFAULT else expected
 
     def cost(self, name: str, rtol: float) -> float:
-        """What a run is foreseen to take, in evaluations of the default method; nothing where only a run can tell."""
+        """What a run is foreseen to take, in evaluations of the default method; nothing where only a run can show
+        it."""
         if name in self.seen:
             return DEARER[name] * self.evaluations(name, rtol)
         return self.least if name == DEFAULT else 0.0
@@ -228,7 +229,7 @@ class Suit:
 
     def learn(self, rtol: float, name: str, run: xr.Dataset) -> None:
         """Remember what a run that began with an integrator took."""
-        if DEFAULT in self.expected:  # where stability sets the pace, it tells what the whole run would have taken
+        if DEFAULT in self.expected:  # where stability sets the pace, it gives the cost of the whole run
             self.seen.setdefault(DEFAULT, {})[rtol] = self.expected[DEFAULT]
         if run.attrs["method"] != name and not (name == DEFAULT and name in self.expected):
             self.missed[name] = max(rtol, self.missed.get(name, 0.0))

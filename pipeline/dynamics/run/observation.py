@@ -73,7 +73,7 @@ def _observe(engine: Engine, rows: np.ndarray, pieces: np.ndarray, tolerance: fl
 
 
 def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
-    """Whether a row of the record is so near to a singular pose that its accelerations and forces are rounding."""
+    """Whether a row of the record is so close to a singular pose that its accelerations and forces are rounding."""
     one = m.record(row[None], len(engine.model.contacts))
     seen = engine.attempt(one.state[0], float(one.time[0]))
     return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear

@@ -132,9 +132,9 @@ def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
 
 
 def stretches(engine: Engine, period: float, phase: float) -> list[Engine]:
-    """The engine between the waypoints of a period, one of which is at `phase`; they share its work space."""
+    """The engine between the waypoints of a period, one of which is at `phase`; they use its work space."""
     regular = period * np.linspace(0.0, 1.0, WAYPOINTS + 1)
-    # where a regular one is next to the phase, the phase takes its place
+    # where a regular one is next to the phase, the phase replaces it
     inner = regular[1:-1][np.abs(regular[1:-1] - phase) > 0.25 * period / WAYPOINTS]
     times = engine.start + np.unique([0.0, *inner, phase, period])
     return [replace(engine, start=float(a), end=float(b)) for a, b in pairwise(times)]

@@ -165,7 +165,7 @@ def remember(engine: Engine, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def piece(engine: Engine, y: np.ndarray, outputs: np.ndarray, left: Handover | None) -> Piece | None:
-    """The piece of an integration from state y, as an earlier attempt left it; None where nothing is kept.
+    """The piece of an integration from state y, as an earlier attempt left it; None where nothing is recorded.
 
     left: what another method left or None.
     """

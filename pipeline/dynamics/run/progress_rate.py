@@ -63,7 +63,7 @@ def half(looks: Sequence[Look]) -> Look:
 def pace(looks: Sequence[Look], patience: float) -> float:
     """Evaluations per second of motion by which to judge a method: as of late, since half of its evaluations.
 
-    patience: evaluations up to which the average counts where it is less; a hasty start or a single impact tell little.
+    patience: evaluations up to which the average counts where it is less; a fast start or a single impact says little.
     """
     first, middle, now = looks[0], half(looks), looks[-1]
     average, late = (

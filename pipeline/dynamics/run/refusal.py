@@ -33,7 +33,7 @@ def text(engine: Engine, rows: np.ndarray) -> str:
     fixed = f"{control[m.FIXED]:.2g} s"
     too_long = f"the fixed step of {fixed} is too long for it, or " if control[m.FIXED] else ""
     unsolvable = (
-        f"the loops cannot be kept closed: {too_long}a singular pose in which they can go on in several ways ({where})"
+        f"the loops cannot be closed: {too_long}a singular pose in which they can go on in several ways ({where})"
     )
     if not engine.model.closures:
         unsolvable = f"the equations cannot be solved here: {too_long}the motion has grown beyond bounds"
@@ -47,8 +47,8 @@ def text(engine: Engine, rows: np.ndarray) -> str:
         "divides by zero",
         m.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
         "take a shorter step, or leave [solver.step] out",
-        m.STUCK_EVENT: f"{culprit} opens and closes without end at one time: a smaller rtol tells these "
-        "times apart, a softer contact or more damping parts them",
+        m.STUCK_EVENT: f"{culprit} opens and closes without end at one time: a smaller rtol distinguishes these "
+        "times, a softer contact or more damping separates them",
         m.STEPPED_OVER: f"the contact of {culprit} began unseen within a step: a smaller rtol or a shorter "
         "step finds it",
         m.AT_SINGULAR: "the motion does not get away from a singular pose, where it can go on in several ways "

@@ -47,7 +47,7 @@ class Run:
     scene: as the user gave it; the engine may hold another, made for it.
     perturbed: the same run from a perturbed start, of scenes with contacts.
     mended: what was changed of the start that the scene gives, in words.
-    switched: from when on and why another integrator took the place of the first; empty when none did.
+    switched: from when on and why another integrator replaced the first; empty when none did.
     """
 
     scene: Scene
@@ -70,7 +70,8 @@ def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
 
 
 def placed(scene: Scene) -> Scene:
-    """The scene whose joints and drives place the bodies where the run begins: itself, unless it begins elsewhere."""
+    """The scene whose joints and drives position the bodies where the run begins: itself, unless it begins
+    elsewhere."""
     if scene.start is None or scene.start.at is None:
         return scene
     scene_placed: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
@@ -107,7 +108,7 @@ def engines(
 
 
 def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Callable[[str, Progress], Engine]:
-    """What makes the engine of a run by an integrator's name, that of the scene's own by none; it tells how it goes."""
+    """What makes the engine of a run by an integrator's name, that of the scene's own by none; it reports progress."""
     posed, choice = begun(scene, bundles, progress)
     moved, given = driven(posed, bundles, progress)
     making = Lock()  # a run and its perturbed run may both go on with another integrator
@@ -249,8 +250,8 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
             raise SolverError(at + "friction of ideal joints jams the mechanism in the recorded state")
         if seen.status[bad[0]] == m.SINGULAR:
             lost = (
-                "the recorded state is so near to a singular pose that nothing tells its accelerations and forces: let "
-                "the mechanism pass the pose at speed, or stop elsewhere"
+                "the recorded state is so close to a singular pose that nothing determines its accelerations and "
+                "forces: let the mechanism pass the pose at speed, or stop elsewhere"
             )
         raise SolverError(at + lost)
     return seen
@@ -259,7 +260,7 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
 def _near_singular(
     engine: Engine, rows: np.ndarray, motions: tuple[Collocation, ...]
 ) -> Iterator[tuple[int, Collocation]]:
-    """Rows, by number, that are too near to a singular pose, and the motion over it to which they belong."""
+    """Rows, by number, that are too close to a singular pose, and the motion over it to which they belong."""
     for motion in motions:
         engine.select_pieces_after(0.5 * (motion.start + motion.end))
         begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")

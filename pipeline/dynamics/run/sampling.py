@@ -21,7 +21,7 @@ NEAR = 1e-6
 
 @dataclass(frozen=True)
 class _Sampled:
-    """A controller: its row of LOADS, its numbers, its part, the places of its internal states."""
+    """A controller: its row of LOADS, its numbers, its part, the indices of its internal states."""
 
     row: Any
     numbers: np.ndarray

@@ -1,4 +1,4 @@
-"""Closures near singular poses: choice of the rows to solve for, condition numbers, refusals in words."""
+"""Closures close to singular poses: choice of the rows to solve for, condition numbers, refusals in words."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
 
 
 def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """Closure Jacobians (..., kept rows, nv) with lengths in units of `SCALE`: what condition numbers are reported
+    """Closure Jacobians (..., selected rows, nv) with lengths in units of `SCALE`: what condition numbers are reported
     of."""
     along = built_rows(model, h) == 0
     return J * np.outer(np.where(along, 1.0 / SCALE, 1.0), coordinate_scales(model.numbering))
@@ -85,7 +85,7 @@ def natural(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
 
 
 def built_rows(model: Model, h: np.ndarray) -> np.ndarray:
-    """Kind of each kept row: 0 along an axis [m], 1 of two axes [-]."""
+    """Kind of each selected row: 0 along an axis [m], 1 of two axes [-]."""
     kinds = []
     rows = model.arrays.table(m.CLOSURE_ROWS, h)
     for c in model.arrays.table(m.CLOSURES, h):

@@ -52,8 +52,8 @@ class Pass:
 def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
     """Leave a polynomial ready for the stepper, over the singular pose ahead of it or out of one; and what it passes.
 
-    Where there is none yet, the stepper's memory says how near to the pose it shall go before it asks again, or that it
-    shall go on by itself.  SolverError when the mechanism comes to rest in the pose.
+    Where there is none yet, the stepper's memory says how close to the pose it shall go before it asks again, or that
+    it shall go on by itself.  SolverError when the mechanism comes to rest in the pose.
     """
     control = engine.control
     t, y = float(control[m.TIME]), engine.view(m.Y).copy()
@@ -78,7 +78,7 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
 
 
 def _closed(sampler: Sampler, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    """The state closed, and its slope; as it is, and None, where the pose is too near for both."""
+    """The state closed, and its slope; as it is, and None, where the pose is too close for both."""
     closed, sound = sampler.closed(t, y)
     if not sound or not sampler.attempt(t, closed):
         return y, None
@@ -86,7 +86,7 @@ def _closed(sampler: Sampler, t: float, y: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def foresee_at_start(engine: Engine) -> bool:
-    """Put a pose that is near ahead of the stepper's state into its memory, where no step has led to; whether it is so.
+    """Put a pose close ahead of the stepper's state into its memory, where no step has led to; whether it is so.
 
     From how fast the closure rows come to depend on each other there.
     """
@@ -124,7 +124,7 @@ def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple
 
 
 def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
-    """A polynomial out of a pose, or over one that has come too near to be foreseen, by the motion's own scale."""
+    """A polynomial out of a pose, or over one that is too close to be predicted, by the motion's own scale."""
     nq = sampler.engine.model.nq
     sampler.attempt(t, y)
     rate = np.append(sampler.slope()[:nq], np.zeros(len(y) - nq))
@@ -193,7 +193,7 @@ def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass:
 
 
 def _refuse_rest(engine: Engine, made: Collocation, one: Pass, left: np.ndarray) -> None:
-    """SolverError where the coordinates of the dependent closures stand still in the pose."""
+    """SolverError where the coordinates of the dependent closures do not move in the pose."""
     moving = selection.coordinates_of_rows(engine.model, engine.h, np.max(np.abs(left), axis=1) > 0.1)
     speeds = engine.model.speeds
     times = np.append(np.linspace(made.start, made.end, LOOKS + 1), one.time)

@@ -35,7 +35,7 @@ ALIKE = 0.05
 
 @dataclass(frozen=True)
 class StartMotion:
-    """A motion out of the pose; kept: closure rows that are solved for on it."""
+    """A motion out of the pose; selected: closure rows that are solved for on it."""
 
     motion: Collocation
     selected: np.ndarray
@@ -114,7 +114,7 @@ def _changes(engine: Engine, way: Direction, until: float) -> dict[str, float]:
 
 
 def _refuse_open(engine: Engine, changes: list[dict[str, float]], choices: tuple[Branch, ...]) -> None:
-    """Say which joint tells the branches apart best, and how its coordinate changes on each."""
+    """Say which joint distinguishes the branches best, and how its coordinate changes on each."""
     spread = {name: float(np.ptp([change[name] for change in changes])) for name in changes[0]}
     size = {name: max(abs(change[name]) for change in changes) for name in changes[0]}
     best = max(spread, key=lambda name: spread[name] / size[name] if size[name] > 0.0 else 0.0)

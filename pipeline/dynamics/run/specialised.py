@@ -36,7 +36,7 @@ SELECTIONS = 4
 #: states that are evaluated at once: few, or many. Of fewer than `FEW` each is evaluated alone
 FEW, LANES = 2, (4, 8)
 _making = Lock()
-#: addresses by parts, wiring and lanes: many engines of a process share them
+#: addresses by parts, wiring and lanes: many engines of a process use them
 _known: dict[tuple[Parts, Wiring, int], int] = {}
 
 
@@ -102,7 +102,7 @@ def _make(engine: Engine, progress: Progress) -> None:
 
 
 def _group(engine: Engine, rows: bytes, lane: Place, progress: Progress) -> LaneGroup | None:
-    """Who takes the steps at a place, with the closure rows that the first integration there begins with."""
+    """What takes the steps in a lane, with the closure rows that the first integration there begins with."""
     several = _code(engine, rows, progress, lane.groups.width)
     if not several:
         return None

@@ -104,7 +104,7 @@ def _judged(body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: n
         row, bent = largest(body.shapes, q, BENT * body.length)
         if bent > BENT * body.length:
             yield (
-                f"{body.name}: at t = {time[row]:.6g} s a point of it is {bent:.3g} m from its undeformed place, "
+                f"{body.name}: at t = {time[row]:.6g} s a point of it is {bent:.3g} m from its undeformed position, "
                 f"{bent / body.length:.2g} of its length; linear modes hold below {BENT:g}: divide it into several "
                 "bodies joined by fixed joints, or make it stiffer"
             )

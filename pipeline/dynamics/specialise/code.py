@@ -37,14 +37,14 @@ LIBRARY = {"sin": "sin", "cos": "cos", "exp": "exp", "tanh": "tanh", "arctan2": 
 
 @dataclass(frozen=True)
 class Program:
-    """block: what is computed.  stores: what is written at the end, (array, place, value)."""
+    """block: what is computed.  stores: what is written at the end, (array, index, value)."""
 
     block: list[Any]
     stores: list[tuple[str, Any, Any]]
 
 
 def loads(program: Program) -> list[tuple[str, Any]]:
-    """Array and place of all that is loaded."""
+    """Array and index of all that is loaded."""
     entries, blocks = list[tuple[str, Any]](), [program.block]
     while blocks:
         for item in blocks.pop():
@@ -117,9 +117,9 @@ def divisor(product: Symbol, counts: Counter[Symbol]) -> Symbol | None:
 class Emitter:
     """Writes a program into a function under construction.
 
-    where: the place of an array's element: where(array, place as a number or a value of the code, lane) -> pointer.
+    where: address of an array's element: where(array, index as a number or a value of the code, lane) -> pointer.
     lanes: states at once.  exact: every operation is rounded as it is.
-    number: of several states, what is at a place of f, of all of them.
+    number: of several states, what is at an index of f, of all of them.
     """
 
     def __init__(
@@ -312,7 +312,7 @@ class Emitter:
     def _call(self, name: str, values: list[Any]) -> Any:
         """A function of the mathematics library, in one lane.
 
-        Exact code has no other in its place, such as one for vectors: the compiler is not to know what it is.
+        Exact code has no alternative, such as one for vectors: the compiler is not to know what it is.
         """
         module, kind = self.builder.module, TYPES[FLOAT]
         full = LIBRARY[name] if self.exact or name not in INTRINSICS else f"{INTRINSICS[name]}.f64"

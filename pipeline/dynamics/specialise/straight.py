@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, UnsuitedError
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
-#: operations beyond which straight code is no faster than loops: it no longer fits the caches near to the processor
+#: operations beyond which straight code is no faster than loops: it no longer fits the processor's first caches
 LONGEST = 80_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_SPEEDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
@@ -44,7 +44,7 @@ def program(rates: Callable, wiring: wired.Wiring) -> Program:
 
 
 def _kept(h: list[int]) -> Callable[[int, int], bool]:
-    """Whether a place is read after an evaluation: of the factor of J M^-1 J^T its diagonal, of scales the last."""
+    """Whether an index is read after an evaluation: of the factor of J M^-1 J^T its diagonal, of scales the last."""
     o = h[m.CLOSURE_ENVELOPE.place]
     rows = [(h[o + 2 * r], h[o + 2 * r + 1]) for r in range(h[m.N_KEPT_ROWS])]
     diagonal = {start - first + r for r, (first, start) in enumerate(rows)}
@@ -78,8 +78,8 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
     """Functions of compiled code: note(h, f, numbers, lane) and abreast(places, numbers).
 
     The second does the same for several states, each of a mechanism with numbers of its own, which the first has put
-    where they stand side by side: numbers has room for all of f in all lanes.
-    places: addresses of all h, then of all f, w and n, then all places y and dy, shape (6 lanes,).
+    where they are adjacent: numbers has room for all of f in all lanes.
+    places: addresses of all h, then of all f, w and n, then all addresses of y and dy, shape (6 lanes,).
     """
     made = cache(lambda: program(rates, wiring))  # both functions are typed and written, and the tape is long
 

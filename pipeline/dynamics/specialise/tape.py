@@ -197,7 +197,7 @@ class Tape:
         return self.write(FLOAT, "mul", *_ordered(a, b))
 
     def divide(self, a: Any, b: Any) -> Any:
-        """The quotient, by a reciprocal that others may share."""
+        """The quotient, by a reciprocal that others may reuse."""
         if not isinstance(b, Symbol):
             return self.multiply(a, 1.0 / b)
         if _negative(b):
@@ -233,7 +233,7 @@ class Tape:
                 del self._known[key]
 
     def join(self, branch: Branch, a: Any, b: Any) -> Any:
-        """What a place holds after a branch."""
+        """Value at an index after a branch."""
         if same(a, b):
             return a
         joined = self._symbol(kind_of(a), "join", ())

@@ -1,6 +1,6 @@
 """Kernels run in Python on symbols, so that what they compute for one wiring is on a tape.
 
-Sizes, offsets and tables of h are numbers, so loops are counted and places known while the tape is written; w and f
+Sizes, offsets and tables of h are numbers, so loops are counted and indices known while the tape is written; w and f
 hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it is, and
 what both ways leave is joined. Kernels that are called before the branch are not run again, but what they did is
 repeated.
@@ -23,7 +23,7 @@ FUNCTIONS = ("sqrt", "sin", "cos", "exp", "tanh", "arctan2", "round", "copysign"
 
 
 class Memory:
-    """An array that is read and written by place; what was not written is loaded when the code runs."""
+    """An array that is read and written by index; what was not written is loaded when the code runs."""
 
     def __init__(self, trace: Trace, name: str, kind: str) -> None:
         self.trace, self.name, self.kind = trace, name, kind

@@ -1,7 +1,7 @@
-"""The wiring of a mechanism as its specialised code depends on it, and what the code keeps apart from it.
+"""The wiring of a mechanism as its specialised code depends on it, and what the code does not depend on.
 
 Sizes and tables of h, without those that only laws of time, error norms and the record read. Where w and f keep what
-is none of it: stretches of arrays are known by their place in the header, so that one code serves every integrator and
+is none of it: stretches of arrays are known by their index in the header, so that one code serves every integrator and
 any number of pieces of laws.
 """
 
@@ -19,7 +19,7 @@ Wiring = tuple[tuple[int, ...], ...]
 #: read by laws of time, error norms and the record alone
 LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS, m.BODIES, m.FRAMES)
 SIZES = m.ADDRESSES[0]
-#: a place is a stretch of an array and where in the stretch; the first stretch is the array itself
+#: an index is a stretch of an array and where in the stretch; the first stretch is the array itself
 STRETCH = 40
 #: stretches of w that are reported by an argument: the state and its rates
 STATE, RATES = m.HEADER + 1, m.HEADER + 2
@@ -48,12 +48,12 @@ def header(wired: Wiring) -> list[int]:
 
 
 def split(index: int) -> tuple[int, int]:
-    """The header's place of a stretch, -1 of an array itself, and where in it."""
+    """The header's index of a stretch, -1 of an array itself, and where in it."""
     return (index >> STRETCH) - 1, index & ((1 << STRETCH) - 1)
 
 
 def start(stretch: int) -> int:
-    """The place where a stretch begins."""
+    """The index where a stretch begins."""
     return (stretch + 1) << STRETCH
 
 

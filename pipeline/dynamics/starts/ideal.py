@@ -2,7 +2,7 @@
 
 The ideal_scene has ideal joints instead of pins and balls with clearance. The force that such a joint carries at the
 start presses the pin onto one side of its socket, and so deep into it that the contact carries that force. Slots and
-planes have no ideal joint in their place: they stay as they are, and what touches them where the poses put it.
+planes have no ideal counterpart: they stay as they are, and what touches them where the poses put it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,8 @@ from flexclear.pipeline.dynamics.run.run import driven
 from flexclear.pipeline.dynamics.run.start import consistent_start, project, rates_at_speeds
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
-#: a pin is in its place when it is this fraction of the clearance from it; passes in which that is reached, at most
+#: a pin has its final position when it is this fraction of the clearance from it; passes in which that is reached, at
+#: most
 THERE, PASSES = 1e-9, 20
 #: forces below this fraction of the weight press nothing: the pin stays in the middle
 NOTHING = 1e-9
@@ -122,7 +123,7 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
 
 
 def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray, bent: np.ndarray) -> np.ndarray:
-    """The state with the pins moved by `offsets` (3 each) [m], and modal coordinates as near to `bent` as that allows.
+    """The state with the pins moved by `offsets` (3 each) [m], and modal coordinates as close to `bent` as that allows.
 
     The least motion alone would bend rods by some of the clearance, and the run begin with the blow of their springing
     back: a stiff one is under kilonewtons then.
