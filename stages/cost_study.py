@@ -33,7 +33,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     points = with_reference(points, runs, chosen)
     study = assemble(points, runs, chosen)
     study.attrs |= params["own"] | {"undone": params["undone"], "complete": int(params["complete"])}
-    asis = next(runs[p.key] for p in points if p.key == "as it stands")
+    asis = next(runs[p.key] for p in points if p.key == "as it is")
     study.attrs |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
     ensembles = _ensembles(inputs)
     # the last one is that at the tightest tolerance
@@ -64,7 +64,7 @@ def _ensembles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 
 def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> tuple[Any, ...]:
-    """The scene as it stands and the paper's choice of method and step, as marked points."""
+    """The scene as it is and the paper's choice of method and step, as marked points."""
     from flexclear.pipeline.post.cost.study import believed, cost, relative_errors
     from flexclear.pipeline.post.cost.work_precision import Mark
 

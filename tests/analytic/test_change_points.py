@@ -269,7 +269,7 @@ def test_free_four_bars_keep_their_branch(name: str) -> None:
 
 @pytest.mark.slow
 def test_mechanisms_without_a_pose_ahead_lay_no_polynomial() -> None:
-    """A crank-rocker that comes near a change point and turns sharply there is integrated as it stands."""
+    """A crank-rocker that comes near a change point and turns sharply there is integrated as it is."""
     lengths = (0.2, 0.4, 0.3, 0.499)
     table = cp.driven(cp.four_bar(1.5, 1.0, lengths, time={"end": 2.0}), "A", cp.steady(1.5, 4.0))
     run = integrate(Scene.model_validate(table), {}, lambda fraction, text: None)

@@ -54,7 +54,7 @@ def study(swing: Scene, place: Workplace) -> cost.Study:
 def test_a_first_answer_has_tighter_and_looser_runs_and_another_family_of_methods(csj: Scene):
     designs = cost_design.neighbours(csj, OWN)
     first = designs[: cost_design.FIRST]
-    assert first[0].key == "as it stands"
+    assert first[0].key == "as it is"
     tolerances = [d.scene.solver.rtol for d in first if d.scene.solver.integrator == "dop853"]
     assert min(tolerances) < OWN.rtol < max(tolerances)
     assert {d.scene.solver.integrator for d in first} - {"dop853"}
@@ -99,7 +99,7 @@ def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.
 def test_a_small_budget_leaves_points_undone_and_a_larger_goes_on(swing: Scene, place: Workplace, study: cost.Study):
     small = cost.Study(swing, place, seconds=1e-3)
     small.first()
-    assert [d.key for d in small.points] == ["as it stands"]
+    assert [d.key for d in small.points] == ["as it is"]
     assert len(small.undone) == cost_design.FIRST - 1
     mine, others = small.task().inputs["point0"], study.task().inputs["point0"]
     assert mine.params == others.params

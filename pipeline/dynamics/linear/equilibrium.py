@@ -88,7 +88,8 @@ def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
     loose = _leading(bench.model, at.Z @ at.unbalanced, at.mass)
     raise SolverError(
         f"the search for a static equilibrium close to this pose failed in {MOST} iterations: "
-        f"a force of {residual(bench, at):.3g} N stays unbalanced, most of it at {loose}; hold that motion by a joint, a drive or a spring"
+        f"a force of {residual(bench, at):.3g} N stays unbalanced, most of it at {loose}; "
+        "hold that motion by a joint, a drive or a spring"
     )
 
 
