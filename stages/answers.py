@@ -81,7 +81,7 @@ def said(name: str, answer: Answer, scene: Scene) -> Said:
     data = answer.dataset()
     if name == "accuracy":
         caption = "Error against processor time; the star is this scene"
-        return Said("What accuracy costs", sentences(data), "work_precision.png", caption)
+        return Said("What accuracy costs", sentences(data), "accuracy.png", caption)
     if name == "stability":
         columns = ("value", "limit", "verdict", "remedy")
         rows = [[str(c), *(str(data[n].sel(check=c).item()) for n in columns)] for c in data["check"].values]
