@@ -142,13 +142,13 @@ class Room:
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
     MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES, N_RUBBING, N_BEARINGS, RUBBING_SLOT,
-    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES,
+    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES, N_COMPONENTS,
 ) = _named(
     SIZES,
     "n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger n_pairs "
     "n_known_pairs n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
     "n_loads n_internal load_slot n_couplings n_surfaces n_rubbing n_bearings rubbing_slot n_worn wear_slot n_bodies "
-    "n_frames",
+    "n_frames n_components",
 )
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
@@ -156,13 +156,17 @@ class Room:
 EVALUATE, PROJECT, RETRACT, RATES = ADDRESSES = _places(4)
 
 # Wiring in h ---------------------------------------------------------------------------------------------------------
-#: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1
-LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by")
+#: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;
+#: component: independent mechanism that it belongs to, -1 of the ground
+LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by component")
 SITES = wiring("link port")  # port: or -1
 #: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes share entries of
 #: the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0, n_basis: entries
-#: of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in that basis
-FLEXES = wiring("link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0")
+#: of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in that basis; book:
+#: place in the ledger of what its damping loses
+FLEXES = wiring(
+    "link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0 book"
+)
 BASIS = wiring("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
 MOMENTS = wiring("mode")  # mode i of int rho S_ki S_lj, row after row
 MOMENT_ROWS = wiring("end")  # per body and row (3k + l) n + j of these: place in MOMENTS after its last one
@@ -189,8 +193,9 @@ CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: t
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first
 PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
 #: a: site, -1 where the world holds against it; gauge, measured: of the joint coordinate that it acts along, and of one
-#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame
-LOADS = wiring("a b law0 number0 gauge measured internal0 follows")
+#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame; book: where
+#: in the ledger its work is, and then its loss
+LOADS = wiring("a b law0 number0 gauge measured internal0 follows book")
 LOAD_KINDS = wiring("load0 n_loads")
 #: how a joint coordinate is measured between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
 #: turns: place of the angle with its full turns among the internal states or -1
@@ -209,6 +214,8 @@ REACTION_LOOPS = wiring("closure sign part")  # closures that act beyond it
 WORN = wiring("contact")  # contacts whose wear is counted
 BODIES, FRAMES = wiring("link"), wiring("link")  # moving bodies and named frames: what is recorded, which no step reads
 GROUPS = wiring("group")  # error group of each state variable
+BOOKS = wiring("work loss load")  # of each independent mechanism: places in the ledger (`DRIVE_WORK`, ...)
+DRIVES = wiring("book")  # place in the ledger of each drive's work
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
 LINK_NUMBERS = numbers("mass com:3 inertia:6")  # inertia about the centre of mass (xx yy zz xy xz yz), link axes
@@ -221,8 +228,8 @@ INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), 
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port and moving shape r: translation shape (3r), rotation shape (3r)
 #: radius: of the inner surface; kinks: sliding speeds at which the friction law bends, or 0; shape: what else its kind
-#: of surfaces has
-CONTACT_NUMBERS = numbers("clearance radius floor stick_speed kinks:2 normal_law:4 friction_law:6 shape:2")
+#: of surfaces has; length: size of the mechanism that it belongs to
+CONTACT_NUMBERS = numbers("clearance radius floor stick_speed kinks:2 normal_law:4 friction_law:6 shape:2 length")
 #: radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per force
 #: along the axis and per moment about it; preload: normal force that is always there; kinks: as of CONTACT_NUMBERS;
 #: turning_kink: size of sliding speeds of a law that bends where sliding reverses, or 0
@@ -233,7 +240,10 @@ HARMONICS = numbers("amplitude frequency phase")  # angular frequency
 LOAD_NUMBERS = numbers("value")  # see `loads`
 LOAD_KINKS = numbers("speeds:2")  # of each load, along its joint coordinate, at which its friction bends, or 0
 GRAVITY = numbers("acceleration:3")
-FLOORS = numbers("magnitude")  # per error group: below it is resolved absolutely
+#: per error group. magnitude: below it is resolved absolutely, natural: the same by the size of all that there is;
+#: share: factor of its tolerance by which no independent mechanism is resolved less well than alone
+FLOORS = numbers("magnitude natural share")
+CLOSURE_NUMBERS = numbers("weight")  # of each closure's lengths, so that the loops of small mechanisms close as well
 #: of bodies and named frames in their link, undeformed. mass, com, inertia: as of LINK_NUMBERS; mass and inertia are 0
 #: where nothing but the body itself is in its link
 BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("mass com:3 inertia:6 axes:3x3"), numbers("origin:3")
@@ -305,7 +315,7 @@ WATCH = work(
 HEADER = next(_place)
 
 # the ledger before the contacts' slots (three deflections of each contact with bristles come after them):
-# work of drives, loss of modal damping
+# work of drives, loss of modal damping, both of the first independent mechanism; BOOKS says where those of others are
 DRIVE_WORK, MODAL_LOSS, CONTACT_SLOTS = range(3)
 #: a contact's slots there: losses of its damping and of friction, impulse of its normal force
 CONTACT_LEDGER = layout("damping friction impulse")

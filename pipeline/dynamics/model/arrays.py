@@ -131,6 +131,7 @@ def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int
         m.N_WORN: count[m.WORN],
         m.N_BODIES: count[m.BODIES],
         m.N_FRAMES: count[m.FRAMES],
+        m.N_COMPONENTS: count[m.BOOKS],
         m.MASS_SIZE: envelope_size(named(m.ENVELOPE, tables[m.ENVELOPE])),
         m.SCHUR_SIZE: envelope_size(named(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
         m.JACOBIAN_SIZE: int(np.sum(3 * closures["threes"] * closures["n_support"])),

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.clearance import Clearance
@@ -18,6 +20,8 @@ from flexclear.pipeline.dynamics.model.stops import End
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
 
+#: a number of each independent mechanism
+Floors = Sequence[float] | np.ndarray
 #: wiring of a contact but for the kinds of its laws
 Touching = Sequence[tuple[int, int]]
 
@@ -34,9 +38,11 @@ def fill(
 
     gauges: take those of the stops.
     """
-    contacts = numbering.mechanism.contacts
-    rows, reals = [], []
-    for (name, joint, *_), law, sites, place in zip(contacts, laws, touching, bristle_places(numbering), strict=True):
+    mechanism, rows, reals = numbering.mechanism, [], []
+    given = zip(mechanism.contacts, laws, touching, bristle_places(numbering), strict=True)
+    for contact, law, sites, place in given:
+        name, joint, *_ = contact
+        length = mechanism.components.lengths[part_of(mechanism, contact)]
         friction_kind, numbers, stick, kinks = -1, (0.0,) * 6, 0.0, (0.0, 0.0)
         if joint.friction is not None:
             friction = _friction(name, joint)
@@ -49,8 +55,15 @@ def fill(
             surfaces, shape = parts.surfaces.index(joint.type), joint.shape
         kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
         rows.append((*sites, *kinds_of, place))
-        reals.append([joint.clearance, joint.radius, joint.floor, stick, *kinks, *law.numbers, *numbers, *shape])
+        reals.append(
+            [joint.clearance, joint.radius, joint.floor, stick, *kinks, *law.numbers, *numbers, *shape, length]
+        )
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
+
+
+def of_worn(mechanism: Mechanism) -> list[int]:
+    """The independent mechanism of every contact that wears."""
+    return [part_of(mechanism, mechanism.contacts[k]) for (k,) in worn(mechanism)]
 
 
 def worn(mechanism: Mechanism) -> list[tuple[int]]:
@@ -60,16 +73,28 @@ def worn(mechanism: Mechanism) -> list[tuple[int]]:
     return [(names.index(name),) for name in wearing]
 
 
-def ledger_groups(mechanism: Mechanism, energy: float) -> list[tuple[float, int]]:
-    """(floor, number of variables) of every error group after positions and speeds: ledger, then bristles."""
-    contact = [(energy, 1), (energy, 1), (energy / mechanism.length, 1)]  # losses [J], impulse [N s]
-    ledger = [(energy, 1)] * m.CONTACT_SLOTS + contact * len(mechanism.contacts)
-    return ledger + [(size, 3) for size in _bristles(mechanism) if size is not None]
+def part_of(mechanism: Mechanism, contact: Contact) -> int:
+    """The independent mechanism that a contact belongs to."""
+    return mechanism.components.of(contact.outer.link, contact.inner.link)
+
+
+def ledger_groups(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[tuple[float, int, int]]:
+    """(floor, number of variables, independent mechanism) of every error group after positions and speeds.
+
+    First the ledger, then bristles.  energies, lengths: floors of each independent mechanism.
+    """
+    parts = [part_of(mechanism, contact) for contact in mechanism.contacts]
+    ledger = [(energies[0], 1, 0)] * m.CONTACT_SLOTS
+    for part in parts:
+        ledger += [(energies[part], 1, part)] * 2 + [(energies[part] / lengths[part], 1, part)]  # losses, impulse [N s]
+    bristles = zip(_bristles(mechanism), parts, strict=True)
+    return ledger + [(size, 3, part) for size, part in bristles if size is not None]
 
 
 def ledger_size(mechanism: Mechanism) -> int:
     """Variables of the ledger up to the contacts' and their bristles, where those of the loads begin."""
-    return sum(count for _, count in ledger_groups(mechanism, 0.0))
+    ones = np.ones(len(mechanism.components.lengths))
+    return sum(count for _, count, _ in ledger_groups(mechanism, ones, ones))
 
 
 def bristle_places(numbering: Numbering) -> list[int]:

@@ -22,8 +22,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def fill(numbering: Numbering) -> dict[Any, Any]:
-    """The tables FLEXES .. PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies."""
+def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
+    """The tables FLEXES .. PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies.
+
+    losses: place in the ledger of what damping loses in each independent mechanism.
+    """
     flex, flex_real, data, index, value = [], [], [], [], []
     entry, entry_value, interface = list[tuple[int, int]](), list[float](), list[np.ndarray]()
     row_end = list[int]()
@@ -41,7 +44,7 @@ def fill(numbering: Numbering) -> dict[Any, Any]:
         entries, places = basis.entries(), (i, len(q), q.start, c.start, data0, moment0, len(row_end))
         held = sum(j < basis.held for _, j in entries)
         of_basis = (basis.held, len(entry), len(entries), len(entry) + held, interface0)
-        flex.append((*places, moves, int(coupled(mechanism, i)), *of_basis))
+        flex.append((*places, moves, int(coupled(mechanism, i)), *of_basis, losses[mechanism.components.of(i)]))
         entry += entries
         entry_value += [basis.matrix[where_] for where_ in entries]
         interface.append(_interface_data(bundle, basis))

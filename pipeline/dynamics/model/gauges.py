@@ -14,22 +14,29 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 class Gauges:
     """Gauges and internal states given out so far.
 
-    rows: of the table GAUGES.  internal: number of internal states; they stand at the end of the state.
+    rows: of the table GAUGES.  owners: sites, or -1, between which the part of each internal state acts; these states
+    stand at the end of the state.
     """
 
     rows: list[tuple[int, ...]] = field(default_factory=list)
-    internal: int = 0
+    owners: list[tuple[int, int]] = field(default_factory=list)
+
+    @property
+    def internal(self) -> int:
+        """Number of internal states."""
+        return len(self.owners)
 
     def add(self, a: int, b: int, coordinate: Coordinate, *, counts: bool) -> int:
         """Number of a new gauge of a joint coordinate between sites; `counts`: whether full turns of an angle count."""
-        turns = self.states(1) if counts and coordinate.turning else -1
+        turns = self.states(1, a, b) if counts and coordinate.turning else -1
         how = (coordinate.side, coordinate.axis, *coordinate.sine, *coordinate.cosine)
         self.rows.append((a, b, turns, int(coordinate.turning), *how))
         return len(self.rows) - 1
 
-    def states(self, number: int) -> int:
-        """First of so many new internal states."""
-        first, self.internal = self.internal, self.internal + number
+    def states(self, number: int, a: int, b: int) -> int:
+        """First of so many new internal states of a part between sites."""
+        first = self.internal
+        self.owners += [(a, b)] * number
         return first
 
 

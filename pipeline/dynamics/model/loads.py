@@ -76,7 +76,7 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
                 numbering.site(mechanism.site(frame)) for frame in scene.joint[measured[0]].between
             )
             look = gauges.add(first_end, second_end, measured[1], counts=True)
-        internal = gauges.states(row.states) if row.states else -1
+        internal = gauges.states(row.states, a, b) if row.states else -1
         first = numbering.known + len(laws)
         if f"load.{name}" in given:
             laws.append(given[f"load.{name}"])

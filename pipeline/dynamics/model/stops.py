@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flexclear.pipeline.core.errors import InputError
@@ -43,18 +44,18 @@ def ends_an_angle(joint: object) -> bool:
     return isinstance(joint, End) and joint.coordinate.turning
 
 
-def ends(scene: Scene, length: float) -> list[tuple[str, End]]:
+def ends(scene: Scene, lengths: Mapping[str, float]) -> list[tuple[str, End]]:
     """The ends of all stops by name, ``stop.lower`` and ``stop.upper``; InputError for what cannot be.
 
-    length: size of the mechanism [m].
+    lengths: size of the mechanism that each stopped joint belongs to [m].
     """
     found = []
     for name, stop in scene.stop.items():
-        found += [(f"{name}.{side}", end) for side, end in _both(scene, name, stop, length).items()]
+        found += [(f"{name}.{side}", end) for side, end in _both(scene, name, stop, lengths).items()]
     return found
 
 
-def _both(scene: Scene, name: str, stop: Stop, length: float) -> dict[str, End]:
+def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> dict[str, End]:
     place = f"[stop.{name}]"
     joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, place)
 
@@ -71,7 +72,7 @@ def _both(scene: Scene, name: str, stop: Stop, length: float) -> dict[str, End]:
             f"its lower end must lie below its upper one; lower = {limits['lower']:.6g}, upper = {limits['upper']:.6g}",
             "exchange them, or leave one out",
         )
-    far = limits["upper"] - limits["lower"] if len(limits) == 2 else (1.0 if coordinate.turning else length)
+    far = limits["upper"] - limits["lower"] if len(limits) == 2 else (1.0 if coordinate.turning else lengths[joint])
     speed = "angular velocity" if coordinate.turning else "velocity"
     speeds: dict[str, float] = {
         key: read(key, speed) for key in ("floor", "initial_approach_speed") if getattr(stop, key) is not None
