@@ -46,7 +46,7 @@ class Graph:
     A scene without flexible bodies has no mesh, modes and bundle; one without an ensemble has no
     such task. Raises InputError for names that no family lists and recipes that cannot be read.
 
-    shown: whether the artifacts take their place below results/runs; an edited copy of a scene
+    shown: whether the artifacts are shown below results/runs; an edited copy of a scene
     must not take that of its original.
     recipe: edits of all mesh recipes: `theory`, and a factor for the number of `elements`.
     """
@@ -199,13 +199,13 @@ class Graph:
 
     def up_to(self, stage: str) -> list[Task]:
         """All tasks of the scene up to a stage, that stage included."""
-        wanted = STAGES[: STAGES.index(stage) + 1]
-        return [task for name in wanted for task in self.of(name).values()]
+        requested = STAGES[: STAGES.index(stage) + 1]
+        return [task for name in requested for task in self.of(name).values()]
 
     def of(self, stage: str) -> dict[str, Task]:
         """Tasks of one stage by body; by the empty name where there is one for the whole scene."""
-        found = getattr(self, stage)
-        return found if isinstance(found, dict) else {"": found} if found is not None else {}
+        tasks = getattr(self, stage)
+        return tasks if isinstance(tasks, dict) else {"": tasks} if tasks is not None else {}
 
     def artifact(self, reference: str) -> Task:
         """The task behind ``run``, ``post``, ``modes/rod1`` ...; InputError when there is none."""
@@ -239,7 +239,7 @@ class Graph:
 
     @property
     def has_tighter(self) -> bool:
-        """Whether there is a tighter tolerance that tells the error of a run."""
+        """Whether there is a tighter tolerance that gives the error of a run."""
         return self.scene.solver.step is not None or self.scene.solver.rtol > 10.0 * TIGHTEST
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Where loads stand in the tables, and what the kernels of all loads share: measuring and pushing.
+"""Positions of loads in the tables, and the common kernels of loads: measuring and pushing.
 
 A load between two sites acts on both by one wrench, with opposite signs: it leaves no force and no moment over.
 """

@@ -61,9 +61,9 @@ def components(scene: Scene, parents: Sequence[int], link_of: Mapping[str, int])
             root[find(link)] = find(moving[0])
     first = dict.fromkeys(find(link) for link in range(1, len(parents)))
     numbers = {link: k for k, link in enumerate(first)}
-    found = Components((-1, *(numbers[find(link)] for link in range(1, len(parents)))))
+    result = Components((-1, *(numbers[find(link)] for link in range(1, len(parents)))))
     frames = [set[str]() for _ in numbers] or [set[str]()]
     for part, links in zip(parts, held, strict=True):
         if any(links):
-            frames[found.of(*links)].update(part)
-    return Components(found.of_link, tuple(map(frozenset, frames)))
+            frames[result.of(*links)].update(part)
+    return Components(result.of_link, tuple(map(frozenset, frames)))

@@ -1,4 +1,4 @@
-"""The tables of the contacts: wiring, numbers of their laws, and their share of the state."""
+"""The tables of the contacts: wiring, numbers of their laws, and their fraction of the state."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def fill(
     """
     mechanism, rows, reals = numbering.mechanism, [], []
     given = zip(mechanism.contacts, laws, touching, bristle_places(numbering), strict=True)
-    for contact, law, sites, place in given:
+    for contact, law, sites, first in given:
         name, joint, *_ = contact
         length = mechanism.components.lengths[part_of(mechanism, contact)]
         friction_kind, numbers, stick, kinks = -1, (0.0,) * 6, 0.0, (0.0, 0.0)
@@ -54,7 +54,7 @@ def fill(
         else:
             surfaces, shape = parts.surfaces.index(joint.type), joint.shape
         kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
-        rows.append((*sites, *kinds_of, place))
+        rows.append((*sites, *kinds_of, first))
         reals.append(
             [joint.clearance, joint.radius, joint.floor, stick, *kinks, *law.numbers, *numbers, *shape, length]
         )
@@ -99,11 +99,11 @@ def ledger_size(mechanism: Mechanism) -> int:
 
 def bristle_places(numbering: Numbering) -> list[int]:
     """Where in the state each contact's deflection of bristles starts, or -1."""
-    place = numbering.nq + numbering.nv + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(numbering.mechanism.contacts)
+    first = numbering.nq + numbering.nv + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(numbering.mechanism.contacts)
     places = []
     for size in _bristles(numbering.mechanism):
-        places.append(-1 if size is None else place)
-        place += 0 if size is None else 3
+        places.append(-1 if size is None else first)
+        first += 0 if size is None else 3
     return places
 
 
@@ -120,25 +120,25 @@ def _friction(name: str, joint: Clearance | End) -> Any:
 
 
 def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
-    joint, place = contact.joint, f"[{contact.place}.normal]"
+    joint, path = contact.joint, f"[{contact.place}.normal]"
     masses = [mechanism.links[site.link].mass for site in (contact.outer, contact.inner)]
-    normal = lookup(NORMAL_LAWS, joint.normal.law, where=place)
+    normal = lookup(NORMAL_LAWS, joint.normal.law, where=path)
     if isinstance(joint, End):
-        return _resolved(normal, joint, joint.normal.stiffness, None, place)
-    surfaces = lookup(CONTACTS, joint.type, where=place)
+        return _resolved(normal, joint, joint.normal.stiffness, None, path)
+    surfaces = lookup(CONTACTS, joint.type, where=path)
     exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
     try:
         stiffness = surfaces.stiffness(joint, exponent)
     except ValueError as error:
-        raise InputError(place, str(error)) from None
-    return _resolved(normal, joint, stiffness, _reduced_mass(masses), place)
+        raise InputError(path, str(error)) from None
+    return _resolved(normal, joint, stiffness, _reduced_mass(masses), path)
 
 
-def _resolved(normal: Any, joint: Clearance | End, stiffness: float | None, mass: float | None, place: str) -> Resolved:
+def _resolved(normal: Any, joint: Clearance | End, stiffness: float | None, mass: float | None, path: str) -> Resolved:
     try:
         law: Resolved = normal.resolve(joint.normal, stiffness, mass)
     except ValueError as error:
-        raise InputError(place, str(error)) from None
+        raise InputError(path, str(error)) from None
     return law
 
 

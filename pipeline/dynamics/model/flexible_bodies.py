@@ -110,13 +110,13 @@ def shift(
     shape: S, (3, mode).  bow: B, (mode, mode), the shortening of a bent beam; None where the scene leaves it out.
     q, u, du: modal coordinates, rates and second rates, (time, mode).
     """
-    place, rate, second = q @ shape.T, u @ shape.T, du @ shape.T
+    displacement, rate, second = q @ shape.T, u @ shape.T, du @ shape.T
     if bow is not None:
         bent, turning = q @ bow, u @ bow
-        place[:, 0] += 0.5 * np.sum(bent * q, axis=1)
+        displacement[:, 0] += 0.5 * np.sum(bent * q, axis=1)
         rate[:, 0] += np.sum(bent * u, axis=1)
         second[:, 0] += np.sum(bent * du, axis=1) + np.sum(turning * u, axis=1)
-    return place, rate, second
+    return displacement, rate, second
 
 
 def _damping(name: str, body: FlexibleBody, bundle: xr.Dataset) -> np.ndarray:

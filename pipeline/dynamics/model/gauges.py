@@ -52,7 +52,7 @@ def angles(gauges: np.ndarray, sites: np.ndarray) -> dict[int, float]:
 
 def values(gauges: np.ndarray, sites: np.ndarray, internal: np.ndarray) -> list[float]:
     """Coordinates [rad, or m] that gauges measure, full turns counted as the internal states say; as of `angles`."""
-    found = []
+    entries = []
     for row in gauges:
         a, b = sites[row["a"]], sites[row["b"]]
         if row["turning"]:
@@ -60,8 +60,8 @@ def values(gauges: np.ndarray, sites: np.ndarray, internal: np.ndarray) -> list[
             cosine = float(a["axes"][:, row["cosine_f"]] @ b["axes"][:, row["cosine_g"]])
             angle = atan2(sine, cosine)
             turns = round((internal[row["turns"]] - angle) / (2.0 * np.pi)) if row["turns"] >= 0 else 0
-            found.append(angle + 2.0 * np.pi * turns)
+            entries.append(angle + 2.0 * np.pi * turns)
         else:
             along = (b if row["side"] else a)["axes"][:, row["axis"]]
-            found.append(float(along @ (b["origin"] - a["origin"])))
-    return found
+            entries.append(float(along @ (b["origin"] - a["origin"])))
+    return entries

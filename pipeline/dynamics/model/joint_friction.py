@@ -139,12 +139,12 @@ def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
 
 def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
     """The link whose inboard joint this is (of a chain its last one), and whether it is on the first frame's side."""
-    found = [
+    bearings = [
         (i, link.branch.reverse)
         for i, link in enumerate(mechanism.links)
         if link.branch.edge is not None and link.branch.edge.name == name
     ]
-    return found[-1] if found else (-1, False)
+    return bearings[-1] if bearings else (-1, False)
 
 
 def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]]) -> _Reaction:

@@ -34,7 +34,7 @@ from flexclear.pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, sp
 if TYPE_CHECKING:
     import xarray as xr
 
-#: share of the largest radius of gyration below which the distances of a scene are no size of it
+#: fraction of the largest radius of gyration below which the distances of a scene are no size of it
 NOTHING = 1e-9
 
 
@@ -136,12 +136,12 @@ class Link:
 
     @property
     def massless(self) -> bool:
-        """Whether it only stands between two freedoms of a joint, or is the ground."""
+        """Whether it only connects two freedoms of a joint, or is the ground."""
         return self.inertia is None and self.bundle is None
 
     @property
     def on_path(self) -> bool:
-        """Whether a prescribed pose in the world takes the place of its joint."""
+        """Whether a prescribed pose in the world replaces its joint."""
         return self.branch.edge is not None and self.branch.edge.kind == PATH
 
 
@@ -149,8 +149,9 @@ class Link:
 class Mechanism:
     """Links in tree order, closures and contacts of a scene; lengths in the world's axes.
 
-    origin: point of the world that the kernels use as theirs, near the mechanism.  length: size of the mechanism [m].
-    components: its parts that share no force.
+    origin: point of the world that the kernels use as theirs, close to the mechanism.  length: size of the mechanism
+    [m].
+    components: its parts that fraction no force.
     start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
     placed: frames of all links as the scene gives them, before joints and drives are made to fit.
     choice: which of several ways it was assembled in, in words; empty where there is one, or the scene chooses.
@@ -207,8 +208,8 @@ class Mechanism:
 def _site(frames: Mapping[str, Frame], links: list[Link], link_of: Mapping[str, int], name: str) -> Site:
     frame = find_frame(frames, name, "frame")
     i = link_of[frame.body]
-    place = links[i].places[frame.body].of(frame.place)
-    return Site(i, place, name if links[i].flexible else None)
+    placement = links[i].places[frame.body].of(frame.place)
+    return Site(i, placement, name if links[i].flexible else None)
 
 
 def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
@@ -252,7 +253,7 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
 
 
 def _centre(starts: list[Placement]) -> np.ndarray:
-    """A point near the mechanism: moments about it lose no digits, wherever the scene stands."""
+    """A point close to the mechanism: moments about it lose no digits, wherever the scene is."""
     moving = [s.p for s in starts[1:]]
     return np.mean(moving, axis=0) if moving else np.zeros(3)
 
@@ -324,17 +325,17 @@ def sizes(
 
     What an independent mechanism does not use of the ground is none of its size.
     """
-    found = components(scene, [link.branch.parent for link in links], link_of)
+    result = components(scene, [link.branch.parent for link in links], link_of)
     contacts = scene.contacts().values()
 
     def size(number: int) -> float:
-        mine = [link for link, of in zip(links, found.of_link, strict=True) if of in (number, -1)]
-        known = {n: f for n, f in frames.items() if link_of.get(f.body) != 0 or n in found.frames[number]}
-        loose = [j.clearance for j in contacts if found.of(*_links_of(j, link_of)) == number]
+        mine = [link for link, of in zip(links, result.of_link, strict=True) if of in (number, -1)]
+        known = {n: f for n, f in frames.items() if link_of.get(f.body) != 0 or n in result.frames[number]}
+        loose = [j.clearance for j in contacts if result.of(*_links_of(j, link_of)) == number]
         return _size(mine, known, loose)
 
     whole = _size(links, frames, [joint.clearance for joint in contacts])
-    return whole, replace(found, lengths=tuple(size(k) for k in range(len(found.frames))))
+    return whole, replace(result, lengths=tuple(size(k) for k in range(len(result.frames))))
 
 
 def _links_of(joint: Any, link_of: Mapping[str, int]) -> list[int]:
@@ -348,14 +349,14 @@ def _size(links: Sequence[Link], frames: Mapping[str, Frame], clearances: Sequen
     for frame in frames.values():
         of_body.setdefault(frame.body, []).append(frame.place.p)
     for link in links:
-        for name, place in link.places.items():
-            points += [link.start.point(place.point(p)) for p in of_body.get(name, [])]
+        for name, path in link.places.items():
+            points += [link.start.point(path.point(p)) for p in of_body.get(name, [])]
             if link.inertia is not None:
                 points.append(link.start.point(link.inertia.com))
     cloud = np.array(points) if points else np.zeros((1, 3))
     size = float(np.max(np.linalg.norm(cloud - cloud.mean(axis=0), axis=1)))
     size = max(size, *clearances, 0.0)
-    # of a body held at its centre of mass, only rounding of its place is left
+    # of a body held at its centre of mass, only rounding of its position is left
     gyration = max((np.sqrt(np.trace(J) / (2.0 * mass)) for mass, _, J in _inertias(links)), default=0.0)
     return size if size > NOTHING * gyration else float(gyration) or 1.0
 

@@ -67,7 +67,7 @@ class Model:
 
     @property
     def speeds(self) -> slice:
-        """Speeds of the free coordinates in the state; the positions stand before, the ledger after them."""
+        """Speeds of the free coordinates in the state; the positions come before, the ledger after them."""
         return slice(self.nq, self.nq + self.nv)
 
     @property
@@ -274,8 +274,8 @@ def _rubbing(numbering: Numbering, parts: Parts, closures: tuple[Closure | Coupl
     return joint_friction.fill(numbering, parts.joint_frictions, closures, slot)
 
 
-def _pose_row(place: Placement) -> np.ndarray:
-    return np.concatenate([place.p, place.R.ravel()])
+def _pose_row(placement: Placement) -> np.ndarray:
+    return np.concatenate([placement.p, placement.R.ravel()])
 
 
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:

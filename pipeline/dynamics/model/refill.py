@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism, sizes
 from flexclear.pipeline.dynamics.model.merge import rigid_inertia
 from flexclear.pipeline.dynamics.model.model import Model, filled
 
-#: least principal moment as share of the largest with which no motion of a link can be without inertia
+#: least principal moment as fraction of the largest with which no motion of a link can be without inertia
 SLENDER = 1e-6
 
 
@@ -120,7 +120,7 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
 
 
 def _held(joint: Any) -> tuple[str, tuple[str, str]]:
-    """What a clearance joint holds beside its contact."""
+    """What a clearance joint holds next to its contact."""
     return joint.type, tuple(joint.between)
 
 
@@ -143,13 +143,13 @@ def _drives_alike(new: Any, was: Any) -> bool:
 
 
 def _same_start(model: Model, scene: Scene) -> bool:
-    """Whether the drives stand at the start where they stood: then the links stand there, too."""
+    """Whether the drives start where they started before: then the links do, too."""
     pairs = zip(prescribed(model.scene), prescribed(scene), strict=True)
     changed = [(was, new) for was, new in pairs if was.law is not new.law]
     try:
         return all(_at_start(was, scene) == _at_start(new, scene) for was, new in changed)
     except ValueError:
-        return False  # a law that cannot be had, as is told when the model is made from scratch
+        return False  # a law that cannot be had, as is reported when the model is made from scratch
 
 
 def _at_start(one: Prescribed, scene: Scene) -> float:

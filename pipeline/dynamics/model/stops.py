@@ -49,15 +49,15 @@ def ends(scene: Scene, lengths: Mapping[str, float]) -> list[tuple[str, End]]:
 
     lengths: size of the mechanism that each stopped joint belongs to [m].
     """
-    found = []
+    listed = []
     for name, stop in scene.stop.items():
-        found += [(f"{name}.{side}", end) for side, end in _both(scene, name, stop, lengths).items()]
-    return found
+        listed += [(f"{name}.{side}", end) for side, end in _both(scene, name, stop, lengths).items()]
+    return listed
 
 
 def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> dict[str, End]:
-    place = f"[stop.{name}]"
-    joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, place)
+    path = f"[stop.{name}]"
+    joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, path)
 
     def read(key: str, dimension: str) -> float:
         try:
@@ -68,7 +68,7 @@ def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> 
     limits = {end: read(end, coordinate.dimension) for end in stop.ends}
     if len(limits) == 2 and not limits["lower"] < limits["upper"]:
         raise InputError(
-            place,
+            path,
             f"its lower end must lie below its upper one; lower = {limits['lower']:.6g}, upper = {limits['upper']:.6g}",
             "exchange them, or leave one out",
         )
@@ -81,8 +81,8 @@ def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> 
         if not value > 0.0:
             raise InputError(f"[stop.{name}.{key}]", f"must be positive, not {value:.6g}")
     between, sides = scene.joint[joint].between, {"lower": -1.0, "upper": 1.0}
-    told = speeds.get("initial_approach_speed")
+    approach = speeds.get("initial_approach_speed")
     return {
-        end: End(name, between, coordinate, limit, sides[end], far, stop.normal, speeds["floor"], told)
+        end: End(name, between, coordinate, limit, sides[end], far, stop.normal, speeds["floor"], approach)
         for end, limit in limits.items()
     }

@@ -20,9 +20,9 @@ Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 #: rounding of the largest energies, which may cancel in the balance
 ROUNDING = 1e-12
 #: no contact law is known to a thousandth of its energy; a run of chosen steps that is off by more says something
-#: else. Where more is asked for, more is kept: of three hundred hard cases at rtol 1e-10 (benchmarks/stability) none is
-#: off by 1e-6, unless something is wrong; what damps by its order is not told from a fault that soon. Fixed steps are
-#: for comparison: their error is to be seen, up to a tenth of all energy
+#: else. Where more is requested, the balance is better: of three hundred hard cases at rtol 1e-10
+#: (benchmarks/stability) none is off by 1e-6, unless something is wrong; what damps by its order is not told from a
+#: fault that soon. Fixed steps are for comparison: their error is to be seen, up to a tenth of all energy
 CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 0.1
 #: fraction of the exchanged energy above which an error is a warning: no force or speed can be trusted to a per cent
 DOUBTFUL = 1e-2
@@ -88,7 +88,7 @@ def series(model: Model, seen: Observed, component: int | None = None) -> Variab
 
 
 def usual(solver: Solver) -> float:
-    """Energy error, as a share of what is turned over, beyond which a run is refused when the scene does not say."""
+    """Energy error, as a fraction of what is turned over, beyond which a run is refused when the scene does not say."""
     if solver.step is not None:
         return FIXED
     if INTEGRATORS[solver.integrator].dissipative:
@@ -146,21 +146,21 @@ def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
 def require_closed(model: Model, trajectory: Trajectory, seen: Observed) -> None:
     """SolverError when the run diverges, or its ledger is off by more than the scene's tolerance."""
     _require_bounded(model, trajectory, seen)
-    for found in balances(model, seen):
-        _require(model, trajectory, found)
+    for energies in balances(model, seen):
+        _require(model, trajectory, energies)
 
 
-def _require(model: Model, trajectory: Trajectory, found: Balance) -> None:
+def _require(model: Model, trajectory: Trajectory, result: Balance) -> None:
     solver = model.scene.solver
     tolerance = solver.ledger_tolerance or usual(solver)
-    allowed = tolerance * found.exchanged + found.rounding
-    if found.error[found.worst] <= allowed:
+    allowed = tolerance * result.exchanged + result.rounding
+    if result.error[result.worst] <= allowed:
         return
-    first = int(np.argmax(~(found.error <= allowed)))
+    first = int(np.argmax(~(result.error <= allowed)))
     raise SolverError(
-        f"at t = {trajectory.time[first]:.6g} s: the energy balance{found.of} does not close: the error is up to "
-        f"{found.error[found.worst]:.3g} J where {found.exchanged:.3g} J are exchanged (tolerance {tolerance:g}, "
-        f"[solver.ledger_tolerance]); lost so far: {_losses(model, found.totals, first)}; "
+        f"at t = {trajectory.time[first]:.6g} s: the energy balance{result.of} does not close: the error is up to "
+        f"{result.error[result.worst]:.3g} J where {result.exchanged:.3g} J are exchanged (tolerance {tolerance:g}, "
+        f"[solver.ledger_tolerance]); lost so far: {_losses(model, result.totals, first)}; "
         "choose a smaller rtol or step, or another integrator"
     )
 

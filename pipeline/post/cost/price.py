@@ -25,14 +25,14 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
     """
     rows = []
     for target in TARGETS:
-        found = cheapest(study, target)
-        if found is None:
+        choice = cheapest(study, target)
+        if choice is None:
             best = min(choices(study), key=lambda c: c.error, default=NOTHING)
             rows.append((f"{target:g}", _absent(study), "–", "–", f"{best.error:.1e} at best", best.worst))
         else:
-            seconds = f"{found.seconds:.3f}"
+            seconds = f"{choice.seconds:.3f}"
             rows.append(
-                (f"{target:g}", found.name, f"{found.evaluations:.0f}", seconds, f"{found.error:.1e}", found.worst)
+                (f"{target:g}", choice.name, f"{choice.evaluations:.0f}", seconds, f"{choice.error:.1e}", choice.worst)
             )
     return Table(title, COLUMNS, tuple(rows), (*_notes(study), *notes))
 
@@ -62,7 +62,7 @@ def _cell(choice: Choice | None, absent: str) -> str:
 class Choice:
     """One way to integrate: its name, cost, largest relative error and the quantity that has it.
 
-    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be told.
+    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be determined.
     """
 
     name: str
@@ -84,7 +84,7 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 
 def choices(study: xr.Dataset) -> list[Choice]:
     """All ways to integrate whose error is known."""
-    found = []
+    choices = []
     unsure = study["reference_uncertainty"].fillna(0.0)
     for group, word in INTEGRATION.items():
         if f"error_by_{group}" not in study:
@@ -99,8 +99,8 @@ def choices(study: xr.Dataset) -> list[Choice]:
                 worst = str(study["quantity"].values[int(np.argmax(error.values))])
                 evaluations, seconds = float(one[f"evaluations_by_{group}"]), float(one[f"cpu_seconds_by_{group}"])
                 unit = " s" if word == "step" else ""
-                found.append(Choice(f"{m}, {word} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
-    return found
+                choices.append(Choice(f"{m}, {word} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
+    return choices
 
 
 def _notes(study: xr.Dataset) -> list[str]:
@@ -108,7 +108,7 @@ def _notes(study: xr.Dataset) -> list[str]:
     notes = [
         "The error is the largest of all quantities: "
         + ", ".join(str(q) for q in study["quantity"].values)
-        + "; each as a share of its own size, the reference's uncertainty included.",
+        + "; each as a fraction of its own size, the reference's uncertainty included.",
         _confirmed(study),
     ]
     if recorded == recorded:
