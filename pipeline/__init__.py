@@ -43,6 +43,7 @@ __all__ = [
     "report",
     "run",
     "sections",
+    "stability",
     "sweep",
 ]
 
@@ -63,7 +64,7 @@ def __getattr__(name: str) -> Any:
 def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
     """The scene in a TOML file, with everything that it extends, or in a table of the same keys.
 
-    override: dotted place -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
+    override: dotted path -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
     Raises InputError (exit code 2 of the command) with all mistakes at once.
 
     >>> import flexclear as fc
@@ -77,7 +78,7 @@ def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, ob
 
 
 def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
-    """A copy of a scene with dotted places changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a whole part as a table.
+    """A copy of a scene with dotted paths changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a whole part as a table.
 
     Raises InputError.
 
@@ -103,13 +104,28 @@ def run(scene: Scene | str | Path) -> xr.Dataset:
     return _stages("run").run(_loaded(scene))
 
 
-def cost(scene: Scene | str | Path) -> xr.Dataset:
-    """Error against cost of a scene over integrators, tolerances, steps and models; cached point by point.
+def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models: bool = False) -> xr.Dataset:
+    """What accuracy costs: error against cost over integrators, tolerances and steps; cached point by point.
 
-    The quantities are those of the scene's `[accuracy]`, else the usual ones.  Raises FlexclearError.
+    The quantities are those of the scene's `[accuracy]`, else the usual ones.  budget: processor time that the runs may
+    take [s], or text such as "2min"; by default that of ``flexclear cost``.  models: also other meshes and mode sets.
+    In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
-    dataset, _ = _stages("cost").bring(_loaded(scene), _stages("run").workplace())
-    return dataset
+    result: xr.Dataset = _stages("cost").dataset(_loaded(scene), _stages("run").open_workplace(), budget, models)
+    return result
+
+
+def stability(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
+    """Whether the run of a scene is stable: value, limit, verdict and remedy over `check`.
+
+    Energy balance, closed loops, agreement with tighter runs and with another method, rejected and stiff steps,
+    singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost.  In a notebook
+    the dataset shows the answer first.  Raises FlexclearError.
+    """
+    result: xr.Dataset = _stages("answers").dataset(
+        "stability", _loaded(scene), _stages("run").open_workplace(), budget
+    )
+    return result
 
 
 def sweep(
@@ -123,8 +139,8 @@ def sweep(
 ) -> xr.Dataset:
     """Many points of one scene, as ``flexclear sweep`` makes them; finished points come from the cache.
 
-    vary: place of the scene -> its values (a list), or what else a sweep file says of a parameter.
-    keep: what is kept of each point, e.g. ``["platform.velocity.largest", "A1.peak_force"]``.
+    vary: path in the scene -> its values (a list), or what else a sweep file says of a parameter.
+    keep: what is recorded of each point, e.g. ``["platform.velocity.largest", "A1.peak_force"]``.
     workers: processes of this machine, its cores by default; scheduler: address of a Dask cluster instead.
     more: `set`, `combine`, `sample`, `members` and `error` of a sweep file.
     The result has the parameters as dimensions.  Raises FlexclearError.
@@ -152,8 +168,8 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
     The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
     why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
     """
-    found: tuple[xr.Dataset, xr.Dataset] = _stages("sections").judge(_loaded(scene))
-    return found
+    datasets: tuple[xr.Dataset, xr.Dataset] = _stages("sections").judge(_loaded(scene))
+    return datasets
 
 
 def equilibrium(
@@ -163,7 +179,7 @@ def equilibrium(
     *,
     moving: bool = False,
 ) -> xr.Dataset:
-    """Static equilibrium of a mechanism near its start pose, the drives held (schema EQUILIBRIUM).
+    """Static equilibrium of a mechanism close to its start pose, the drives held (schema EQUILIBRIUM).
 
     time: at which the drives' laws give their positions [s], the scene's start when None.
     drives: positions [m or rad] by drive, instead of the law's.
@@ -201,25 +217,35 @@ def frequencies(
 def compare(
     *scenes: Scene | str | Path, ideal: bool | Literal["both", "clearance", "flexibility", "each"] = False
 ) -> xr.Dataset:
-    """Scenes beside each other, or beside their ideal twins: differences, the error of each run, events and costs.
+    """Scenes next to each other, or next to their ideal mechanisms: differences, the error of each run, events and
+    costs.
 
     ideal: compare each scene with itself without clearance and flexibility (True or "both"), without one of them, or
-    with each of these.  The first run is the reference; its variables are told in `pipeline.post.overview.comparison`.
-    Raises FlexclearError.
+    with each of these.  The first run is the reference; its variables are reported in
+    `pipeline.post.overview.comparison`. Raises FlexclearError.
     """
     without = "both" if ideal is True else ideal or None
-    found = _stages("compare").bring([_loaded(scene) for scene in scenes], _stages("run").workplace(), without)
-    return found.dataset()
+    comparison = _stages("compare").bring(
+        [_loaded(scene) for scene in scenes], _stages("run").open_workplace(), without
+    )
+    return comparison.dataset()
 
 
-def effects(scene: Scene | str | Path) -> xr.Dataset:
+def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
     """What each effect of a scene does to each quantity, taken away and put in, alone and in pairs.
 
     Variables and meanings: `pipeline.post.effect_sizes`.  The quantities are those of `[view] watch`, else of
-    `[accuracy]`, else the usual ones.  Raises FlexclearError.
+    `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is taken away alone, the most
+    important ones first, with as many members as decide the change (`pipeline.post.matters`); a notebook shows the
+    answer first.  Raises FlexclearError.
     """
-    found: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").workplace())
-    return found
+    if budget is not None:
+        some: xr.Dataset = _stages("answers").dataset(
+            "matters", _loaded(scene), _stages("run").open_workplace(), budget
+        )
+        return some
+    dataset: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").open_workplace())
+    return dataset
 
 
 def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
@@ -228,8 +254,8 @@ def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
     The dataset (`pipeline.post.plan.dataset`) holds the estimated influence of each effect on each quantity of
     `[accuracy]`, what was decided, and why.  Raises FlexclearError.
     """
-    found = _stages("plan").bring(_loaded(scene), _stages("run").workplace())
-    return found.planned, found.dataset()
+    planned = _stages("plan").bring(_loaded(scene), _stages("run").open_workplace())
+    return planned.planned, planned.dataset()
 
 
 def render(scene: Scene | str | Path) -> Path:
@@ -237,9 +263,15 @@ def render(scene: Scene | str | Path) -> Path:
     return _stages("render").rendered(_loaded(scene))
 
 
-def report(scene: Scene | str | Path) -> Path:
-    """The page with everything about a scene, one file, brought up to date.  Raises FlexclearError."""
-    return _stages("own_report").make(_stages("run").graph(_loaded(scene)), _stages("run").workplace())
+def report(scene: Scene | str | Path, budget: str | float | None = None, *, answers: bool = True) -> Path:
+    """The page with everything about a scene, one file, brought up to date.
+
+    budget: of what accuracy costs, whether the run is stable and which effects matter, as of `stability`; answers:
+    whether these are there.  Raises FlexclearError.
+    """
+    seconds = _stages("answers").seconds(budget)
+    graph, where = _stages("run").graph(_loaded(scene)), _stages("run").open_workplace()
+    return _stages("own_report").make(graph, where, seconds=seconds, answers=answers)
 
 
 def open(scene: Scene | str | Path) -> xr.DataTree:

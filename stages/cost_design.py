@@ -1,4 +1,9 @@
-"""Which runs a cost study makes of a scene: the factors, the reference and its confirmation."""
+"""Which runs a cost study makes of a scene: the factors, how dear each is foreseen to be, and in which order.
+
+First the neighbourhood of the scene's own setting: looser and tighter tolerances, another family of methods, denser
+output. Then, cheapest first, all methods over all their tolerances and steps. No run is a reference by itself: the
+study takes the tightest that was made (`pipeline.post.cost.study.reference_of`).
+"""
 
 from __future__ import annotations
 
@@ -8,15 +13,20 @@ from pathlib import Path
 from typing import Any
 
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.integrators import DEFAULT, INTEGRATORS, STIFF, VIBRATING
 from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.load import edited, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.stages.timing import paper_solver
 
-REFERENCE: Mapping[str, Any] = {"integrator": "dop853", "rtol": 1e-14}
-#: another family of methods
-CONFIRMATION: Mapping[str, Any] = {"integrator": "radau", "rtol": 1e-12}
+#: the scene's own tolerance and step times these, in this order; half and a tenth show whether tighter runs agree
+TOLERANCES, STEPS = (0.1, 10.0, 1.0, 0.5, 0.01, 100.0), (0.5, 2.0, 1.0, 0.25, 4.0)
+#: the same of another family of methods, by which the tightest is confirmed; with fixed steps at these tolerances
+CONFIRMING, CONFIRMING_STEPS = (0.1, 0.01), (1e-6, 1e-8)
+#: so many of the neighbourhood give a first answer
+FIRST = 4
+#: tolerances that make a difference: tighter ones drown in rounding
+TIGHTEST, LOOSEST = 1e-14, 1e-2
 #: mode sets that are compared, limits of their frequencies as multiples of the scene's own, and refinements of its mesh
 MODE_SETS = ("craig-bampton", "free-free", "fixed-fixed")
 LIMITS = (0.25, 0.5, 1.0, 2.0)
@@ -24,6 +34,23 @@ REFINEMENTS = (1, 2, 4)
 FINER_OUTPUT = 10.0
 #: what no point of a study has
 PLAIN: Mapping[str, None] = {"accuracy": None, "ensemble": None}
+#: what a method is foreseen to take of which no run is known, in evaluations of the scene's own run
+UNSEEN = 3.0
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How the scene's own run is integrated; step: of fixed steps, else None."""
+
+    integrator: str
+    rtol: float
+    step: float | None = None
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """As attributes of a study."""
+        setting = {"own_rtol": self.rtol} if self.step is None else {"own_step": self.step}
+        return {"own_integrator": self.integrator, **setting}
 
 
 @dataclass(frozen=True)
@@ -36,25 +63,87 @@ class Design:
     scene: Scene
     recipe: Mapping[str, Any] = field(default_factory=dict)
 
+    def evaluations(self, seen: Mapping[str, Mapping[float, float]], own: float) -> float:
+        """Foreseen evaluations of the right-hand side.
 
-def runs(scene: Scene, highest: float | None, integrators: Collection[str] = ()) -> list[Design]:
-    """All runs of a study.
+        seen: those of runs with chosen steps, by integrator and tolerance.  own: those of the scene as it is.
+        """
+        solver = self.scene.solver
+        order = INTEGRATORS[solver.integrator].order
+        if solver.step is not None:
+            return (self.scene.time.end - self.scene.time.start) / solver.step * order
+        known = seen.get(solver.integrator)
+        if self.group not in ("tolerance", "sampling"):
+            return UNSEEN * own
+        if not known:
+            return UNSEEN * own * max(1.0, 1e-6 / solver.rtol) ** (1.0 / (order + 1.0))
+        at = min(known, key=lambda rtol: max(rtol / solver.rtol, solver.rtol / rtol))
+        return known[at] * (at / solver.rtol) ** (1.0 / (order + 1.0))
 
-    highest: the highest frequency that the scene's bundles hold [Hz], None if all is rigid.  integrators: those that
-    are compared, all when empty; reference, confirmation and the paper's choice are always there.
-    Raises InputError for a method that is not compared.
+
+def neighbours(scene: Scene, own: Setting) -> list[Design]:
+    """The scene as it is and its neighbourhood, what answers most first."""
+    asis, denser = _sampling(scene, own)
+    if own.step is not None:
+        mine = [_stepped(scene, own.integrator, own.step * factor) for factor in STEPS]
+        confirming: tuple[float, ...] = CONFIRMING_STEPS
+    else:
+        tolerances = dict.fromkeys(min(max(own.rtol * factor, TIGHTEST), LOOSEST) for factor in TOLERANCES)
+        mine = [_tolerant(scene, own.integrator, rtol) for rtol in tolerances]
+        confirming = tuple(dict.fromkeys(max(own.rtol * factor, TIGHTEST) for factor in CONFIRMING))
+    others = [_tolerant(scene, other, rtol) for rtol in confirming for other in _others(scene, own)]
+    return [asis, *mine[:2], *others[:1], *mine[2:4], denser, *others[1:], *mine[4:]]
+
+
+def _others(scene: Scene, own: Setting) -> list[str]:
+    """Methods of other families than the scene's own: an explicit one, and one for what is stiff or vibrates."""
+    implicit = VIBRATING if scene.flexible() and own.integrator != VIBRATING else STIFF
+    return [name for name in (DEFAULT, implicit) if name != own.integrator]
+
+
+def wide(scene: Scene, integrators: Collection[str] = ()) -> list[Design]:
+    """All methods over all their tolerances and steps, and the paper's choice.
+
+    integrators: those that are compared, all when empty.  Raises InputError for a method that is not compared.
     """
     known = [name for name, traits in INTEGRATORS.items() if traits.tolerances or traits.steps]
     for name in integrators:
         if name not in known:
             raise InputError(f"--integrators {name}", "is not among those that are compared", suggestion(name, known))
-    found = [d for d in _integration(scene) if _chosen(d, integrators)] + list(_sampling(scene))
-    return found + (list(_models(scene, highest)) if highest is not None else [])
+    result = list[Design]()
+    for name in integrators or known:
+        result += [_tolerant(scene, name, rtol) for rtol in INTEGRATORS[name].tolerances]
+        result += [_stepped(scene, name, step) for step in INTEGRATORS[name].steps]
+    paper = paper_solver(scene)
+    return [*result, _design(scene, "paper", paper, f"{_words(paper)}, as the paper")]
 
 
-def _chosen(design: Design, integrators: Collection[str]) -> bool:
-    method = design.factors.get("adaptive_integrator") or design.factors.get("fixed_integrator")
-    return not integrators or method is None or method in integrators
+def models(scene: Scene, own: Setting, highest: float) -> list[Design]:
+    """Mode sets by the frequencies that they reach, finer meshes, and another beam theory, with the own integrator.
+
+    highest: the highest frequency that the scene's bundles hold [Hz].
+    """
+    return list(_models(scene, own, highest))
+
+
+def _tolerant(scene: Scene, integrator: str, rtol: float) -> Design:
+    solver = {"integrator": integrator, "rtol": rtol}
+    return _design(scene, "tolerance", solver, adaptive_integrator=integrator, rtol=rtol)
+
+
+def _stepped(scene: Scene, integrator: str, step: float) -> Design:
+    solver = {"integrator": integrator, "step": step}
+    return _design(scene, "step", solver, fixed_integrator=integrator, step=step)
+
+
+def _design(scene: Scene, group: str, solver: Mapping[str, Any], key: str = "", **factors: Any) -> Design:
+    change = {"solver": _solver(scene, **solver), **PLAIN}
+    return Design(key or _words(solver), group, factors, edited(scene, change))
+
+
+def _words(solver: Mapping[str, Any]) -> str:
+    setting = f"rtol {solver['rtol']:g}" if "rtol" in solver else f"step {solver['step']:g} s"
+    return f"{solver['integrator']}, {setting}" + (", unlocated contacts" if "events" in solver else "")
 
 
 def _solver(scene: Scene, **changes: Any) -> dict[str, Any]:
@@ -63,35 +152,21 @@ def _solver(scene: Scene, **changes: Any) -> dict[str, Any]:
     return own | changes
 
 
-def _integration(scene: Scene) -> Iterator[Design]:
-    def design(group: str, solver: Mapping[str, Any], **factors: Any) -> Design:
-        setting = f"rtol {solver['rtol']:g}" if "rtol" in solver else f"step {solver['step']:g} s"
-        located = ", unlocated contacts" if "events" in solver else ""
-        key = f"{solver['integrator']}, {setting}{located}" + (", as the paper" if group == "paper" else "")
-        return Design(key, group, factors, edited(scene, {"solver": _solver(scene, **solver), **PLAIN}))
-
-    yield design("reference", REFERENCE)
-    yield design("confirmation", CONFIRMATION)
-    for method, traits in INTEGRATORS.items():
-        for rtol in traits.tolerances:
-            solver = {"integrator": method, "rtol": rtol}
-            yield design("tolerance", solver, adaptive_integrator=method, rtol=rtol)
-    for method, traits in INTEGRATORS.items():
-        for step in traits.steps:
-            yield design("step", {"integrator": method, "step": step}, fixed_integrator=method, step=step)
-    yield design("paper", paper_solver(scene))
+def _own(scene: Scene, own: Setting) -> dict[str, Any]:
+    fixed = {} if own.step is None else {"step": own.step, "events": scene.solver.events}
+    return _solver(scene, integrator=own.integrator, rtol=own.rtol, **fixed)
 
 
-def _sampling(scene: Scene) -> Iterator[Design]:
-    """The scene as it stands, and with denser output."""
-    interval = scene.output.interval
-    yield Design("as it stands", "sampling", {"interval": interval}, edited(scene, PLAIN))
-    finer = edited(scene, {**PLAIN, "output": {"interval": interval / FINER_OUTPUT}})
+def _sampling(scene: Scene, own: Setting) -> Iterator[Design]:
+    """The scene as it is, and with denser output."""
+    interval, plain = scene.output.interval, {"solver": _own(scene, own), **PLAIN}
+    yield Design("as it is", "sampling", {"interval": interval}, edited(scene, plain))
+    output = scene.output.model_dump(mode="json", exclude_none=True, exclude={"stress"})
+    finer = edited(scene, {**plain, "output": output | {"interval": interval / FINER_OUTPUT}})
     yield Design("denser output", "sampling", {"interval": interval / FINER_OUTPUT}, finer)
 
 
-def _models(scene: Scene, highest: float) -> Iterator[Design]:
-    """Mode sets by the frequencies that they reach, finer meshes, and another beam theory."""
+def _models(scene: Scene, own_setting: Setting, highest: float) -> Iterator[Design]:
     recipes = [read_toml(Path(body.mesh)) for body in scene.flexible().values()]
     own_theory = str(recipes[0].get("theory", "rayleigh"))
     own = next(iter(scene.flexible().values())).modes.reference
@@ -99,8 +174,7 @@ def _models(scene: Scene, highest: float) -> Iterator[Design]:
     def design(reference: str, limit: float, refinement: int, theory: str) -> Design:
         modes = {"reference": reference, "up_to": limit * highest}
         bodies = {f"body.{name}.modes": modes for name in scene.flexible()}
-        solver = _solver(scene, integrator="dop853", rtol=1e-12)
-        change = edited(scene, {**bodies, "solver": solver, **PLAIN})
+        change = edited(scene, {**bodies, "solver": _own(scene, own_setting), **PLAIN})
         elements = refinement * int(recipes[0].get("elements", 1))
         key = f"{reference} up to {limit * highest:.4g} Hz, {elements} elements, {theory}"
         own_one = (reference, limit, refinement, theory) == (own, 1.0, 1, own_theory)
@@ -108,9 +182,11 @@ def _models(scene: Scene, highest: float) -> Iterator[Design]:
         factors |= {"own": own_one}
         return Design(key, "model", factors, change, {"elements": refinement, "theory": theory})
 
+    yield design(own, 1.0, 1, own_theory)
     for reference in dict.fromkeys((own, *MODE_SETS)):
         for limit in LIMITS:
-            yield design(reference, limit, 1, own_theory)
+            if (reference, limit) != (own, 1.0):
+                yield design(reference, limit, 1, own_theory)
     if all("elements" in recipe for recipe in recipes):
         for refinement in REFINEMENTS[1:]:
             yield design(own, 1.0, refinement, own_theory)

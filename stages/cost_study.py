@@ -10,37 +10,44 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.progress import Progress
 
-#: contact events are located to this share of the clearance (flexclear.pipeline.dynamics.integrate.contact_events)
+#: contact events are located to this fraction of the clearance (flexclear.pipeline.dynamics.integrate.contact_events)
 LOCATED = 1e-12
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``cost.nc`` and its tables and figures.
 
-    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, and `peers`, as of
-    `stages.cost_peers`.
+    params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, the `own`
+    setting of the scene (own_integrator, own_rtol or own_step), what was left `undone` in words, whether the study is
+    `complete`, and `peers`, as of `stages.cost_peers`.  The reference is the tightest run among the points, and a run
+    by another method confirms it.
     """
     from flexclear.pipeline.core.scene.requested_accuracy import Quantity
     from flexclear.pipeline.post.cost import causes, price, statistics, work_precision
-    from flexclear.pipeline.post.cost.study import Point, assemble
+    from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
     from flexclear.pipeline.post.plotting.table import files
 
     points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
     chosen = [Quantity(*pair) for pair in params["quantities"]]
+    points = with_reference(points, runs, chosen)
     study = assemble(points, runs, chosen)
+    study.attrs |= params["own"] | {"undone": params["undone"], "complete": int(params["complete"])}
+    asis = next(runs[p.key] for p in points if p.key == "as it is")
+    study.attrs |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
     ensembles = _ensembles(inputs)
     # the last one is that at the tightest tolerance
     split = split_of(points, runs, chosen, next(reversed(ensembles.values()), None))
     title = params["title"]
     said = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
-    study = causes.beside(study, split)
+    said += (f"Not run within the budget: {params['undone']}.",) if params["undone"] else ()
+    study = causes.with_causes(study, split)
     result: dict[str, Any] = {"nc": study}
     result |= files("price", price.price_list(study, f"What accuracy costs: {title}", said))
     result |= files("quantities", price.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
     result |= causes.make("causes", split, f"Where the error comes from: {title}")
-    marks = tuple(m for m in (_paper(points, runs, chosen),) if m is not None)
+    marks = _marks(points, runs, chosen)
     result |= work_precision.make(
         "work_precision", study, f"Error against cost: {title}", marks, work_precision.peers(study, params["peers"])
     )
@@ -52,27 +59,28 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def _ensembles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     """Ensembles that could be made, by what was varied."""
-    found = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
-    return {name: data for name, data in found.items() if "refused" not in data.attrs}
+    ensembles = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
+    return {name: data for name, data in ensembles.items() if "refused" not in data.attrs}
 
 
-def _paper(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> Any:
-    """The paper's own choice of method and step, as a marked point."""
+def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> tuple[Any, ...]:
+    """The scene as it is and the paper's choice of method and step, as marked points."""
     from flexclear.pipeline.post.cost.study import believed, cost, relative_errors
     from flexclear.pipeline.post.cost.work_precision import Mark
 
-    mine = [p for p in points if p.group == "paper" and "refused" not in runs[p.key].attrs]
-    if not mine:
-        return None
-    reference = runs[next(p.key for p in points if p.group == "reference")]
-    errors = relative_errors(runs[mine[0].key], reference, chosen, believed(points, runs))
-    return Mark("paper's choice", cost(runs[mine[0].key], "cpu_seconds"), errors)
+    reference, found = runs[next(p.key for p in points if p.group == "reference")], []
+    for name, group in (("this scene", "sampling"), ("paper's choice", "paper")):
+        run = next((runs[p.key] for p in points if p.group == group and "refused" not in runs[p.key].attrs), None)
+        if run is not None:
+            errors = relative_errors(run, reference, chosen, believed(points, runs))
+            found.append(Mark(name, cost(run, "cpu_seconds"), errors))
+    return tuple(found)
 
 
 def split_of(
     points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any], ensemble: xr.Dataset | None
 ) -> dict[str, dict[str, float]]:
-    """Relative error of the scene as it stands, by quantity and cause."""
+    """Relative error of the scene as it is, by quantity and cause."""
     from flexclear.pipeline.post.cost.split import causes_of
 
     return {q.name: causes_of(q, points, runs, LOCATED, ensemble) for q in chosen}

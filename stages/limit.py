@@ -18,14 +18,19 @@ def argument(parser: argparse.ArgumentParser) -> None:
 
 
 def deadline(options: argparse.Namespace | None) -> tuple[float, str]:
-    """Seconds from now, and what is told then; InputError for what is no time."""
+    """Seconds from now, and what is said then; InputError for what is no time."""
     text = getattr(options, "limit", None)
     if text is None:
         return math.inf, ""
+    return seconds(text, "--limit"), f"the time that --limit {text} gives is over"
+
+
+def seconds(text: str, option: str) -> float:
+    """A time above zero [s], as ``10s``, ``2min`` or ``1h``; InputError for other texts of an option."""
     try:
-        seconds = quantity(re.sub(r"(?<=[0-9.])(?=[a-z])", " ", text.strip()), "time")
-        if not seconds > 0.0:
+        result = quantity(re.sub(r"(?<=[0-9.])(?=[a-z])", " ", text.strip()), "time")
+        if not result > 0.0:
             raise ValueError("it must be above zero")
     except ValueError as error:
-        raise InputError(f"--limit {text}", f"is no time: {error}", "write --limit 2h, or '90 min'") from None
-    return seconds, f"the time that --limit {text} gives is over"
+        raise InputError(f"{option} {text}", f"is no time: {error}", f"write {option} 2h, or '90 min'") from None
+    return result

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 
 from flexclear.pipeline.post.render import gl
-from flexclear.stages.workplace import Workplace, check, common_arguments, near, workplace
+from flexclear.stages.workplace import Workplace, check, common_arguments, open_workplace, relative
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,33 +21,44 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--folder", action="store_true", help="a folder with the page and its pictures as files, not one file with all"
     )
+    parser.add_argument(
+        "--budget",
+        metavar="TIME",
+        help="processor time for the three answers about each scene, such as 10s, 2min or 1h; default: three times the "
+        "run's own",
+    )
+    parser.add_argument(
+        "--answers", choices=("all", "none"), default="all", help="none leaves the three answers out (default all)"
+    )
     common_arguments(parser)
 
 
 def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
-    place = workplace(options)
+    workplace = open_workplace(options)
     if not options.scenes:
-        print(near(make(place, folder=options.folder)))
+        print(relative(make(workplace, folder=options.folder)))
         return
-    from flexclear.stages import own_report, run
+    from flexclear.stages import limit, own_report, run
 
+    seconds = None if options.budget is None else limit.seconds(options.budget, "--budget")
     for graph in run.graphs(options.scenes, options.set):
-        print(near(own_report.make(graph, place, folder=options.folder)))
+        answers = options.answers != "none"
+        print(relative(own_report.make(graph, workplace, folder=options.folder, seconds=seconds, answers=answers)))
 
 
-def make(place: Workplace, *, folder: bool = False) -> Path:
-    """Bring everything that the report shows up to date; returns the page; with `folder` one with files beside it.
+def make(workplace: Workplace, *, folder: bool = False) -> Path:
+    """Bring everything that the report shows up to date; returns the page; with `folder` one with files next to it.
 
     What fails is left out of the page and raised (FailedTasksError) after the page is written.
     """
     from flexclear.stages import paper_report
 
-    outcome = paper_report.bring(place)
+    outcome = paper_report.bring(workplace)
     if gl.state().endswith("none"):
-        place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
+        workplace.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
     check(outcome)
-    target = place.store.root / "report" / "index.html"
+    target = workplace.store.root / "report" / "index.html"
     if not folder:
         return target
     from flexclear.stages.own_report import publish_page

@@ -32,7 +32,7 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> LabelledArrays:
     """One run of a scene (schema RUN).
 
-    bundles: reduced flexible bodies by name.  progress(share or None, text) is called now and then.
+    bundles: reduced flexible bodies by name.  progress(fraction or None, text) is called now and then.
     A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for; where it
     names no integrator, by the one that suits it.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on, StoppedError with what
@@ -70,11 +70,13 @@ def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     return of(deliver(scene, compared, progress, suit(scene, bundles)))
 
 
-def cost(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *, checked: bool = True) -> Cost:
+def cost(
+    scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *, checked: bool = True, brief: bool = False
+) -> Cost:
     """One run, and what its integration and its recording cost each (`pipeline.dynamics.record.cost.measure`)."""
     from flexclear.pipeline.dynamics.record.cost import measure
 
-    return measure(scene, bundles, progress, checked=checked)
+    return measure(scene, bundles, progress, checked=checked, brief=brief)
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
@@ -99,7 +101,7 @@ def equilibrium(
     drives: Mapping[str, float] | None = None,
     moving: bool = False,
 ) -> xr.Dataset:
-    """Static equilibrium near the scene's start pose, its drives held (schema EQUILIBRIUM).
+    """Static equilibrium close to the scene's start pose, its drives held (schema EQUILIBRIUM).
 
     time: at which the drives' laws give their positions [s]; the start when None.  drives: positions [m or rad] by
     name instead.  moving: the drives keep the speed of that moment, and the pose is one of steady motion.

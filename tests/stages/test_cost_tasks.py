@@ -1,46 +1,118 @@
-"""The tasks of a cost study: what is measured alone, what is compiled once for many points."""
+"""A cost study: what is measured alone, in which order, what a budget leaves undone, whether its errors are right."""
 
 from __future__ import annotations
 
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.requested_accuracy import parse
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
-from flexclear.pipeline.core.workflow.task import Task, in_order
-from flexclear.stages import cost, cost_design, cost_peers
+from flexclear.pipeline.core.workflow.task import in_order
+from flexclear.pipeline.post.cost.answer import sentences
+from flexclear.stages import cost, cost_design, cost_peers, run
 from flexclear.stages.__main__ import main
+from flexclear.stages.cost_design import Setting
 from flexclear.stages.workplace import Workplace
+
+OWN = Setting("dop853", 1e-6)
 
 
 @pytest.fixture
-def study(root: Path, tmp_path: Path) -> Task:
-    scene = load_scene(root / "scenes" / "sps4" / "csj.toml")
-    return cost.study(scene, Workplace(Store(tmp_path), Sources(root)))
+def csj(root: Path) -> Scene:
+    return load_scene(root / "scenes" / "sps4" / "csj.toml")
 
 
-def test_points_are_measured_alone_and_their_kernels_compiled_beforehand_side_by_side(study: Task):
-    points = [task for task in in_order([study]) if task.stage == "cost-point"]
-    ahead = [task for task in in_order([study]) if task.stage == "kernels"]
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Workplace:
+    root = Path(__file__).parents[2]
+    return Workplace(Store(tmp_path_factory.mktemp("cost")), Sources(root), jobs=1)
+
+
+@pytest.fixture(scope="module")
+def swing() -> Scene:
+    """A pendulum at a loose tolerance, whose errors are far above rounding."""
+    path = Path(__file__).parents[2] / "scenes" / "checks" / "pendulum.toml"
+    return load_scene(path, {"solver": {"integrator": "dop853", "rtol": 1e-6}, "time.end": "2 s"})
+
+
+@pytest.fixture(scope="module")
+def study(swing: Scene, place: Workplace) -> cost.Study:
+    found = cost.Study(swing, place, seconds=60.0)
+    found.first()
+    found.neighbourhood()
+    return found
+
+
+def test_a_first_answer_has_tighter_and_looser_runs_and_another_family_of_methods(csj: Scene):
+    designs = cost_design.neighbours(csj, OWN)
+    first = designs[: cost_design.FIRST]
+    assert first[0].key == "as it is"
+    tolerances = [d.scene.solver.rtol for d in first if d.scene.solver.integrator == "dop853"]
+    assert min(tolerances) < OWN.rtol < max(tolerances)
+    assert {d.scene.solver.integrator for d in first} - {"dop853"}
+    assert len({d.key for d in designs}) == len(designs)
+
+
+def test_fixed_steps_are_compared_with_other_steps_and_with_chosen_ones(csj: Scene):
+    designs = cost_design.neighbours(csj, Setting("rk4", 1e-10, 1e-5))
+    assert {d.scene.solver.step for d in designs if d.group == "step"} == {2.5e-6, 5e-6, 1e-5, 2e-5, 4e-5}
+    assert {d.scene.solver.step for d in designs if d.group == "tolerance"} == {None}
+
+
+def test_points_are_measured_alone_with_kernels_compiled_before(study: cost.Study):
+    points = [task for task in in_order([study.task()]) if task.stage == "cost-point"]
+    assert len(points) == len(study.points)
     assert all(point.exclusive for point in points)
-    assert not any(task.exclusive for task in ahead)
-    # four methods with chosen steps, three with fixed ones, and the paper's, whose contacts are not located
-    assert len(ahead) == 8
-    assert all(point.inputs["kernels"] in ahead for point in points)
     for point in points:
         mine, compiled = (t.params["simulate"]["scene"]["solver"] for t in (point, point.inputs["kernels"]))
         assert (mine["integrator"], mine["events"]) == (compiled["integrator"], compiled["events"])
-        assert ("step" in mine) == ("step" in compiled)
 
 
-def test_a_study_goes_on_where_it_was(study: Task, root: Path):
-    """Every point has an artifact of its own, whose key depends on that point alone."""
-    points = [task for task in in_order([study]) if task.stage == "cost-point"]
-    assert len({task.part for task in points}) == len(points)
+def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.Study, swing: Scene, place: Workplace):
+    found, _ = study.drawn()
+    solver = {"solver": {"integrator": "radau", "rtol": 1e-12}}
+    converged = run.run(edited(swing, solver), place)
+    told = 0
+    for rtol in found["rtol"].values:
+        if np.isnan(found.error_by_tolerance.sel(adaptive_integrator="dop853", rtol=rtol)).any():
+            continue  # too loose: the energy balance does not close
+        other = run.run(edited(swing, {"solver": {"integrator": "dop853", "rtol": float(rtol)}}), place)
+        for name in map(str, found["quantity"].values):
+            q = parse(name, swing.owners())
+            error = quantities.error(other, converged, q) / max(quantities.scale(converged, q), 1e-300)
+            here = found.error_by_tolerance.sel(adaptive_integrator="dop853", rtol=rtol, quantity=name)
+            unsure = float(found.reference_uncertainty.sel(quantity=name))
+            if float(here) > 20.0 * unsure:  # of errors near the reference's own nothing is claimed
+                assert 0.5 < error / float(here) < 2.0
+                told += 1
+    assert told >= 3
+
+
+def test_a_small_budget_leaves_points_undone_and_a_larger_goes_on(swing: Scene, place: Workplace, study: cost.Study):
+    small = cost.Study(swing, place, seconds=1e-3)
+    small.first()
+    assert [d.key for d in small.points] == ["as it is"]
+    assert len(small.undone) == cost_design.FIRST - 1
+    mine, others = small.task().inputs["point0"], study.task().inputs["point0"]
+    assert mine.params == others.params
+
+
+def test_the_answer_names_its_cost_its_error_and_the_next_digit(study: cost.Study):
+    found, _ = study.drawn()
+    text = sentences(found)
+    assert "dop853 at rtol 1e-06" in text
+    assert "One more digit costs" in text
+    assert found.attrs["own_evaluations"] > 0
+    assert found.attrs["complete"] == 0  # the neighbourhood is not all
+    assert not np.isnan(found.own_error).any()
 
 
 def test_a_scene_without_a_quantity_is_refused(root: Path):
@@ -48,7 +120,7 @@ def test_a_scene_without_a_quantity_is_refused(root: Path):
         load_scene(root / "scenes" / "sps4" / "csj.toml", {"accuracy": {"platform.positon": "1 um"}})
 
 
-TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"platform.position": [1e-6, 1e-7]}}
+TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"bob.position": [1e-6, 1e-7]}}
 
 
 @pytest.mark.parametrize(
@@ -69,30 +141,35 @@ def test_a_file_of_peers_that_makes_no_sense_is_refused(tmp_path: Path, text: st
         cost_peers.read(file)
 
 
-def test_peers_change_the_study_but_none_of_its_points(root: Path, tmp_path: Path, study: Task):
+def test_peers_change_the_study_but_none_of_its_points(tmp_path: Path, swing: Scene, place: Workplace):
     file = tmp_path / "peers.json"
-    file.write_text(json.dumps({"sps4/csj": [TRACK]}))
-    scene, place = load_scene(root / "scenes" / "sps4" / "csj.toml"), Workplace(Store(tmp_path), Sources(root))
-    other = cost.study(scene, place, cost_peers.read(file)["sps4/csj"])
+    file.write_text(json.dumps({"checks/pendulum": [TRACK]}))
+    studies = [cost.Study(swing, place, 1e-3, peers=peers) for peers in ((), cost_peers.read(file)["checks/pendulum"])]
+    for one in studies:
+        one.begin()
+    plain, other = (one.task() for one in studies)
     assert other.params["peers"] == [TRACK]
-    assert {k: v.params for k, v in other.inputs.items()} == {k: v.params for k, v in study.inputs.items()}
+    assert {k: v.params for k, v in other.inputs.items()} == {k: v.params for k, v in plain.inputs.items()}
 
 
-def test_a_study_of_some_integrators_keeps_what_all_are_compared_with(root: Path, tmp_path: Path):
-    scene = load_scene(root / "scenes" / "sps4" / "csj.toml")
-    some = cost.study(scene, Workplace(Store(tmp_path), Sources(root)), integrators=("rk4",))
-    groups = {p["group"]: p["key"] for p in some.params["points"]}
-    assert groups.keys() == {"reference", "confirmation", "step", "paper", "sampling"}
-    assert "rk4" in groups["step"]
+def test_integrators_that_are_named_are_compared_and_unknown_ones_refused(csj: Scene):
+    groups = {d.group for d in cost_design.wide(csj, ("rk4",))}
+    assert groups == {"step", "paper"}
     with pytest.raises(InputError, match="did you mean 'radau'"):
-        cost_design.runs(scene, None, ("radua",))
+        cost_design.wide(csj, ("radua",))
 
 
-def test_points_keep_the_limits_of_the_scene(root: Path):
-    scene = load_scene(root / "scenes" / "sps4" / "csj.toml", {"solver": {"rtol": 1e-7, "evaluations": 1234}})
-    assert {design.scene.solver.evaluations for design in cost_design.runs(scene, None)} == {1234}
+def test_points_keep_the_limits_of_the_scene(csj: Scene):
+    limited = edited(csj, {"solver": {"rtol": 1e-7, "evaluations": 1234}})
+    designs = [*cost_design.neighbours(limited, OWN), *cost_design.wide(limited)]
+    assert {design.scene.solver.evaluations for design in designs} == {1234}
 
 
 def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     assert main(["cost", "sps4/csj", "--page", str(tmp_path / "nowhere" / "page.md")]) == 2
     assert "its folder does not exist" in capsys.readouterr().err
+
+
+def test_a_budget_that_is_no_time_is_refused(capsys: pytest.CaptureFixture[str]):
+    assert main(["cost", "checks/pendulum", "--budget", "soon"]) == 2
+    assert "--budget soon" in capsys.readouterr().err

@@ -30,11 +30,12 @@ from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.search import summed
 from flexclear.pipeline.dynamics.plan.tolerance import no_dearer
 from flexclear.pipeline.dynamics.run.run import Run, integrate
+from flexclear.pipeline.post.plan import verdict as judged
 from flexclear.stages import plan, s4_simulate, s4_watched, s8_plan
 from flexclear.stages.__main__ import main
 from flexclear.stages.graph import Graph
 from flexclear.stages.new import write
-from flexclear.stages.workplace import FailedTasksError, workplace
+from flexclear.stages.workplace import FailedTasksError, open_workplace
 
 #: of the leg's rod [m, Pa, kg/m^3], and what stands on it [kg]
 LENGTH, RADIUS, MODULUS, DENSITY, PLATFORM = 0.24, 0.01, 71.7e9, 2740.0, 3.0
@@ -60,7 +61,7 @@ def _response(scene: Scene, chosen: list[Quantity]) -> Response:
 
 def _ideal(scene: Scene) -> tuple[Run, dict[str, xr.Dataset]]:
     """The run of a scene's ideal twin, and what is known of its bodies."""
-    place, task = workplace(), s8_plan.task(edited(scene, {"accuracy": {"quantities": {}}}))
+    place, task = open_workplace(), s8_plan.task(edited(scene, {"accuracy": {"quantities": {}}}))
     outcome = place.bring(list(task.inputs.values()), 1)
     inputs = {name: place.store.load(outcome.records[id(below)]) for name, below in task.inputs.items()}
     gone = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
@@ -132,7 +133,7 @@ def test_the_elements_that_are_called_for_make_the_error_that_is_wanted(tmp_path
 
     def reduced(factor: int) -> xr.Dataset:
         task = Graph(coarse, shown=False, recipe={"elements": factor}).bundle["rod"]
-        place = workplace()
+        place = open_workplace()
         return place.store.load(place.bring([task], 1).records[id(task)])
 
     recipe = tmp_path / "coarse.toml"
@@ -248,11 +249,11 @@ def test_a_plan_keeps_a_rod_that_bends_by_more_than_is_wanted_and_drops_one_that
     moving = edited(leg, {"drive.stroke": load_scene(tmp_path / "leg.toml").drive["stroke"].model_dump(mode="json")})
     moving = edited(moving, {"time.end": 0.02})
     kept = {}
-    for wanted in (1e-4, 1e-8):
-        scene = edited(moving, {"accuracy": {"quantities": {"platform.position": {"absolute": wanted}}}})
+    for requested in (1e-4, 1e-8):
+        scene = edited(moving, {"accuracy": {"quantities": {"platform.position": {"absolute": requested}}}})
         planned, found = fc.plan(scene)
-        kept[wanted] = "rod" in planned.flexible()
-        assert bool(found["kept"].sel(effect="body.rod.modes")) == kept[wanted]
+        kept[requested] = "rod" in planned.flexible()
+        assert bool(found["kept"].sel(effect="body.rod.modes")) == kept[requested]
         assert found.attrs["evaluations"] > 0
     assert kept == {1e-4: False, 1e-8: True}
 
@@ -276,7 +277,7 @@ def test_the_planned_scene_is_a_file_that_runs_and_verifies(tmp_path: Path, caps
 
 def test_bad_plans_are_refused_in_words(tmp_path: Path, capsys: pytest.CaptureFixture, results: Path):
     path = write("pendulum", tmp_path)[0]
-    assert main(["plan", str(path), "-q", "--jobs", "1"]) == 2
+    assert main(["plan", str(path), "-q", "--jobs", "1", "--verify"]) == 2
     assert "asks for no accuracy" in capsys.readouterr().err
     path.write_text(path.read_text() + '\n[accuracy]\nnobody.position = "10 um"\n')
     assert main(["plan", str(path), "-q", "--jobs", "1"]) == 2
@@ -286,12 +287,28 @@ def test_bad_plans_are_refused_in_words(tmp_path: Path, capsys: pytest.CaptureFi
     assert not (results / "plan").exists()
 
 
+def test_without_a_requested_accuracy_three_levels_are_planned(tmp_path: Path, capsys: pytest.CaptureFixture):
+    path = write("pendulum", tmp_path)[0]
+    assert main(["plan", str(path), "-q", "--jobs", "1"]) == 0
+    said = capsys.readouterr().out
+    assert all(f"| {level}" in said for level in plan.LEVELS)
+    assert said.count("gravity") >= 3  # without it nothing swings
+
+
+@pytest.mark.parametrize(
+    "error, chance, wanted, verdict",
+    [(0.0, 0.5, 1.0, "met"), (0.6, 0.5, 1.0, "not decided"), (1.2, 0.5, 1.0, "not decided"), (1.6, 0.5, 1.0, "missed")],
+)
+def test_met_and_missed_are_said_only_where_error_and_chance_agree(error, chance, wanted, verdict):
+    assert judged(error, chance, wanted) == verdict
+
+
 def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Path, results: Path):
     scene = edited(
         _tight(_standing_leg(tmp_path)), {"accuracy": {"quantities": {"platform.position": {"absolute": 1.0}}}}
     )
     with pytest.raises((InputError, FailedTasksError), match="leave out everything") as refused:
-        plan.bring(scene, workplace())
+        plan.bring(scene, open_workplace())
     assert refused.value.exit_code == 2
     assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]
 
@@ -376,7 +393,7 @@ def test_a_scene_that_cannot_be_run_as_it_stands_has_no_plan(tmp_path: Path, res
             "accuracy": {"quantities": {"slider.position": {"absolute": 1e-3}}},
         },
     )
-    with pytest.raises(FailedTasksError, match="cannot be run as it stands") as refused:
-        plan.bring(wild, workplace())
+    with pytest.raises(FailedTasksError, match="cannot be run as it is") as refused:
+        plan.bring(wild, open_workplace())
     assert refused.value.exit_code == 3
     assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]

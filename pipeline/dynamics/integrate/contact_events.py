@@ -309,8 +309,8 @@ def try_again(n, c):
 @kernel
 def stepped_over(h, f, w, n, c):
     """Whether contact c, about to change its mode where a step starts, has begun long before."""
-    o, gap = h[m.CONTROL], w[m.TOUCH.row(h, c) + m.TOUCH.gap]
-    deep = DEEP * clearance(h, f, c) + ERRORS * w[o + m.RTOL] * w[o + m.LENGTH]
+    gap, length = w[m.TOUCH.row(h, c) + m.TOUCH.gap], f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.length]
+    deep = DEEP * clearance(h, f, c) + ERRORS * w[h[m.CONTROL] + m.RTOL] * length
     return gap < -deep and n[n[m.MODE] + c] == 0
 
 

@@ -38,7 +38,7 @@ def derivative(force: Callable[[float], np.ndarray], widest: float, rounding: Ro
     """Derivative d force / d s at s = 0, and the estimate of its error in the Euclidean norm.
 
     force(s): shape (n,); it may raise SolverError where it does not exist, which steps inward.
-    widest: the largest step tried.  Raises SolverError when `force` exists nowhere near.
+    widest: the largest step tried.  Raises SolverError when `force` exists nowhere close by.
     """
     steps = widest / FACTOR ** np.arange(LEVELS)
     table = [_row(force, float(step)) for step in steps]
@@ -56,7 +56,7 @@ def derivative(force: Callable[[float], np.ndarray], widest: float, rounding: Ro
             if best is None or float(change) + floor < best[1]:
                 best = row[j], float(change) + floor
     if best is None:
-        raise SolverError("the forces near this pose cannot be evaluated")
+        raise SolverError("the forces close to this pose cannot be evaluated")
     return best
 
 

@@ -26,15 +26,15 @@ from flexclear.pipeline.dynamics.model.model import Model
 
 #: iterations before giving up
 MOST = 200
-#: longest step, as a share of the mechanism's size or of a radian
+#: longest step, as a fraction of the mechanism's size or of a radian
 LONGEST = 0.2
-#: balanced: unbalanced force below this share of those in balance (or of the weight), or a step too short to matter
+#: balanced: unbalanced force below this fraction of those in balance (or of the weight), or a step too short to matter
 BALANCED, SHORT = 1e-12, 1e-14
 #: what rounding may leave when iterations no longer gain
 ROUNDING = 1e-8
-#: eigenvalues of the stiffness below this share of the largest hold nothing
+#: eigenvalues of the stiffness below this fraction of the largest hold nothing
 LIMP = 1e-12
-#: a step may end with this share of the starting power turned against it
+#: a step may end with this fraction of the starting power turned against it
 OVERSHOOT = 0.5
 
 
@@ -61,7 +61,7 @@ def equilibrium(
 
 
 def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
-    """The equilibrium near positions q (loops closed); SolverError when there is none or none is found."""
+    """The equilibrium close to positions q (loops closed); SolverError when there is none, or the search fails."""
     at = tangent(bench, q)
     best, since = np.inf, 0
     for iteration in range(MOST):
@@ -77,8 +77,9 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
         at = _search(bench, at, step)
     loose = _leading(bench.model, at.Z @ at.unbalanced, at.mass)
     raise SolverError(
-        f"no static equilibrium was found near this pose in {MOST} iterations: a force of {residual(bench, at):.3g} N "
-        f"stays unbalanced, most of it at {loose}; hold that motion by a joint, a drive or a spring"
+        f"the search for a static equilibrium close to this pose failed in {MOST} iterations: "
+        f"a force of {residual(bench, at):.3g} N stays unbalanced, most of it at {loose}; "
+        "hold that motion by a joint, a drive or a spring"
     )
 
 
@@ -111,16 +112,16 @@ def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
 def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
     """The pose after the step or a part of it."""
     direction = at.Z @ step
-    share, power = 1.0, -float(step @ at.unbalanced)
+    fraction, power = 1.0, -float(step @ at.unbalanced)
     for _ in range(80):
         try:
-            new = tangent(bench, closed(bench, at.q + share * (at.moves @ direction)))
+            new = tangent(bench, closed(bench, at.q + fraction * (at.moves @ direction)))
         except SolverError:
-            share *= 0.5
+            fraction *= 0.5
             continue
         if -float((new.Z.T @ (at.mass @ direction)) @ new.unbalanced) >= -OVERSHOOT * power:
             return new
-        share *= 0.5
+        fraction *= 0.5
     raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium can be made from this pose")
 
 
@@ -129,12 +130,12 @@ def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
 
     motion: speeds, shape (nv,).
     """
-    energy, shares = motion * (mass @ motion), dict[str, float]()
+    energy, fractions = motion * (mass @ motion), dict[str, float]()
     for i, link in enumerate(model.links[1:], start=1):
         edge, mine = link.branch.edge, model.numbering.coordinates[i]
         name = f"joint {edge.name}" if edge is not None else f"body {link.group.host}"
         if not link.drives:
-            shares[name] = shares.get(name, 0.0) + float(energy[mine].sum())
+            fractions[name] = fractions.get(name, 0.0) + float(energy[mine].sum())
         if link.flexible:
-            shares[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
-    return max(shares, key=lambda name: shares[name])
+            fractions[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
+    return max(fractions, key=lambda name: fractions[name])

@@ -29,13 +29,13 @@ from flexclear.pipeline.dynamics.run.singular import built_rows
 
 #: corrections of one pose; each is at most this fraction of the one before, else a stride has to be shorter
 CORRECTIONS, CONTRACTION = 20, 0.5
-#: corrections below this share of the mechanism's size, or of a radian, that shrink no more are rounding
+#: corrections below this fraction of the mechanism's size, or of a radian, that shrink no more are rounding
 ROUNDED = 1e-8
-#: shortest stride, as a share of the drives' speed: narrow against the way between two critical speeds
+#: shortest stride, as a fraction of the drives' speed: narrow against the way between two critical speeds
 SHORTEST = 1.0 / 256.0
 #: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
 STEADY = 1e-9
-#: how far the drives are moved to see whether the forces stay the same, in radians or shares of the mechanism's size
+#: how far the drives are moved to see whether the forces stay the same, in radians or fractions of the mechanism's size
 PROBE = 0.1
 
 
@@ -84,18 +84,18 @@ def _continued(bench: Bench, q: np.ndarray) -> Equilibrium:
     except SolverError:
         pass
 
-    def at(share: float, start: np.ndarray) -> Equilibrium:
-        set_drives(bench, bench.drives * [1.0, share])
+    def at(fraction: float, start: np.ndarray) -> Equilibrium:
+        set_drives(bench, bench.drives * [1.0, fraction])
         return newton(bench, start)
 
     try:
         set_drives(bench, bench.drives * [1.0, 0.0])
-        rest, share = descend(bench, q), 0.0
-        while share < 1.0:
-            stride = 1.0 - share
+        rest, fraction = descend(bench, q), 0.0
+        while fraction < 1.0:
+            stride = 1.0 - fraction
             while True:
                 try:
-                    rest, share = at(min(1.0, share + stride), rest.at.q), min(1.0, share + stride)
+                    rest, fraction = at(min(1.0, fraction + stride), rest.at.q), min(1.0, fraction + stride)
                     break
                 except SolverError:
                     stride *= 0.5

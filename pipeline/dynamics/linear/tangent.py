@@ -16,9 +16,9 @@ from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.dynamics.linear.bench import Bench, balance, displacement_map
 from flexclear.pipeline.dynamics.linear.differences import Rounding, derivative
 
-#: singular values of the closures below this share of the largest are redundant rows
+#: singular values of the closures below this fraction of the largest are redundant rows
 RANK = 1e-9
-#: widest step of a derivative, as a share of the mechanism's size, or of one radian
+#: widest step of a derivative, as a fraction of the mechanism's size, or of one radian
 WIDEST = 1e-2
 #: rounding of a sum of some dozens of terms
 EPSILON = 1e-15

@@ -1,6 +1,6 @@
 r"""Natural vibrations about an equilibrium, or about steady motion: :math:`\ddot z + D\dot z + Kz = 0`.
 
-Stiff contacts beside soft pendulums: a stiffness differenced along mixed directions would leave rounding of the stiff
+Stiff contacts next to soft pendulums: a stiffness differenced along mixed directions would leave rounding of the stiff
 ones in the soft. So it is taken twice, the second time along the vibrations that the first gave, and the eigenvalue
 problem is solved in coordinates scaled by their own frequency.
 
@@ -19,13 +19,13 @@ from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, damping
 
 #: an eigenvalue of the stiffness within this many estimated errors of zero is zero
 NOTHING = 10.0
-#: the same, as a share of the largest eigenvalue
+#: the same, as a fraction of the largest eigenvalue
 NOTHING_BESIDE = 1e-13
-#: asymmetry below this share of the scaled stiffness is rounding
+#: asymmetry below this fraction of the scaled stiffness is rounding
 NEGLIGIBLE = 1e-9
-#: a motion without stiffness is scaled by this share of the highest frequency
+#: a motion without stiffness is scaled by this fraction of the highest frequency
 LEAST_SCALE = 1e-6
-#: an eigenvalue with this share of imaginary part is real, it decays or grows without vibrating; likewise imaginary
+#: an eigenvalue with this fraction of imaginary part is real, it decays or grows without vibrating; likewise imaginary
 REAL = 1e-12
 
 
@@ -78,7 +78,7 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
 
 
 def _limp(K: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Which motions have no stiffness as far as the differences can tell."""
+    """Which motions have no stiffness as far as the differences can show."""
     own = np.abs(np.diag(K))
     return own <= np.maximum(NOTHING * error, NOTHING_BESIDE**2 * own.max())
 
@@ -128,8 +128,8 @@ def _damped(
     order, with its left and right vectors y and x (Golub & Van Loan (2013), Matrix Computations, sec. 7.2.2).
     """
     loose = limp & ~np.any(D, axis=0) & ~np.any(D, axis=1)
-    kept = np.ix_(~loose, ~loose)
-    K, D, scale = K[kept], D[kept], _scale(K)[~loose]
+    rows = np.ix_(~loose, ~loose)
+    K, D, scale = K[rows], D[rows], _scale(K)[~loose]
     n = len(K)
     # coordinates z and z'/scale change at comparable rates
     A = np.block([[np.zeros_like(K), np.diag(scale)], [-K / scale[None, :], -D]])

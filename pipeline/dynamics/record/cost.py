@@ -46,45 +46,55 @@ class Cost:
 
 
 def measure(
-    scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress = silent, *, checked: bool = True
+    scene: Scene,
+    bundles: Mapping[str, xr.Dataset],
+    progress: Progress = silent,
+    *,
+    checked: bool = True,
+    brief: bool = False,
 ) -> Cost:
     """The cost of a scene's run, its code fetched before; the scene's `[accuracy]` is not looked at.
 
     checked: whether a run whose energy ledger does not close is refused, as every run is.
+    brief: whether the perturbed run of a scene with contacts and repeats of the record are left out; the first run is
+    then the first measurement.
     Raises InputError and SolverError as a run does.
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
-    last, trajectory, switched, perturbed = _followed(engine, start, progress, other)
+    begun, alone = journal.seconds(), brief or not engine.model.contacts
+    last, trajectory, switched, perturbed = _followed(engine, start, progress, other, alone)
+    first = (journal.seconds() - begun,) if alone else ()
     seen = observed(last, trajectory)
     if checked:
         require_closed(last.model, trajectory, seen)
-    recording = _repeated(lambda: dataset(Run(scene, last, trajectory, observed(last, trajectory), None, switched)), 0)
+    record = lambda: dataset(Run(scene, last, trajectory, observed(last, trajectory), None, switched))  # noqa: E731
+    recording = (_once(record),) if brief else _repeated(record, 0)
     run = dataset(Run(scene, last, trajectory, seen, perturbed, switched))
-    integration = _repeated(lambda: follow(engine, start, silent, other), MOST)
+    integration = _repeated(lambda: follow(engine, start, silent, other), MOST, first)
     return Cost(run, integration, recording, engine.model.length)
 
 
 def _followed(
-    engine: Engine, start: np.ndarray, progress: Progress, other: Callable[[str], Engine]
+    engine: Engine, start: np.ndarray, progress: Progress, other: Callable[[str], Engine], alone: bool
 ) -> tuple[Engine, Trajectory, str, PerturbedRun | None]:
-    """The run, and after it the perturbed run of a scene with contacts: a measured run has no other next to it."""
-    if not engine.model.contacts:
+    """The run, and unless it runs alone the perturbed run after it: a measured run has no other next to it."""
+    if alone:
         return *follow(engine, start, progress, other), None
     from flexclear.pipeline.dynamics.run.horizon import Pair
 
     pair = Pair(engine)
-    followed = pair.run(lambda *told: follow(engine, start, progress, other, None, *told))
+    followed = pair.run(lambda *text: follow(engine, start, progress, other, None, *text))
 
-    def steps(mine: Engine, y: np.ndarray, *told: Any) -> Followed:
-        return follow(mine, y, silent, lambda name: another(other(name)), None, *told)
+    def steps(mine: Engine, y: np.ndarray, *text: Any) -> Followed:
+        return follow(mine, y, silent, lambda name: another(other(name)), None, *text)
 
     return *followed, pair.perturbed_run(start, steps, silent)
 
 
-def _repeated(task: Callable[[], object], most: int) -> tuple[float, ...]:
-    """Processor times [s] of a task: REPEATS, or up to `most` of a short one."""
-    seconds: list[float] = []
+def _repeated(task: Callable[[], object], most: int, first: tuple[float, ...] = ()) -> tuple[float, ...]:
+    """Processor times [s] of a task, `first` among them: REPEATS, or up to `most` of a short one."""
+    seconds = [*first]
     while not seconds or (sum(seconds) < LONG and len(seconds) < REPEATS):
         seconds.append(_once(task))
     while len(seconds) < most and sum(seconds) < ENOUGH:

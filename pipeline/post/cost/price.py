@@ -25,14 +25,14 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
     """
     rows = []
     for target in TARGETS:
-        found = cheapest(study, target)
-        if found is None:
+        choice = cheapest(study, target)
+        if choice is None:
             best = min(_choices(study), key=lambda c: c.error, default=NOTHING)
-            rows.append((f"{target:g}", "cannot be had", "–", "–", f"{best.error:.1e} at best", best.worst))
+            rows.append((f"{target:g}", _absent(study), "–", "–", f"{best.error:.1e} at best", best.worst))
         else:
-            seconds = f"{found.seconds:.3f}"
+            seconds = f"{choice.seconds:.3f}"
             rows.append(
-                (f"{target:g}", found.name, f"{found.evaluations:.0f}", seconds, f"{found.error:.1e}", found.worst)
+                (f"{target:g}", choice.name, f"{choice.evaluations:.0f}", seconds, f"{choice.error:.1e}", choice.worst)
             )
     return Table(title, COLUMNS, tuple(rows), (*_notes(study), *notes))
 
@@ -43,20 +43,26 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
     for name in study["quantity"].values:
         one = study.sel(quantity=[name])
         best = min(_choices(one), key=lambda c: c.error, default=NOTHING)
-        rows.append((str(name), *(_cell(cheapest(one, target)) for target in TARGETS), f"{best.error:.1e}"))
+        cells = (_cell(cheapest(one, target), _absent(study)) for target in TARGETS)
+        rows.append((str(name), *cells, f"{best.error:.1e}"))
     heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
     return Table(title, heads, tuple(rows), ("In brackets: processor time of the integration of one run.",))
 
 
-def _cell(choice: Choice | None) -> str:
-    return "cannot be had" if choice is None else f"{choice.name} ({choice.seconds:.2g} s)"
+def _absent(study: xr.Dataset) -> str:
+    """What is said of an accuracy that no run of a study has."""
+    return "cannot be had" if study.attrs.get("complete", 1) else "not reached yet"
+
+
+def _cell(choice: Choice | None, absent: str) -> str:
+    return absent if choice is None else f"{choice.name} ({choice.seconds:.2g} s)"
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
     """One way to integrate: its name, cost, largest relative error and the quantity that has it.
 
-    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be told.
+    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be determined.
     """
 
     name: str
@@ -77,7 +83,7 @@ def cheapest(study: xr.Dataset, target: float) -> Choice | None:
 
 
 def _choices(study: xr.Dataset) -> list[Choice]:
-    found = []
+    choices = []
     unsure = study["reference_uncertainty"].fillna(0.0)
     for group, word in INTEGRATION.items():
         if f"error_by_{group}" not in study:
@@ -92,8 +98,8 @@ def _choices(study: xr.Dataset) -> list[Choice]:
                 worst = str(study["quantity"].values[int(np.argmax(error.values))])
                 evaluations, seconds = float(one[f"evaluations_by_{group}"]), float(one[f"cpu_seconds_by_{group}"])
                 unit = " s" if word == "step" else ""
-                found.append(Choice(f"{m}, {word} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
-    return found
+                choices.append(Choice(f"{m}, {word} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
+    return choices
 
 
 def _notes(study: xr.Dataset) -> list[str]:
@@ -101,7 +107,7 @@ def _notes(study: xr.Dataset) -> list[str]:
     notes = [
         "The error is the largest of all quantities: "
         + ", ".join(str(q) for q in study["quantity"].values)
-        + "; each as a share of its own size, the reference's uncertainty included.",
+        + "; each as a fraction of its own size, the reference's uncertainty included.",
         _confirmed(study),
     ]
     if recorded == recorded:
@@ -110,7 +116,7 @@ def _notes(study: xr.Dataset) -> list[str]:
         )
     missing = [f"{target:g}" for target in TARGETS if cheapest(study, target) is None]
     if missing:
-        notes.append(f"{' and '.join(missing)} cannot be had: {_why_not(study)}.")
+        notes.append(f"{' and '.join(missing)} {_absent(study)}: {_why_not(study)}.")
     hidden = sum(int((~resolved(study, g) & np.isfinite(study[f"error_by_{g}"])).sum()) for g in _present(study))
     if hidden:
         notes.append(
@@ -118,10 +124,7 @@ def _notes(study: xr.Dataset) -> list[str]:
             "the figure shows that bound."
         )
     if study.attrs["horizon"] != "none":
-        notes.append(
-            f"Pointwise errors count up to the horizon of the reference and its confirmation, "
-            f"t = {study.attrs['horizon']:.4g} s."
-        )
+        notes.append(f"Pointwise errors count up to the predictability horizon, t = {study.attrs['horizon']:.4g} s.")
     if study.attrs["refused"]:
         notes.append(f"Refused: {study.attrs['refused']}.")
     return notes
@@ -130,6 +133,8 @@ def _notes(study: xr.Dataset) -> list[str]:
 def _confirmed(study: xr.Dataset) -> str:
     unsure, by = study["reference_uncertainty"].values, study.attrs["confirmation"]
     said = f"Reference: {study.attrs['reference']}. "
+    if not by:
+        return f"{said}Not confirmed: no other run was made."
     if np.isnan(unsure).any():
         return f"{said}Not confirmed: {by} was refused."
     if np.isinf(unsure).any():
@@ -147,10 +152,10 @@ def _why_not(study: xr.Dataset) -> str:
     if best is NOTHING:
         return "every run is refused, or has another number of impacts than the reference"
     if best.error <= ROUNDED * float(unsure.sel(quantity=best.worst)):
-        return (
-            f"two independent methods at their tightest tolerances differ as much ({best.worst}); "
-            "rounding errors, which the motion itself magnifies, decide there, and no method helps"
-        )
+        agree = f"two independent methods at the tightest tolerances that were run differ as much ({best.worst})"
+        if not study.attrs.get("complete", 1):
+            return f"{agree}; a larger budget allows tighter ones"
+        return f"{agree}; rounding errors, which the motion itself magnifies, decide there, and no method helps"
     return f"the best setting that was tried reaches {best.error:.1e} ({best.worst})"
 
 

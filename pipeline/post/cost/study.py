@@ -1,6 +1,6 @@
 """From the runs of a study to one dataset: error and cost over the factors, and how good the reference is.
 
-Errors are pointwise up to the horizon of the reference and its confirmation; beyond it only statistics mean anything
+Errors are pointwise up to the horizon of the scene's run; beyond it only statistics mean anything
 (`pipeline.post.cost.statistics`). They are relative to the size of each quantity (`quantities.scale`).
 """
 
@@ -15,6 +15,7 @@ import xarray as xr
 
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 
 #: groups of points and the factors that span each
@@ -27,12 +28,14 @@ GROUPS: dict[str, tuple[str, ...]] = {
 #: the reference must agree with its independent confirmation this many times better than an error it measures
 MARGIN = 10.0
 LONG_NAMES = {
-    "error": "largest error up to the horizon, as a share of the quantity's size",
+    "error": "largest error up to the horizon, as a fraction of the quantity's size",
+    "distance": "largest distance from the scene's own run up to the horizon, as a fraction of the quantity's size",
     "cpu_seconds": "processor time of the integration of a warm run, median of the repeats",
     "recording_seconds": "processor time of its record: rows and dataset",
     "cpu_spread": "largest minus smallest processor time of the repeats",
     "evaluations": "right-hand sides evaluated",
     "peak_memory": "largest resident memory of the process that made the run",
+    "own_error": "error of the scene's own run, the reference's uncertainty included, as a fraction of the size",
     "compile_seconds": "time to build and fetch or compile the kernels, not part of the run",
 }
 UNITS = {
@@ -56,10 +59,36 @@ class Point:
     factors: Mapping[str, Any]
 
 
+def with_reference(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[Point]:
+    """The points, and among them again the reference and its confirmation, as points of groups of these names.
+
+    The reference is the run at the tightest tolerance. Of the runs by other methods the one that agrees best with it
+    confirms it: its own error, which is not smaller than the reference's, is part of their distance. Where no other
+    method was run, it is the same one's next run.
+    Raises SolverError where every run was refused.
+    """
+    there = [p for p in points if p.group == "tolerance" and "refused" not in runs[p.key].attrs]
+    if not there:
+        reasons = "; ".join(dict.fromkeys(_reason(runs[p.key]) for p in points if "refused" in runs[p.key].attrs))
+        raise SolverError(
+            f"no run with chosen steps could be made, so that there is nothing to compare with: {reasons}"
+        )
+    best = min(there, key=lambda p: (p.factors["rtol"], -INTEGRATORS[p.factors["adaptive_integrator"]].order))
+    others = [p for p in there if p.factors["adaptive_integrator"] != best.factors["adaptive_integrator"]]
+    others = others or [p for p in there if p is not best]
+    until, reference = believed(points, runs), runs[best.key]
+
+    def apart(point: Point) -> float:
+        return max(relative_errors(runs[point.key], reference, chosen, until).values(), default=0.0)
+
+    result = [*points, Point(best.key, "reference", {})]
+    return result + [Point(p.key, "confirmation", {}) for p in sorted(others, key=apart)[:1]]
+
+
 def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
     """The study's dataset; `runs` holds what each point left, by key.
 
-    A run that was refused has no values: its place is NaN and its reason stands in `refused`.
+    A run that was refused has no values: its entry is NaN and its reason is in `refused`.
     Raises SolverError when that is the reference.
     """
     reference = runs[next(p.key for p in points if p.group == "reference")]
@@ -76,9 +105,10 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
         "unit": ("quantity", [quantities.unit(reference, q) for q in chosen]),
     }
 
-    def errors(run: xr.Dataset) -> np.ndarray:
-        return np.array(list(relative_errors(run, reference, chosen, until).values()))
+    def errors(run: xr.Dataset, other: xr.Dataset = reference) -> np.ndarray:
+        return np.array(list(relative_errors(run, other, chosen, until).values()))
 
+    asis = next((runs[p.key] for p in points if p.key == "as it is"), None)
     confirmations = [runs[p.key] for p in points if p.group == "confirmation"]
     confirmed = [errors(run) for run in confirmations if "refused" not in run.attrs]
     floor = np.max(confirmed, axis=0) if confirmed else np.full(len(chosen), np.nan)
@@ -86,7 +116,9 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     for group, factors in GROUPS.items():
         mine = [p for p in points if p.group == group]
         if mine:
-            _span(group, factors, mine, runs, errors, data, coordinates)
+            _span(group, factors, mine, runs, errors, asis, data, coordinates)
+    if asis is not None and "refused" not in asis.attrs:
+        data["own_error"] = (("quantity",), errors(asis) + np.nan_to_num(floor))
     attributes = {
         "reference": _described(points, "reference"),
         "confirmation": _described(points, "confirmation"),
@@ -104,8 +136,8 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
 
 def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
     """Whether an error is so large that the reference can measure it; same shape as ``error_by_<group>``."""
-    found: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
-    return found
+    mask: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
+    return mask
 
 
 def _reason(refused: xr.Dataset) -> str:
@@ -119,6 +151,7 @@ def _span(
     points: list[Point],
     runs: Mapping[str, xr.Dataset],
     errors: Any,
+    asis: xr.Dataset | None,
     data: dict[str, Any],
     coordinates: dict[str, Any],
 ) -> None:
@@ -126,17 +159,21 @@ def _span(
     values = {factor: _sorted({p.factors[factor] for p in points}) for factor in factors}
     shape = tuple(len(v) for v in values.values())
     error = np.full((*shape, len(coordinates["quantity"])), np.nan)
+    distance = error.copy()
     costs = {name: np.full(shape, np.nan) for name in COSTS}
     for point in points:
         run = runs[point.key]
-        place = tuple(values[factor].index(point.factors[factor]) for factor in factors)
+        index = tuple(values[factor].index(point.factors[factor]) for factor in factors)
         if "refused" in run.attrs:
             continue
-        error[place] = errors(run)
+        error[index] = errors(run)
+        if asis is not None:
+            distance[index] = errors(run, asis)
         for name in COSTS:
-            costs[name][place] = cost(run, name)
+            costs[name][index] = cost(run, name)
     coordinates |= values
     data[f"error_by_{group}"] = ((*factors, "quantity"), error)
+    data[f"distance_by_{group}"] = ((*factors, "quantity"), distance)
     data |= {f"{name}_by_{group}": (factors, array) for name, array in costs.items()}
 
 
@@ -152,32 +189,31 @@ def cost(run: xr.Dataset, name: str) -> float:
 
 def recording(study: xr.Dataset) -> float:
     """Processor time of the record of one run [s]: of as many rows whatever the integration took, so one median."""
-    found = [study[f"recording_seconds_by_{group}"].values.ravel() for group in ("tolerance", "step")
+    times = [study[f"recording_seconds_by_{group}"].values.ravel() for group in ("tolerance", "step")
              if f"recording_seconds_by_{group}" in study]  # fmt: skip
-    values = np.concatenate([*found, [np.nan]])
+    values = np.concatenate([*times, [np.nan]])
     return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")
 
 
 def relative_errors(
     run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity], until: float
 ) -> dict[str, float]:
-    """Largest error up to a time [s] as a share of the quantity's size, by name."""
+    """Largest error up to a time [s] as a fraction of the quantity's size, by name."""
     return {
         q.name: relative(quantities.error(run, reference, q, until), quantities.scale(reference, q)) for q in chosen
     }
 
 
 def believed(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
-    """Time up to which pointwise errors mean something [s]: the lesser horizon of the reference and its confirmation.
+    """Time up to which pointwise errors mean something [s]: the least horizon of the runs that have one.
 
-    Infinite for runs that say nothing of it.
+    Infinite where none has.
     """
-    both = [runs[p.key] for p in points if p.group in ("reference", "confirmation")]
-    return min((float(run["horizon"]) for run in both if "horizon" in run), default=np.inf)
+    return min((float(runs[p.key]["horizon"]) for p in points if "horizon" in runs[p.key]), default=np.inf)
 
 
 def relative(error: float, scale: float) -> float:
-    """An error as a share of a size; the error itself where there is no size."""
+    """An error as a fraction of a size; the error itself where there is no size."""
     return error / scale if scale > 0.0 else error
 
 

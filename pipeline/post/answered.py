@@ -1,0 +1,25 @@
+"""Datasets that answer a question: in a notebook they show the answer first, then their variables."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+
+class Answered(xr.Dataset):
+    """A dataset with an answer as HTML; what is computed from it is a plain dataset's content without the answer."""
+
+    __slots__ = ("_answer",)
+
+    def _repr_html_(self) -> str:
+        return f"{getattr(self, '_answer', '')}{super()._repr_html_()}"
+
+
+def answered(data: xr.Dataset, text: str, picture: bytes | None = None, table: str = "") -> Answered:
+    """The dataset with an answer: text in words, a picture as PNG, a table as HTML."""
+    import base64
+    import html
+
+    result = Answered(data.data_vars, coords=data.coords, attrs=data.attrs)
+    image = "" if picture is None else f"<img src='data:image/png;base64,{base64.b64encode(picture).decode()}' alt=''>"
+    result._answer = f"<p>{html.escape(text)}</p>{image}{table}"
+    return result

@@ -1,0 +1,100 @@
+"""Which effects matter: from made-up points whose differences and scatter are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.post.matters import (
+    IDEAL,
+    Pair,
+    assemble,
+    compared,
+    decided,
+    ideal_sentences,
+    needed,
+    sentence,
+    table,
+    undecided,
+)
+
+VELOCITY = Quantity("slider", "velocity")
+TIME = np.linspace(0.0, 1.0, 201)
+
+
+def point(offset: float, scatter: float = 0.0) -> Point:
+    """A slider that swings by 1 m/s, `offset` off, its members scattered by so much [m/s]."""
+    series = np.zeros((len(TIME), 3))
+    series[:, 0] = np.sin(2.0 * np.pi * TIME) + offset
+    values = {"slider.velocity.series": series, "slider.velocity.largest": np.array(1.0 + offset)}
+    deviation = {
+        name: np.full_like(value, scatter / np.sqrt(value.shape[-1] if value.ndim else 1))
+        for name, value in values.items()
+    }
+    return Point(values, {}, deviation if scatter else {}, 100)
+
+
+def study(**pairs: Pair):
+    words = {name: f"effect {name}" for name in pairs} | {IDEAL: IDEAL}
+    named = {IDEAL if name == "ideal" else name: pair for name, pair in pairs.items()}
+    return assemble(named, words | {name: name for name in named}, [VELOCITY], ["m/s"], "")
+
+
+def test_without_scatter_a_change_is_the_distance_of_the_two_runs():
+    change = compared(Pair(point(0.0), point(0.03), 0), VELOCITY)
+    assert change.difference == pytest.approx(0.03)
+    assert change.uncertainty == 0.0
+
+
+def test_scatter_leaves_a_change_undecided_and_more_members_decide_it():
+    few, many = (Pair(point(0.0, 0.05), point(0.03, 0.05), members) for members in (4, 1024))
+    assert undecided(few, [VELOCITY]) == [VELOCITY]
+    assert undecided(many, [VELOCITY]) == []
+    change = compared(few, VELOCITY)
+    # chance falls with the square root of the members, and Student's t with it
+    assert 4 < needed(change, 1.0, 4) < 1000
+
+
+def test_no_change_is_decided_when_chance_is_below_a_hundredth():
+    change = compared(Pair(point(0.0, 1e-3), point(0.0, 1e-3), 8), VELOCITY)
+    assert change.difference == 0.0
+    assert decided(change, 1.0)
+    assert not decided(change, 0.01)
+
+
+def test_the_summary_says_what_changes_by_how_much_and_how_sure_it_is():
+    (changed,) = ideal_sentences(study(ideal=Pair(point(0.0), point(0.03), 0)))
+    assert "changes by up to <b class='n'>30 mm/s</b>" in changed
+    assert "3 % of its size" in changed
+    (same,) = ideal_sentences(study(ideal=Pair(point(0.0), point(0.0), 0)))
+    assert "does not change" in same
+    (open_,) = ideal_sentences(study(ideal=Pair(point(0.0, 0.5), point(0.0, 0.5), 4)))
+    assert "at most" in open_
+    assert "would decide it" in open_
+
+
+def test_the_answer_says_which_accuracy_calls_for_which_effect():
+    found = study(strong=Pair(point(0.0), point(0.2), 0), weak=Pair(point(0.0), point(5e-3), 0))
+    text = sentence(found, {})
+    assert "An accuracy of 10 % calls for strong." in text
+    assert "An accuracy of 0.1 % calls also for weak." in text
+    assert "An accuracy of 1 % calls for no more." in text
+
+
+def test_a_requested_accuracy_decides_instead_of_levels():
+    found = study(strong=Pair(point(0.0), point(0.2), 0), weak=Pair(point(0.0), point(5e-3), 0))
+    assert sentence(found, {"slider.velocity": 0.1}) == "The accuracy that the scene asks for calls for strong."
+
+
+def test_what_chance_may_hide_is_not_called_absent():
+    found = study(unsure=Pair(point(0.0, 0.5), point(0.0, 0.5), 4))
+    assert "not decided: unsure" in sentence(found, {})
+
+
+def test_a_refused_variant_is_named_and_calls_for_nothing():
+    found = study(broken=Pair(point(0.0), Point({}, {}, {}, 0, "it jams"), 0))
+    assert "it jams" in found.attrs["refused"]
+    assert any("it jams" in note for note in table(found).notes)
+    assert "not decided: broken" in sentence(found, {})
