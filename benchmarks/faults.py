@@ -75,8 +75,8 @@ def main(arguments: list[str] | None = None) -> int:
             found.append(_told("disks full", _full(folder, environment)))
             found.append(_told("equal commands at once", _side_by_side(folder, environment)))
         for verb in options.only or COMMANDS:
-            share, words = COMMANDS[verb]
-            count = round(share * options.kills)
+            fraction, words = COMMANDS[verb]
+            count = round(fraction * options.kills)
             found.append(_told(f"`{verb}` killed", _kills(folder, verb, words, environment, rng, count)))
     return int(any(count["taken"] for count in found))
 

@@ -119,9 +119,9 @@ def spread(time: Mapping[str, float], unit: str, digits: int) -> str:
     return f"{time[unit]:.{digits}f} ± {percent(time['spread'])}"
 
 
-def percent(share: float) -> str:
+def percent(fraction: float) -> str:
     """A share with one digit after the point."""
-    return f"{100 * share:.1f} %"
+    return f"{100 * fraction:.1f} %"
 
 
 def short(value: float) -> str:

@@ -65,7 +65,7 @@ def __getattr__(name: str) -> Any:
 def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
     """The scene in a TOML file, with everything that it extends, or in a table of the same keys.
 
-    override: dotted place -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
+    override: dotted path -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
     Raises InputError (exit code 2 of the command) with all mistakes at once.
 
     >>> import flexclear as fc
@@ -79,7 +79,7 @@ def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, ob
 
 
 def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
-    """A copy of a scene with dotted places changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a whole part as a table.
+    """A copy of a scene with dotted paths changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a whole part as a table.
 
     Raises InputError.
 
@@ -112,8 +112,8 @@ def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models
     take [s], or text such as "2min"; by default that of ``flexclear cost``.  models: also other meshes and mode sets.
     In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
-    found: xr.Dataset = _stages("cost").dataset(_loaded(scene), _stages("run").workplace(), budget, models)
-    return found
+    result: xr.Dataset = _stages("cost").dataset(_loaded(scene), _stages("run").open_workplace(), budget, models)
+    return result
 
 
 def stability(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
@@ -123,8 +123,10 @@ def stability(scene: Scene | str | Path, budget: str | float | None = None) -> x
     singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost.  In a notebook
     the dataset shows the answer first.  Raises FlexclearError.
     """
-    found: xr.Dataset = _stages("answers").dataset("stability", _loaded(scene), _stages("run").workplace(), budget)
-    return found
+    result: xr.Dataset = _stages("answers").dataset(
+        "stability", _loaded(scene), _stages("run").open_workplace(), budget
+    )
+    return result
 
 
 def sweep(
@@ -138,8 +140,8 @@ def sweep(
 ) -> xr.Dataset:
     """Many points of one scene, as ``flexclear sweep`` makes them; finished points come from the cache.
 
-    vary: place of the scene -> its values (a list), or what else a sweep file says of a parameter.
-    keep: what is kept of each point, e.g. ``["platform.velocity.largest", "A1.peak_force"]``.
+    vary: path in the scene -> its values (a list), or what else a sweep file says of a parameter.
+    keep: what is recorded of each point, e.g. ``["platform.velocity.largest", "A1.peak_force"]``.
     workers: processes of this machine, its cores by default; scheduler: address of a Dask cluster instead.
     more: `set`, `combine`, `sample`, `members` and `error` of a sweep file.
     The result has the parameters as dimensions.  Raises FlexclearError.
@@ -167,8 +169,8 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
     The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
     why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
     """
-    found: tuple[xr.Dataset, xr.Dataset] = _stages("sections").judge(_loaded(scene))
-    return found
+    datasets: tuple[xr.Dataset, xr.Dataset] = _stages("sections").judge(_loaded(scene))
+    return datasets
 
 
 def equilibrium(
@@ -178,7 +180,7 @@ def equilibrium(
     *,
     moving: bool = False,
 ) -> xr.Dataset:
-    """Static equilibrium of a mechanism near its start pose, the drives held (schema EQUILIBRIUM).
+    """Static equilibrium of a mechanism close to its start pose, the drives held (schema EQUILIBRIUM).
 
     time: at which the drives' laws give their positions [s], the scene's start when None.
     drives: positions [m or rad] by drive, instead of the law's.
@@ -216,15 +218,18 @@ def frequencies(
 def compare(
     *scenes: Scene | str | Path, ideal: bool | Literal["both", "clearance", "flexibility", "each"] = False
 ) -> xr.Dataset:
-    """Scenes beside each other, or beside their ideal twins: differences, the error of each run, events and costs.
+    """Scenes next to each other, or next to their ideal mechanisms: differences, the error of each run, events and
+    costs.
 
     ideal: compare each scene with itself without clearance and flexibility (True or "both"), without one of them, or
-    with each of these.  The first run is the reference; its variables are told in `pipeline.post.overview.comparison`.
-    Raises FlexclearError.
+    with each of these.  The first run is the reference; its variables are reported in
+    `pipeline.post.overview.comparison`. Raises FlexclearError.
     """
     without = "both" if ideal is True else ideal or None
-    found = _stages("compare").bring([_loaded(scene) for scene in scenes], _stages("run").workplace(), without)
-    return found.dataset()
+    comparison = _stages("compare").bring(
+        [_loaded(scene) for scene in scenes], _stages("run").open_workplace(), without
+    )
+    return comparison.dataset()
 
 
 def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
@@ -236,10 +241,12 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
     answer first.  Raises FlexclearError.
     """
     if budget is not None:
-        some: xr.Dataset = _stages("answers").dataset("matters", _loaded(scene), _stages("run").workplace(), budget)
+        some: xr.Dataset = _stages("answers").dataset(
+            "matters", _loaded(scene), _stages("run").open_workplace(), budget
+        )
         return some
-    found: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").workplace())
-    return found
+    dataset: xr.Dataset = _stages("effects").dataset(_loaded(scene), _stages("run").open_workplace())
+    return dataset
 
 
 def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
@@ -248,8 +255,8 @@ def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
     The dataset (`pipeline.post.plan.dataset`) holds the estimated influence of each effect on each quantity of
     `[accuracy]`, what was decided, and why.  Raises FlexclearError.
     """
-    found = _stages("plan").bring(_loaded(scene), _stages("run").workplace())
-    return found.planned, found.dataset()
+    planned = _stages("plan").bring(_loaded(scene), _stages("run").open_workplace())
+    return planned.planned, planned.dataset()
 
 
 def render(scene: Scene | str | Path) -> Path:
@@ -279,8 +286,8 @@ def report(scene: Scene | str | Path, budget: str | float | None = None, *, answ
     whether these are there.  Raises FlexclearError.
     """
     seconds = _stages("answers").seconds(budget)
-    graph, place = _stages("run").graph(_loaded(scene)), _stages("run").workplace()
-    return _stages("own_report").make(graph, place, seconds=seconds, answers=answers)
+    graph, where = _stages("run").graph(_loaded(scene)), _stages("run").open_workplace()
+    return _stages("own_report").make(graph, where, seconds=seconds, answers=answers)
 
 
 def open(scene: Scene | str | Path) -> xr.DataTree:

@@ -18,7 +18,8 @@ from flexclear.pipeline.core.system import plain_output
 from flexclear.pipeline.core.workflow import workers
 
 CLOSED_PIPE = 141
-#: new objects before Python looks for garbage: a short command makes hardly any, and spent a tenth of its time looking
+#: new objects before Python searches for garbage: a short command makes hardly any, and spent a tenth of its time
+#: looking
 GARBAGE = 200_000
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
 COMMANDS = {
@@ -30,8 +31,8 @@ COMMANDS = {
     "sweep": "many points of one scene: a dataset and a figure",
     "cost": "what accuracy costs: errors against cost, and where they come from",
     "render": "pictures, film and interactive page of scenes",
-    "compare": "scenes beside each other or their ideal twins: differences, errors, events, costs",
-    "plan": "which effects, modes and tolerance the wanted accuracy calls for",
+    "compare": "scenes next to each other or their ideal mechanisms: differences, errors, events, costs",
+    "plan": "which effects, modes and tolerance the requested accuracy calls for",
     "effects": "what each part does to each quantity, alone and in pairs",
     "sections": "is a repeated motion periodic, quasi-periodic or chaotic",
     "frequencies": "equilibrium in a pose, and natural frequencies there",
@@ -39,18 +40,18 @@ COMMANDS = {
     "schema": "JSON schema of scene files",
     "cite": "sources of the methods and data that a scene uses",
     "completion": "completion for bash and zsh",
-    "cache": "what is kept: size, check, explain, prune",
+    "cache": "stored results: size, check, explain, prune",
     "doctor": "is all here that is needed, and does it compute; one file to repeat a failure",
 }
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command and return its exit code; mistakes of the user are told without a traceback."""
+    """Run the command and return its exit code; mistakes of the user are reported without a traceback."""
     plain_output()
     own = arguments is None  # whether this process is the command's
     if own:
         gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
-        # at its end Python looks for garbage in all that there is, several times: a sixth of the time of a short
+        # at its end Python searches for garbage in all that there is, several times: a sixth of the time of a short
         # command, half a second where something was compiled; nobody gains by it, since the system takes all back
         atexit.register(gc.freeze)
     # pydantic would look through all that is installed for plugins of its own
@@ -59,13 +60,13 @@ def main(arguments: list[str] | None = None) -> int:
         options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
         if own:  # what is imported stays: neither now nor at the end is it garbage
             gc.freeze()
-        with workers.kept():
+        with workers.reused():
             return int(options.command(options) or 0)
     except FlexclearError as error:
         print(f"flexclear: {error}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        print("\nflexclear: interrupted; what was finished is kept", file=sys.stderr)
+        print("\nflexclear: interrupted; finished results are stored", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
         # the reader (`| head`) has gone; keep the interpreter from complaining about it at exit
@@ -77,7 +78,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 class Version(argparse.Action):
-    """Prints the version, which is looked for when it is asked for."""
+    """Prints the version, which is searched for when it is asked for."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
         """Print it and end."""
@@ -93,7 +94,7 @@ def parser(arguments: list[str]) -> argparse.ArgumentParser:
     top.add_argument("--version", action=Version, nargs=0, help="say the version")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     asked = [verb for verb in COMMANDS if verb in arguments[:1]]
-    for verb in asked or COMMANDS:  # all of them only where their list is told
+    for verb in asked or COMMANDS:  # all of them only where their list is reported
         text = COMMANDS[verb]
         below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")
         if asked:

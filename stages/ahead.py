@@ -23,37 +23,39 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.stages.graph import Graph
 
-#: templates that stand for the kinds of parts that most mechanisms have
+#: templates that represent the kinds of parts that most mechanisms have
 USUAL = ("pendulum", "four-bar", "slider-crank", "leg")
 
 
-def compiled(names: list[str], place: Workplace) -> list[str]:
+def compiled(names: list[str], workplace: Workplace) -> list[str]:
     """Compile, or fetch, what runs of scenes call; the usual ones' without names.  What each scene is called.
 
     Code for one wiring is left to the runs that are long enough for it.
     """
     if names:
-        return _all(graphs(names), place)
+        return _all(graphs(names), workplace)
     with TemporaryDirectory() as folder:
-        apart = Workplace(Store(Path(folder) / "results"), place.sources, place.monitor, place.jobs, place.end)
-        return _all(graphs([str(new.write(kind, Path(folder) / kind)[0]) for kind in USUAL]), apart)
+        temporary = Workplace(
+            Store(Path(folder) / "results"), workplace.sources, workplace.monitor, workplace.jobs, workplace.end
+        )
+        return _all(graphs([str(new.write(kind, Path(folder) / kind)[0]) for kind in USUAL]), temporary)
 
 
-def _all(wanted: Sequence[Graph], place: Workplace) -> list[str]:
-    outcome = place.bring([task for graph in wanted for task in graph.bodies().values()])
+def _all(requested: Sequence[Graph], workplace: Workplace) -> list[str]:
+    outcome = workplace.bring([task for graph in requested for task in graph.bodies().values()])
     check(outcome)
-    place.monitor.start(len(wanted))
-    for graph in wanted:
-        known = {name: place.store.load(outcome.records[id(task)]) for name, task in graph.bodies().items()}
-        name = place.monitor.begin(graph.scene.name, "kernels")
+    workplace.monitor.start(len(requested))
+    for graph in requested:
+        known = {name: workplace.store.load(outcome.records[id(task)]) for name, task in graph.bodies().items()}
+        name = workplace.monitor.begin(graph.scene.name, "kernels")
         _compile(
             s4_simulate.rebuild(graph.simulate.params, known),
             s4_simulate.bundles(known),
-            partial(place.monitor.update, name),
+            partial(workplace.monitor.update, name),
         )
-        place.monitor.finish(name, failed=False)
-    place.monitor.end()
-    return [graph.scene.name for graph in wanted]
+        workplace.monitor.finish(name, failed=False)
+    workplace.monitor.end()
+    return [graph.scene.name for graph in requested]
 
 
 def _compile(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) -> None:

@@ -16,6 +16,7 @@ from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.ideal import loose
+from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import cost, kernels, limit, s4_watched, s8_matters
@@ -33,9 +34,11 @@ if TYPE_CHECKING:
 TIMES, LEAST = 3.0, 40.0
 #: variants are run and compiled so many at a time
 AT_ONCE = 2.0
+#: tolerance of members with contacts, at most so tight: they start a thousandth of the clearance apart
+MEANS = 1e-7
 #: members with which effects are compared: more of them until the difference is decided or the budget is used
 MEMBERS = (4, 8, 16, 32)
-#: the effect that stands for all clearances and flexible bodies; that of `post.matters`
+#: the effect that represents all clearances and flexible bodies; that of `post.matters`
 IDEAL = "clearance and flexibility"
 
 
@@ -45,19 +48,19 @@ class Answer:
 
     task: Task
     record: Record
-    place: Workplace
+    workplace: Workplace
 
     def dataset(self) -> xr.Dataset:
         """Its numbers."""
-        return self.place.store.load(self.record)
+        return self.workplace.store.load(self.record)
 
     def file(self, name: str) -> Path | None:
         """One of its files, in the store; None where there is none."""
-        return self.place.store.path(self.task.stage, self.record.key, name) if name in self.record.files else None
+        return self.workplace.store.path(self.task.stage, self.record.key, name) if name in self.record.files else None
 
     def text(self, name: str) -> str:
         """One of its files that are text."""
-        return self.place.store.path(self.task.stage, self.record.key, name).read_text(encoding="utf-8")
+        return self.workplace.store.path(self.task.stage, self.record.key, name).read_text(encoding="utf-8")
 
 
 @dataclass(frozen=True)
@@ -81,7 +84,7 @@ def said(name: str, answer: Answer, scene: Scene) -> Said:
     data = answer.dataset()
     if name == "accuracy":
         caption = "Error against processor time; the star is this scene"
-        return Said("What accuracy costs", sentences(data), "work_precision.png", caption)
+        return Said("What accuracy costs", sentences(data), "accuracy.png", caption)
     if name == "stability":
         columns = ("value", "limit", "verdict", "remedy")
         rows = [[str(c), *(str(data[n].sel(check=c).item()) for n in columns)] for c in data["check"].values]
@@ -89,13 +92,13 @@ def said(name: str, answer: Answer, scene: Scene) -> Said:
         table = prose(("check", *columns), rows)
         return Said("Is it stable", data.attrs["answer"], "stability.png", caption, table)
     asked = scene.accuracy.quantities if scene.accuracy is not None else {}
-    wanted = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
+    requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
     table = as_html(from_markdown(answer.text("matters.md")))
     caption = "Change of each quantity without the effect"
-    return Said("Which effects matter", matters.sentence(data, wanted), "matters.png", caption, table)
+    return Said("Which effects matter", matters.sentence(data, requested), "matters.png", caption, table)
 
 
-def dataset(name: str, scene: Scene, place: Workplace, budget: str | float | None) -> xr.Dataset:
+def dataset(name: str, scene: Scene, workplace: Workplace, budget: str | float | None) -> xr.Dataset:
     """One of the three answers as a dataset that shows the answer in a notebook.
 
     budget: processor time [s], or text such as "2min".  Raises InputError for a scene that has nothing to answer.
@@ -103,7 +106,7 @@ def dataset(name: str, scene: Scene, place: Workplace, budget: str | float | Non
     from flexclear.pipeline.post.answered import answered
 
     # in this process: workers would run a caller's script again from its top
-    answer = getattr(Answers(scene, replace(place, jobs=1), seconds(budget), questions=1), name)
+    answer = getattr(Answers(scene, replace(workplace, jobs=1), seconds(budget), questions=1), name)
     if answer is None:
         raise InputError(str(scene.path or scene.name), "has no effect that could be taken away, or watches nothing")
     words = said(name, answer, scene)
@@ -116,10 +119,10 @@ def seconds(budget: str | float | None) -> float | None:
     return limit.seconds(budget, "budget") if isinstance(budget, str) else budget
 
 
-def _brought(task: Task, place: Workplace) -> Answer:
-    outcome = place.bring([task])
+def _brought(task: Task, workplace: Workplace) -> Answer:
+    outcome = workplace.bring([task])
     check(outcome)
-    return Answer(task, outcome.records[id(task)], place)
+    return Answer(task, outcome.records[id(task)], workplace)
 
 
 @dataclass(frozen=True)
@@ -131,14 +134,14 @@ class Answers:
     """
 
     scene: Scene
-    place: Workplace
+    workplace: Workplace
     seconds: float | None = None
     questions: int = 2
 
     @cached_property
     def _begun(self) -> cost.Study:
         """The scene's own run, measured, and the budget that follows from it."""
-        study = cost.Study(self.scene, self.place, (self.seconds or LEAST) / self.questions)
+        study = cost.Study(self.scene, self.workplace, (self.seconds or LEAST) / self.questions)
         study.begin()
         if self.seconds is None:
             study.seconds = max(LEAST, TIMES * study.own * study.pace) / self.questions
@@ -155,7 +158,7 @@ class Answers:
     @cached_property
     def accuracy(self) -> Answer:
         """What accuracy costs (`stages.cost_study`); SolverError where no run could be made."""
-        return _brought(self._study.task(), self.place)
+        return _brought(self._study.task(), self.workplace)
 
     @cached_property
     def stability(self) -> Answer:
@@ -173,7 +176,7 @@ class Answers:
             folder=f"stability/{self.scene.name.replace('/', '_')}",
             names={"nc": "stability.nc"},
         )
-        return _brought(task, self.place)
+        return _brought(task, self.workplace)
 
     @cached_property
     def matters(self) -> Answer | None:
@@ -181,7 +184,7 @@ class Answers:
         effects, chosen = variants.effects(self.scene), self.scene.watched()
         if not effects or not chosen:
             return None
-        return _brought(_Comparison(self.scene, self.place, effects, chosen, self._begun).task(), self.place)
+        return _brought(_Comparison(self.scene, self.workplace, effects, chosen, self._begun).task(), self.workplace)
 
 
 @dataclass
@@ -189,7 +192,7 @@ class _Comparison:
     """The scene against the scene without each effect, with more members where it is not decided yet."""
 
     scene: Scene
-    place: Workplace
+    workplace: Workplace
     effects: Sequence[Effect]
     chosen: Sequence[Quantity]
     study: cost.Study
@@ -218,7 +221,7 @@ class _Comparison:
         return s8_matters.task(self.scene, self.chosen, words, made, pairs, left)
 
     def _affordable(self) -> tuple[list[str], list[str]]:
-        """Effects in the order in which they are looked at, and those that the budget does not reach."""
+        """Effects in the order in which they are examined, and those that the budget does not reach."""
         names = list(self._gone)
         most, cost_of_one = self.study.seconds, self._seconds("", MEMBERS[0])
         taken, total = list[str](), cost_of_one
@@ -245,7 +248,10 @@ class _Comparison:
 
     def _variant(self, name: str) -> Scene:
         gone = self._gone[name] if name else frozenset()
-        return variants.without(self.scene, [e for e in self.effects if e.name in gone])
+        variant = variants.without(self.scene, [e for e in self.effects if e.name in gone])
+        if (variant.contacts() or variant.stop) and variant.solver.step is None and variant.solver.rtol < MEANS:
+            return edited(variant, {"solver.rtol": MEANS})
+        return variant
 
     def _touching(self, name: str) -> bool:
         scene = self._variant(name)
@@ -264,14 +270,14 @@ class _Comparison:
 
     def _bring(self, names: Sequence[str], members: int) -> None:
         made = {name: s4_watched.task(self._variant(name), self.chosen, members) for name in names}
-        check(self.place.bring(list(made.values())))
+        check(self.workplace.bring(list(made.values())))
         for name, task in made.items():
             self.tasks.setdefault(name, {})[members] = task
             self.spent += self._seconds(name, members)
 
     def _point(self, name: str, members: int) -> Point:
         task = self.tasks[name][members]
-        stored = self.place.store.load(self.place.bring([task]).records[id(task)])
+        stored = self.workplace.store.load(self.workplace.bring([task]).records[id(task)])
         return s4_watched.point(stored, self._variant(name), self.chosen)
 
 

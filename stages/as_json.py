@@ -13,9 +13,9 @@ def json_argument(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the results as JSON")
 
 
-def as_json(found: object) -> str:
+def as_json(value: object) -> str:
     """A result as JSON; datasets as their variables with dimensions, units and values, and their attributes."""
-    return json.dumps(found, indent=2, default=_plain, allow_nan=False)
+    return json.dumps(value, indent=2, default=_plain, allow_nan=False)
 
 
 def _plain(value: Any) -> Any:

@@ -29,10 +29,10 @@ from flexclear.stages.sweep_points import source_digest
 
 #: entries of the file: what it is about, what was said; the scene's files stand below the folder
 FACTS, LOG, FILES = "facts.json", "log.txt", "files"
-#: bytes that are unpacked at most, and characters of a log that are kept
+#: bytes that are unpacked at most, and characters of a log that are stored
 LARGEST, LONGEST = 1 << 30, 200_000
 #: last lines of what was said that are shown of each
-TOLD = 5
+REPORTED = 5
 #: variables of the environment that change what is computed, or where
 VARIABLES = ("FLEXCLEAR_", "NUMBA_", "OPENBLAS_", "OMP_", "MKL_")
 #: no date: equal content gives equal bytes
@@ -42,7 +42,7 @@ DATE = (1980, 1, 1, 0, 0, 0)
 def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: Path | None) -> Path:
     """Run a scene and write all about it into one file (zip); its path.
 
-    No path of this machine is in it: files are called by their places relative to each other, folders in what was said
+    No path of this machine is in it: files are called by their paths relative to each other, folders in what was said
     by words.  Raises InputError for a scene that is not there.
     """
     scene = run.find_scene(name).resolve()
@@ -81,7 +81,7 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
 
 
 def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
-    """Run what a file of `make` holds, in a folder of its own; whether it ended as it did, and what is told of that.
+    """Run what a file of `make` holds, in a folder of its own; whether it ended as it did, and the message about that.
 
     Raises InputError for what is no such file.
     """
@@ -91,22 +91,24 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
         environment = {**os.environ, "FLEXCLEAR_RESULTS": str(folder / "results")}
         done, digest = _run(folder / FILES / facts["scene"], facts["settings"], environment)
         said = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST:]
-    told = [f"here it ended with {done.returncode}, there with {facts['exit_code']}"]
+    differences = [f"here it ended with {done.returncode}, there with {facts['exit_code']}"]
     if digest and facts.get("run"):
-        told += [
+        differences += [
             f"the run is {'the same to the last bit' if digest == facts['run'] else 'not the same to the last bit'}"
         ]
     now = {**{library: library_version(library) for library in libraries}, "python": platform.python_version()}
     then = {**facts["libraries"], "python": facts["python"]}
-    told += [f"{k} is {now[k]} here, {v} there" for k, v in sorted(then.items()) if now.get(k, v) != v]
-    ending = [text.strip().splitlines()[-TOLD:] for text in (log, said)]
-    told += [f"{where}: {line}" for where, lines in zip(("there", "here"), ending, strict=True) for line in lines]
-    return done.returncode == facts["exit_code"], "\n".join(told)
+    differences += [f"{k} is {now[k]} here, {v} there" for k, v in sorted(then.items()) if now.get(k, v) != v]
+    ending = [text.strip().splitlines()[-REPORTED:] for text in (log, said)]
+    differences += [
+        f"{where}: {line}" for where, lines in zip(("there", "here"), ending, strict=True) for line in lines
+    ]
+    return done.returncode == facts["exit_code"], "\n".join(differences)
 
 
 def _opened(scene: Path, settings: Sequence[str]) -> list[Path]:
     """The scene, what it extends, recipes, tables, meshes and whatever their readers open."""
-    kept, names = [scene], dict[str, str]()
+    files, names = [scene], dict[str, str]()
     with file_dependencies.watched(
         scene.parent, outside=(results_root(), kernel_root(), TREE / "flexclear" / "stages")
     ) as read:
@@ -118,8 +120,8 @@ def _opened(scene: Path, settings: Sequence[str]) -> list[Path]:
             with contextlib.suppress(FlexclearError):
                 s1_mesh.run({**s1_mesh.params(recipe), "folder": str(recipe.parent)}, {}, silent)
         names = read
-    kept += [Path(os.path.normpath(scene.parent / place)) for place in names]
-    return sorted({path.resolve() for path in kept if path.is_file()})
+    files += [Path(os.path.normpath(scene.parent / where)) for where in names]
+    return sorted({path.resolve() for path in files if path.is_file()})
 
 
 def _recipes(scene: Path) -> list[Path]:
@@ -160,24 +162,24 @@ def _hidden(top: Path) -> dict[str, str]:
     places = {str(top): ".", str(results_root()): "<results>", str(kernel_root()): "<kernels>"}
     places |= {str(TREE): "<flexclear>", sys.prefix: "<python>", sys.base_prefix: "<python>"}
     places |= {str(Path.home()): "~", tempfile.gettempdir(): "<temporary>"}
-    return {place: places[place] for place in sorted(places, key=len, reverse=True) if len(place) > 1}
+    return {where: places[where] for where in sorted(places, key=len, reverse=True) if len(where) > 1}
 
 
 def _without(text: str, hidden: Mapping[str, str]) -> str:
-    for place, word in hidden.items():
-        text = text.replace(place, word)
+    for where, word in hidden.items():
+        text = text.replace(where, word)
     return text
 
 
 def _bytes(path: Path, files: Sequence[Path]) -> bytes:
-    """Content of a file; of a text of ours with the others' places relative to it."""
+    """Content of a file; of a text of ours with the others' paths relative to it."""
     content = path.read_bytes()
     if path.suffix != ".toml":
         return content
     for other in files:
-        near = Path(os.path.relpath(other, path.parent)).as_posix()
+        relative = Path(os.path.relpath(other, path.parent)).as_posix()
         for text in _spellings(other):
-            content = content.replace(os.fsencode(text), near.encode())
+            content = content.replace(os.fsencode(text), relative.encode())
     return content
 
 

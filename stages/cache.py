@@ -11,17 +11,17 @@ from stat import S_ISREG
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.paths import kernel_root
 from flexclear.pipeline.core.errors import InputError, ResourceError, shown
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 
 ACTIONS = {
-    "size": "how much is kept, by stage",
+    "size": "stored bytes by stage",
     "check": "read everything and compare it with its digest; exit code 4 when something is damaged",
     "explain": "what an artifact was made from",
     "prune": "remove what is damaged and what nothing shows any more",
 }
-#: artifacts that nothing shows are kept for so many days: going back to an earlier value costs nothing then
+#: artifacts that nothing shows are stored for so many days: going back to an earlier value costs nothing then
 KEPT = 30.0
-#: faults that `check` tells one by one
+#: faults that `check` lists one by one
 SHOWN = 20
 
 
@@ -43,15 +43,15 @@ def command(options: argparse.Namespace) -> None:
 
 
 def _size(options: argparse.Namespace) -> None:
-    store = workplace().store
-    found = upkeep.inventory(store, whole=False)
+    store = open_workplace().store
+    inventory = upkeep.inventory(store, whole=False)
     sizes: dict[str, list[int]] = {}
-    for artifact in found.artifacts:
+    for artifact in inventory.artifacts:
         sizes.setdefault(artifact.record.stage.partition("/")[0], []).append(artifact.size)
     for stage, each in sorted(sizes.items()):
         print(f"{stage:<12} {len(each):>6} artifacts {_megabytes(sum(each))}")
     shown = [path for path in store.root.rglob("*") if (store.root / "cache") not in path.parents]
-    for name, paths in (("kernels", kernel_root().rglob("*")), ("shown", shown), ("orphans", found.orphans)):
+    for name, paths in (("kernels", kernel_root().rglob("*")), ("shown", shown), ("orphans", inventory.orphans)):
         sizes_there = _sizes(paths)
         print(f"{name:<12} {len(sizes_there):>6} files     {_megabytes(sum(sizes_there))}")
     print(f"results in {store.root}, kernels in {kernel_root()}")
@@ -59,32 +59,34 @@ def _size(options: argparse.Namespace) -> None:
 
 def _sizes(paths: Iterable[Path]) -> list[int]:
     """Sizes of those that are files [bytes]; what others remove meanwhile, as locks, is none any more."""
-    found = []
+    lines = []
     for path in paths:
         with suppress(FileNotFoundError):
             facts = path.stat()
             if S_ISREG(facts.st_mode):
-                found.append(facts.st_size)
-    return found
+                lines.append(facts.st_size)
+    return lines
 
 
 def _check(options: argparse.Namespace) -> None:
     from flexclear.pipeline.dynamics.compile import files
 
-    store = workplace().store
-    found = upkeep.inventory(store, whole=True)
+    store = open_workplace().store
+    inventory = upkeep.inventory(store, whole=True)
     # one without a sum has not been compiled yet, or is about to be
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
     others = {path for path in kernels if files.of_another_build(path)}
     damaged = [path for path in kernels if path not in others and not files.compiled(path)]
-    faults = [*found.damaged, *(f"{path} is damaged" for path in damaged)]
+    faults = [*inventory.damaged, *(f"{path} is damaged" for path in damaged)]
     for fault in faults[:SHOWN]:
         print(shown(fault))
     if len(faults) > SHOWN:
         print(f"... and {len(faults) - SHOWN} more")
-    told = f"{len(found.artifacts)} artifacts, {len(faults)} faults, {len(found.orphans)} files without a record"
+    text = (
+        f"{len(inventory.artifacts)} artifacts, {len(faults)} faults, {len(inventory.orphans)} files without a record"
+    )
     unused = f", {len(others)} of another build, which nothing uses" if others else ""
-    print(f"{told}; {len(kernels)} compiled kernels{unused}")
+    print(f"{text}; {len(kernels)} compiled kernels{unused}")
     if faults:
         raise ResourceError(
             "damaged files are never used: what needs them makes them again; `cache prune` removes them"
@@ -92,7 +94,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _explain(options: argparse.Namespace) -> None:
-    store = workplace().store
+    store = open_workplace().store
     record = upkeep.find(store, options.what)
     if record is None:
         raise InputError(options.what, "is neither a shown file nor the beginning of one key", "see results/runs")
@@ -106,22 +108,22 @@ def _explain(options: argparse.Namespace) -> None:
 def _prune(options: argparse.Namespace) -> None:
     if not options.days >= 0.0:
         raise InputError(f"--days {options.days}", "must not be negative", "0 removes all that nothing shows")
-    store = workplace().store
-    found = upkeep.inventory(store, whole=True)
-    chosen = upkeep.prunable(store, found, options.days * upkeep.DAY)
-    broken = [a for a in found.artifacts if store.fault(a.record) is not None]
+    store = open_workplace().store
+    inventory = upkeep.inventory(store, whole=True)
+    chosen = upkeep.prunable(store, inventory, options.days * upkeep.DAY)
+    broken = [a for a in inventory.artifacts if store.fault(a.record) is not None]
     chosen += [artifact for artifact in broken if artifact not in chosen]
-    size = sum(artifact.size for artifact in chosen) + sum(path.stat().st_size for path in found.orphans)
+    size = sum(artifact.size for artifact in chosen) + sum(path.stat().st_size for path in inventory.orphans)
     kernels = 0
     if not options.dry_run:
         store.sweep()
         for artifact in chosen:
             upkeep.remove(store, artifact)
-        for path in (*found.orphans, *found.unreadable):
+        for path in (*inventory.orphans, *inventory.unreadable):
             path.unlink(missing_ok=True)
         kernels = _prune_kernels()
     verb = "would remove" if options.dry_run else "removed"
-    print(f"{verb} {len(chosen)} artifacts and {len(found.orphans)} files without a record,{_megabytes(size)}")
+    print(f"{verb} {len(chosen)} artifacts and {len(inventory.orphans)} files without a record,{_megabytes(size)}")
     if kernels:
         print(f"removed {kernels} compiled kernels")
 

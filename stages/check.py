@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.scene.schema import Scene
 
-#: what is told of a file: it is wrong, or asks for too much
+#: the message about a file: it is wrong, or asks for too much
 MISTAKES = (InputError, ResourceError)
 
 
@@ -44,28 +44,28 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> int:
     """Tell all mistakes of all files; exit code 2 where there are some, 4 where a file only asks for too much.
 
-    What is only odd is told, and is no mistake.
+    What is only odd is reported, and is no mistake.
     """
-    found: dict[str, FlexclearError] = {}
+    errors: dict[str, FlexclearError] = {}
     for name in options.scenes:
         mistakes, seen = examined(name)
         if options.show:
             refused = _show(name, quiet=options.json)
             mistakes = mistakes or ([] if refused is None else [refused])
-        found |= {str(mistake): mistake for mistake in mistakes}
+        errors |= {str(mistake): mistake for mistake in mistakes}
         if not mistakes and not options.json:
-            print(f"{run.find_scene(name)}: {seen.summary}; no mistake found")
+            print(f"{run.find_scene(name)}: {seen.summary}; no error")
             for odd in seen.odd:
                 print(f"flexclear: warning: {lines.located(odd)}", file=sys.stderr)
     if options.json:
-        print(json.dumps([_record(mistake) for mistake in found.values()], indent=2))
+        print(json.dumps([_record(mistake) for mistake in errors.values()], indent=2))
     else:
-        for mistake in found.values():
-            told = lines.located(mistake) if isinstance(mistake, InputError) else mistake
-            print(f"flexclear: {told}", file=sys.stderr)
-        if len(found) > 1:
-            print(f"flexclear: {len(found)} mistakes", file=sys.stderr)
-    return min((mistake.exit_code for mistake in found.values()), default=0)
+        for mistake in errors.values():
+            text = lines.located(mistake) if isinstance(mistake, InputError) else mistake
+            print(f"flexclear: {text}", file=sys.stderr)
+        if len(errors) > 1:
+            print(f"flexclear: {len(errors)} mistakes", file=sys.stderr)
+    return min((mistake.exit_code for mistake in errors.values()), default=0)
 
 
 def _show(name: str, *, quiet: bool) -> InputError | None:
@@ -100,45 +100,45 @@ def examined(name: str) -> tuple[list[FlexclearError], Seen]:
 
 
 def _of_scene(path: Path) -> tuple[list[FlexclearError], Seen]:
-    found = list[FlexclearError](dangling(compose(path), run.recipe_frames, str(path)))
+    errors = list[FlexclearError](dangling(compose(path), run.recipe_frames, str(path)))
     scene = None
     try:
         scene = load_scene(path)
     except MISTAKES as error:
-        found += _each(error)
-    found += _collect(_recipes(path))
+        errors += _each(error)
+    errors += _collect(_recipes(path))
     if scene is not None:
-        found += _collect([lambda: Graph(scene).up_to("post")], path)
-        found += _collect(_laws(scene), path)
-        if not found and all(s1_mesh.kind_of(Path(mesh)) == "beam" for mesh in scene.recipes().values()):
-            found += _collect([lambda: _assembled(scene)], path)
+        errors += _collect([lambda: Graph(scene).up_to("post")], path)
+        errors += _collect(_laws(scene), path)
+        if not errors and all(s1_mesh.kind_of(Path(mesh)) == "beam" for mesh in scene.recipes().values()):
+            errors += _collect([lambda: _assembled(scene)], path)
     seen = Seen(scene.summary(), tuple(oddities(scene))) if scene is not None else Seen()
-    return list({str(error): error for error in found}.values()), seen
+    return list({str(error): error for error in errors}.values()), seen
 
 
 def _of_sweep(path: Path) -> tuple[list[FlexclearError], Seen]:
     """Its own mistakes and those of its scene."""
     from flexclear.stages import sweep, sweep_plan
 
-    wanted, scene = sweep.read(path)
-    found, seen = examined(str(scene.path))
-    if not found:
-        found = _collect([lambda: sweep_plan.plan(wanted, scene, str(path))])
-    return found, replace(seen, summary=f"a sweep over {', '.join(wanted.vary)} of {scene.name}: {seen.summary}")
+    requested, scene = sweep.read(path)
+    errors, seen = examined(str(scene.path))
+    if not errors:
+        errors = _collect([lambda: sweep_plan.plan(requested, scene, str(path))])
+    return errors, replace(seen, summary=f"a sweep over {', '.join(requested.vary)} of {scene.name}: {seen.summary}")
 
 
 def _of_recipe(path: Path) -> tuple[list[FlexclearError], Seen]:
-    """A recipe is looked at as where a scene names it, with the limits of a scene that says none."""
-    found = _collect([lambda: s1_mesh.check_size(path, Limits())])
-    if not any(isinstance(error, ResourceError) for error in found):  # what is too large is not meshed
-        found += _collect([lambda: _recipe(path)])
-    if found:
-        return found, Seen()
+    """A recipe is examined as where a scene names it, with the limits of a scene that says none."""
+    errors = _collect([lambda: s1_mesh.check_size(path, Limits())])
+    if not any(isinstance(error, ResourceError) for error in errors):  # what is too large is not meshed
+        errors += _collect([lambda: _recipe(path)])
+    if errors:
+        return errors, Seen()
     table = s1_mesh.params(path)["recipe"]
     frames = ", ".join(table.get("frames", {})) or "none"
-    told = f"a mesh recipe, {table['shape']['type']}, frames: {frames}"
+    text = f"a mesh recipe, {table['shape']['type']}, frames: {frames}"
     beam = s1_mesh.kind_of(path) == "beam"
-    return [], Seen(f"{told}, mass {float(_undeformed(path).mass):.6g} kg" if beam else told)
+    return [], Seen(f"{text}, mass {float(_undeformed(path).mass):.6g} kg" if beam else text)
 
 
 LOOKS = {SCENE: _of_scene, SWEEP: _of_sweep, RECIPE: _of_recipe}
@@ -159,7 +159,7 @@ def _recipe(path: Path) -> None:
     if s1_mesh.kind_of(path) == "beam":
         from flexclear.pipeline.structure.fe import mesh
 
-        mesh.build(table, place=str(path))
+        mesh.build(table, where=str(path))
 
 
 def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
@@ -181,7 +181,7 @@ def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
 def _assembled(scene: Scene) -> None:
     """Build the mechanism of a scene: poses, axes and loads are then checked against the joints.
 
-    Where the scene begins at a state that is looked for, that is the mechanism whose joints place the bodies there.
+    Where the scene begins at a state that is searched for, that is the mechanism whose joints place the bodies there.
     Of bodies from recipes of beams, which are meshed in no time, mass and frames are known without their modes; of
     flexible ones it is looked whether the joints fit where nothing is deformed.
     """
@@ -209,19 +209,19 @@ def _undeformed(recipe: Path) -> xr.Dataset:
     from flexclear.pipeline.structure.fe.recipe import read_recipe
     from flexclear.pipeline.structure.modes import rigid
 
-    return rigid.build(mesh.build(read_recipe(recipe), place=str(recipe)))
+    return rigid.build(mesh.build(read_recipe(recipe), where=str(recipe)))
 
 
 def _collect(checks: Iterable[Callable[[], Any]], path: Path | None = None) -> list[FlexclearError]:
     """What the checks raise; errors without a file are placed in that of `path`."""
-    found: list[FlexclearError] = []
+    errors: list[FlexclearError] = []
     for check in checks:
         try:
             with run.in_file(path):
                 check()
         except MISTAKES as error:
-            found += _each(error)
-    return found
+            errors += _each(error)
+    return errors
 
 
 def _each(error: FlexclearError) -> list[FlexclearError]:
@@ -231,8 +231,8 @@ def _each(error: FlexclearError) -> list[FlexclearError]:
 def _record(mistake: FlexclearError) -> dict[str, Any]:
     if not isinstance(mistake, InputError):
         return {"file": None, "line": None, "place": "", "problem": str(mistake), "remedy": None}
-    found = lines.where(mistake)
-    file, line = (str(found[0]), found[1]) if found else (None, None)
+    location = lines.where(mistake)
+    file, line = (str(location[0]), location[1]) if location else (None, None)
     return {
         "file": file,
         "line": line,

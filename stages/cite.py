@@ -18,7 +18,7 @@ from flexclear.pipeline.core.workflow.fingerprint import Sources, imported, pare
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 
 INTEGRATE, COMPILE = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.compile"
 
@@ -31,19 +31,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> None:
     """Print them."""
     (graph,) = run.graphs([options.scene])
-    print(text(graph, workplace().sources), end="")
+    print(text(graph, open_workplace().sources), end="")
 
 
 def text(graph: Graph, sources: Sources) -> str:
     """Three lists: methods, those that may be needed (module: source), and data (part of the scene: source)."""
     scene = graph.scene
-    found, always = list(methods(graph, sources)), _at_once(graph, sources)
+    used, always = list(methods(graph, sources)), _at_once(graph, sources)
     lines = [f"Methods of {scene.name}"]
-    lines += [f"  {module}: {source}" for module, source in found if module in always] or ["  (none is named)"]
+    lines += [f"  {module}: {source}" for module, source in used if module in always] or ["  (none is named)"]
     lines.append("Methods that are used where a run or a command needs them")
-    lines += [f"  {module}: {source}" for module, source in found if module not in always] or ["  (none is named)"]
+    lines += [f"  {module}: {source}" for module, source in used if module not in always] or ["  (none is named)"]
     lines.append(f"Data of {scene.name}")
-    lines += [f"  {place}: {source}" for place, source in scene.sources().items()] or ["  (none is named)"]
+    lines += [f"  {where}: {source}" for where, source in scene.sources().items()] or ["  (none is named)"]
     return "\n".join(lines) + "\n"
 
 
@@ -58,8 +58,8 @@ def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
             continue
         path = source_file(sources.root, name)
         assert path is not None  # else it would not be in the closure
-        for found in dict.fromkeys(named(path.read_text(encoding="utf-8"))):
-            yield name, found
+        for key in dict.fromkeys(named(path.read_text(encoding="utf-8"))):
+            yield name, key
 
 
 def _at_once(graph: Graph, sources: Sources) -> set[str]:
@@ -90,7 +90,7 @@ def _unused(reached: Collection[str], parts: Collection[str]) -> Iterator[str]:
         if listed is None:
             continue
         inside = {name for name in reached if name.startswith(f"{family}.")}
-        those = {f"{family}.{place.partition(':')[0]}" for place in listed.values()}
+        those = {f"{family}.{where.partition(':')[0]}" for where in listed.values()}
         yield from (inside & those) - set(parts) if inside & set(parts) else inside
 
 

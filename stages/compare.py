@@ -1,4 +1,4 @@
-"""``flexclear compare``: scenes beside each other or their ideal twins: differences, and each run's own error."""
+"""``flexclear compare``: scenes next to each other or their ideal mechanisms: differences, and each run's own error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.ideal import EFFECTS, ideal, loose
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check, workplace
+from flexclear.stages.workplace import Workplace, check, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,11 +48,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring the comparison up to date, print its tables and say where it is."""
-    place = workplace(options)
+    workplace = open_workplace(options)
     scenes = [graph.scene for graph in run.graphs(options.scenes, options.set)]
-    found = bring(scenes, place, options.ideal)
-    print(*(found.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")
-    run.told(found.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"})
+    comparison = bring(scenes, workplace, options.ideal)
+    print(*(comparison.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")
+    run.print_files(
+        comparison.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"}
+    )
 
 
 @dataclass(frozen=True)
@@ -61,89 +63,91 @@ class Comparison:
 
     task: Task
     record: Record
-    place: Workplace
+    workplace: Workplace
 
     @property
     def folder(self) -> Path:
         """Where its files are shown."""
-        return self.place.store.root / self.task.folder
+        return self.workplace.store.root / self.task.folder
 
     def dataset(self) -> xr.Dataset:
         """All series, differences, errors, events and costs."""
-        return self.place.store.load(self.record)
+        return self.workplace.store.load(self.record)
 
     def file(self, name: str) -> Path:
         """One of its files, in the store."""
-        return self.place.store.path(self.task.stage, self.record.key, name)
+        return self.workplace.store.path(self.task.stage, self.record.key, name)
 
 
-def bring(scenes: list[Scene], place: Workplace, without: str | None = None) -> Comparison:
-    """Runs of the scenes, of their ideal twins, and of all at tighter tolerances, compared; and the page of it.
+def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None) -> Comparison:
+    """Runs of the scenes, of their ideal mechanisms, and of all at tighter tolerances, compared; and the page of it.
 
     without: one of IDEAL, or None for the scenes alone.  Raises InputError for what cannot be compared.
     """
-    sides = [side for scene in scenes for side in (*twins(scene, without), scene)] if without else scenes
+    sides = [side for scene in scenes for side in (*ideal_scenes(scene, without), scene)] if without else scenes
     if len(sides) < 2:
         raise InputError(
             sides[0].name if sides else "compare",
             "one scene alone is compared with nothing",
-            "name several, or compare it with its ideal twin: --ideal",
+            "name several, or compare it with its ideal mechanism: --ideal",
         )
     graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(_labels(sides), sides, strict=True)}
-    made = place.bring([graph.simulate for graph in graphs.values()])
+    made = workplace.bring([graph.simulate for graph in graphs.values()])
     check(made)
     # their kernels are there now, so that these do not compile side by side what the first ones did
     tight = {
-        label: graph.tighter(int(place.store.load(made.records[id(graph.simulate)]).attrs["evaluations"]))
+        label: graph.tighter(int(workplace.store.load(made.records[id(graph.simulate)]).attrs["evaluations"]))
         for label, graph in graphs.items()
         if graph.has_tighter
     }
-    outcome = place.bring(list(tight.values()))
+    outcome = workplace.bring(list(tight.values()))
     for failure in outcome.failures:
-        place.monitor.say(f"no error can be told: {failure.message}")
+        workplace.monitor.say(f"no error can be determined: {failure.message}")
     task = _task(graphs, {label: task for label, task in tight.items() if id(task) in outcome.records})
-    done = place.bring([task])
+    done = workplace.bring([task])
     check(done)
-    found = Comparison(task, done.records[id(task)], place)
-    publish(found.folder / "index.html", page(found, ", ".join(graphs)))
-    return found
+    comparison = Comparison(task, done.records[id(task)], workplace)
+    publish(comparison.folder / "index.html", page(comparison, ", ".join(graphs)))
+    return comparison
 
 
-def twins(scene: Scene, without: str) -> list[Scene]:
+def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
     """The scene without what `without` says, the most ideal one first; InputError when there is nothing to take."""
     sets = {"both": (tuple(EFFECTS),), "each": (tuple(EFFECTS), *((effect,) for effect in EFFECTS))}
-    found: list[Scene] = []
+    ideals: list[Scene] = []
     for effects in sets.get(without, ((without,),)):
         there = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
-        if there or not found:
-            twin = ideal(scene, effects)
-            same = any(twin.model_dump() == other.model_dump() for other in found)
-            twin._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
-            found += [] if same else [twin]
-    return found
+        if there or not ideals:
+            other = ideal(scene, effects)
+            same = any(other.model_dump() == other.model_dump() for other in ideals)
+            other._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
+            ideals += [] if same else [other]
+    return ideals
 
 
-def page(found: Comparison, title: str) -> bytes:
+def page(comparison: Comparison, title: str) -> bytes:
     """The page of a comparison, all pictures inside."""
     from flexclear.pipeline.post.overview.page import page as written
 
-    return written(f"Compared: {title}", "The first run is the reference.", parts(found))
+    return written(f"Compared: {title}", "The first run is the reference.", parts(comparison))
 
 
-def parts(found: Comparison) -> list[Part]:
+def parts(comparison: Comparison) -> list[Part]:
     """What a page shows of a comparison."""
     from flexclear.pipeline.post.overview.page import Part, media
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
-    tables = "".join(as_html(from_markdown(found.file(name).read_text(encoding="utf-8"))) for name in TABLES)
+    tables = "".join(as_html(from_markdown(comparison.file(name).read_text(encoding="utf-8"))) for name in TABLES)
     pictures = [
-        media(name, found.file(name).read_bytes(), text) for name, text in PICTURES.items() if _there(found, name)
+        media(name, comparison.file(name).read_bytes(), text)
+        for name, text in PICTURES.items()
+        if _there(comparison, name)
     ]
     return [Part("differences", "Differences and errors", tables), Part("runs", "Side by side", "".join(pictures))]
 
 
-def _there(found: Comparison, name: str) -> bool:
-    return name in found.record.files
+def _there(comparison: Comparison, name: str) -> bool:
+    return name in comparison.record.files
 
 
 def _labels(sides: list[Scene]) -> list[str]:

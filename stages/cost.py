@@ -19,7 +19,7 @@ from flexclear.stages import as_json, cost_design, cost_peers, kernels, limit, r
 from flexclear.stages.cost_peers import Track
 from flexclear.stages.graph import Graph
 from flexclear.stages.run import Workplace, bundles, check
-from flexclear.stages.workplace import near, workplace
+from flexclear.stages.workplace import open_workplace, relative
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
 #: processor time that a study's runs may take [s]; what one takes besides its integration, and a new set of kernels
 BUDGET, POINT, COMPILING = 100.0, 0.6, 8.0
-#: a point may take so many times the evaluations of the scene's own run, or this share of the budget if that is more
+#: a point may take so many times the evaluations of the scene's own run, or this fraction of the budget if that is more
 MOST = 10.0
 #: of runs that were left undone, so many are named
 LISTED = 6
@@ -50,7 +50,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     run.scene_arguments(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
     as_json.json_argument(parser)
-    parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn beside ours")
+    parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn next to ours")
     parser.add_argument(
         "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all)"
     )
@@ -68,18 +68,18 @@ def command(options: argparse.Namespace) -> None:
     if options.page is not None:
         run.check_target(options.page, "--page")
     peers = {} if options.peer is None else cost_peers.read(options.peer)
-    place, studies = workplace(options), {}
+    workplace, studies = open_workplace(options), {}
     seconds = limit.seconds(options.budget, "--budget")
 
     def first(folder: Path) -> None:
         if not options.json:
             text = (folder / PRINTED[0]).read_text(encoding="utf-8")
-            print(text, f"{near(folder)}: first answer; going on\n", sep="\n", flush=True)
+            print(text, f"{relative(folder)}: first answer; going on\n", sep="\n", flush=True)
 
     for graph in run.graphs(options.scenes, options.set):
         scene, others = graph.scene, peers.get(graph.scene.name, ())
         studies[scene.name] = _, folder = bring(
-            scene, place, others, options.integrators, seconds=seconds, models=options.models, answered=first
+            scene, workplace, others, options.integrators, seconds=seconds, models=options.models, answered=first
         )
         if not options.json:
             print(
@@ -88,10 +88,11 @@ def command(options: argparse.Namespace) -> None:
             )
             print(f"figures and data: {folder}\n")
     if options.json:
-        print(as_json.as_json({name: found for name, (found, _) in studies.items()}))
+        print(as_json.as_json({name: one for name, (one, _) in studies.items()}))
     if options.page is not None:
         said = f" --peer {options.peer.as_posix()}" if options.peer else ""
         said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
+        said += f" --budget {options.budget}{' --models' if options.models else ''}"
         write_page(studies, options.page, said)
 
 
@@ -104,7 +105,7 @@ class Study:
     """
 
     scene: Scene
-    place: Workplace
+    workplace: Workplace
     seconds: float = BUDGET
     integrators: Collection[str] = ()
     models: bool = False
@@ -143,7 +144,7 @@ class Study:
         """Make the points farther away, the cheapest first, as far as the budget goes."""
         scene, more = self.scene, cost_design.wide(self.scene, self.integrators)
         if self.models and scene.flexible():
-            more += cost_design.models(scene, self.setting, _highest(scene, self.place))
+            more += cost_design.models(scene, self.setting, _highest(scene, self.workplace))
         there = {design.key for design in (*self.points, *self.undone)}
         more = [design for design in more if design.key not in there]
         self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
@@ -151,23 +152,23 @@ class Study:
 
     @cached_property
     def _near(self) -> list[cost_design.Design]:
-        return cost_design.near(self.scene, self.setting)
+        return cost_design.neighbours(self.scene, self.setting)
 
     @cached_property
     def setting(self) -> cost_design.Setting:
         """How the scene's own run is integrated, as the run says where the scene leaves it open."""
         graph = Graph(self.scene, shown=False)
-        outcome = self.place.bring([graph.simulate])
+        outcome = self.workplace.bring([graph.simulate])
         check(outcome)
-        told = self.place.store.load(outcome.records[id(graph.simulate)]).attrs
+        text = self.workplace.store.load(outcome.records[id(graph.simulate)]).attrs
         solver = self.scene.solver
-        rtol = float(told.get("accuracy_rtol", solver.rtol))
-        begun = solver.integrator if "switched" in told and not self.scene.by_need() else str(told["method"])
+        rtol = float(text.get("accuracy_rtol", solver.rtol))
+        begun = solver.integrator if "switched" in text and not self.scene.by_need() else str(text["method"])
         return cost_design.Setting(begun, rtol, solver.step)
 
     def task(self) -> Task:
         """The task of the study of all points that there are."""
-        chosen = self.scene.wanted()
+        chosen = self.scene.requested()
         listed = [
             {"key": d.key, "group": d.group, "factors": dict(d.factors), "input": f"point{k}"}
             for k, d in enumerate(self.points)
@@ -194,13 +195,13 @@ class Study:
     def drawn(self) -> tuple[xr.Dataset, Path]:
         """The dataset of the points so far, and the folder with its tables and figures."""
         task = self.task()
-        outcome = self.place.bring([task])
+        outcome = self.workplace.bring([task])
         check(outcome)
-        return self.place.store.load(outcome.records[id(task)]), self.place.store.root / task.folder
+        return self.workplace.store.load(outcome.records[id(task)]), self.workplace.store.root / task.folder
 
     def ensembles(self) -> None:
         """Ensembles at several tolerances, of a scene that has one, as far as the budget goes."""
-        names, ensemble = [q.name for q in self.scene.wanted()], self.scene.ensemble
+        names, ensemble = [q.name for q in self.scene.requested()], self.scene.ensemble
         for rtol in ENSEMBLES if ensemble is not None else ():
             change = edited(self.scene, {"solver.rtol": rtol, "accuracy": None})
             design = cost_design.Design(f"ensemble, rtol {rtol:g}", "ensemble", {}, change)
@@ -208,7 +209,7 @@ class Study:
                 self.undone.append(design)
                 continue
             task = _measured(design, "run_ensemble", {"quantities": names}, self._kernels(design))
-            check(self.place.bring([task]))
+            check(self.workplace.bring([task]))
             self._ensembles[f"ensemble:rtol {rtol:g}"] = task
 
     def __post_init__(self) -> None:
@@ -231,14 +232,14 @@ class Study:
         if self.own:
             limit = min(self.scene.solver.evaluations, self._most())
             design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
-        names, first = [q.name for q in self.scene.wanted()], kernels.shared(design.scene) not in self._compiled
+        names, first = [q.name for q in self.scene.requested()], kernels.shared(design.scene) not in self._compiled
         compiled = self._kernels(design)
         task = _measured(design, "run", {"quantities": names, "brief": bool(self.points)}, compiled)
-        outcome = self.place.bring([task, compiled] if first else [task])
+        outcome = self.workplace.bring([task, compiled] if first else [task])
         check(outcome)
-        record = self.place.store.load(outcome.records[id(task)])
+        record = self.workplace.store.load(outcome.records[id(task)])
         if first:
-            self.spent += float(self.place.store.load(outcome.records[id(compiled)]).attrs["compile_seconds"])
+            self.spent += float(self.workplace.store.load(outcome.records[id(compiled)]).attrs["compile_seconds"])
         self.runs[design.key] = task
         self.points.append(design)
         solver = design.scene.solver
@@ -265,7 +266,7 @@ class Study:
 
 def bring(
     scene: Scene,
-    place: Workplace,
+    workplace: Workplace,
     peers: Sequence[Track] = (),
     integrators: Collection[str] = (),
     *,
@@ -279,7 +280,7 @@ def bring(
     the `Study`.  answered: called with the folder when the first answer is there.
     Raises InputError when the scene has nothing to measure.  Work that is interrupted leaves the answer so far.
     """
-    study = Study(scene, place, seconds, integrators, models, peers)
+    study = Study(scene, workplace, seconds, integrators, models, peers)
     study.first()
     _, folder = study.drawn()
     answered(folder)
@@ -294,21 +295,21 @@ def bring(
     return study.drawn()
 
 
-def dataset(scene: Scene, place: Workplace, budget: str | float | None = None, models: bool = False) -> xr.Dataset:
+def dataset(scene: Scene, workplace: Workplace, budget: str | float | None = None, models: bool = False) -> xr.Dataset:
     """The study as a dataset that shows its answer in a notebook; budget: [s], or text such as "2min"."""
     from flexclear.pipeline.post.answered import answered
     from flexclear.pipeline.post.cost.answer import sentences
 
     given = limit.seconds(budget, "budget") if isinstance(budget, str) else budget
     # in this process: workers would run a caller's script again from its top
-    found, folder = bring(scene, replace(place, jobs=1), seconds=BUDGET if given is None else given, models=models)
-    return answered(found, sentences(found), (folder / "work_precision.png").read_bytes())
+    result, folder = bring(scene, replace(workplace, jobs=1), seconds=BUDGET if given is None else given, models=models)
+    return answered(result, sentences(result), (folder / "accuracy.png").read_bytes())
 
 
-def told(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:
+def figures_and_tables(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:
     """What a page says of a scene, and the files of its pictures, by path relative to the page.
 
-    study, folder: as `bring` returned them.  pictures: folder for them beside the page.
+    study, folder: as `bring` returned them.  pictures: folder for them next to the page.
     """
     from flexclear.pipeline.post.cost.page import Studied, advice
 
@@ -320,26 +321,26 @@ def told(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Stu
 
 
 def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, options: str = "") -> None:
-    """The page on accuracy, with its pictures in a folder of its name beside it.
+    """The page on accuracy, with its pictures in a folder of its name next to it.
 
-    studies: what `bring` returned, by scene.  options: what else the command was told.
+    studies: what `bring` returned, by scene.  options: the command's other options.
     """
     from flexclear.pipeline.post.cost.page import markdown
 
-    found = []
+    sections = []
     with disk_limits(page.parent):
         (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
         for name, (study, folder) in studies.items():
-            said, pictures = told(name, study, folder, page.stem)
-            found.append(said)
+            said, pictures = figures_and_tables(name, study, folder, page.stem)
+            sections.append(said)
             for path, file in pictures.items():
                 publish(page.parent / path, file.read_bytes())
-        publish(page, markdown(tuple(found), f"{page.as_posix()}{options}").encode())
+        publish(page, markdown(tuple(sections), f"{page.as_posix()}{options}").encode())
 
 
-def _highest(scene: Scene, place: Workplace) -> float:
+def _highest(scene: Scene, workplace: Workplace) -> float:
     """The highest frequency in the bundles of a scene with flexible bodies [Hz]; they are made first."""
-    return max(float(bundle["frequency"].max()) for bundle in bundles(scene, place, jobs=None).values())
+    return max(float(bundle["frequency"].max()) for bundle in bundles(scene, workplace, jobs=None).values())
 
 
 def _listed(keys: Sequence[str]) -> str:

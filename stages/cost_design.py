@@ -66,7 +66,7 @@ class Design:
     def evaluations(self, seen: Mapping[str, Mapping[float, float]], own: float) -> float:
         """Foreseen evaluations of the right-hand side.
 
-        seen: those of runs with chosen steps, by integrator and tolerance.  own: those of the scene as it stands.
+        seen: those of runs with chosen steps, by integrator and tolerance.  own: those of the scene as it is.
         """
         solver = self.scene.solver
         order = INTEGRATORS[solver.integrator].order
@@ -81,8 +81,8 @@ class Design:
         return known[at] * (at / solver.rtol) ** (1.0 / (order + 1.0))
 
 
-def near(scene: Scene, own: Setting) -> list[Design]:
-    """The scene as it stands and its neighbourhood, what answers most first."""
+def neighbours(scene: Scene, own: Setting) -> list[Design]:
+    """The scene as it is and its neighbourhood, what answers most first."""
     asis, denser = _sampling(scene, own)
     if own.step is not None:
         mine = [_stepped(scene, own.integrator, own.step * factor) for factor in STEPS]
@@ -110,12 +110,12 @@ def wide(scene: Scene, integrators: Collection[str] = ()) -> list[Design]:
     for name in integrators:
         if name not in known:
             raise InputError(f"--integrators {name}", "is not among those that are compared", suggestion(name, known))
-    found = list[Design]()
+    result = list[Design]()
     for name in integrators or known:
-        found += [_tolerant(scene, name, rtol) for rtol in INTEGRATORS[name].tolerances]
-        found += [_stepped(scene, name, step) for step in INTEGRATORS[name].steps]
+        result += [_tolerant(scene, name, rtol) for rtol in INTEGRATORS[name].tolerances]
+        result += [_stepped(scene, name, step) for step in INTEGRATORS[name].steps]
     paper = paper_solver(scene)
-    return [*found, _design(scene, "paper", paper, f"{_words(paper)}, as the paper")]
+    return [*result, _design(scene, "paper", paper, f"{_words(paper)}, as the paper")]
 
 
 def models(scene: Scene, own: Setting, highest: float) -> list[Design]:
@@ -158,9 +158,9 @@ def _own(scene: Scene, own: Setting) -> dict[str, Any]:
 
 
 def _sampling(scene: Scene, own: Setting) -> Iterator[Design]:
-    """The scene as it stands, and with denser output."""
+    """The scene as it is, and with denser output."""
     interval, plain = scene.output.interval, {"solver": _own(scene, own), **PLAIN}
-    yield Design("as it stands", "sampling", {"interval": interval}, edited(scene, plain))
+    yield Design("as it is", "sampling", {"interval": interval}, edited(scene, plain))
     output = scene.output.model_dump(mode="json", exclude_none=True, exclude={"stress"})
     finer = edited(scene, {**plain, "output": output | {"interval": interval / FINER_OUTPUT}})
     yield Design("denser output", "sampling", {"interval": interval / FINER_OUTPUT}, finer)

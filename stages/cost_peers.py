@@ -1,4 +1,4 @@
-"""Points of other programs, measured elsewhere, that the figures of cost studies show beside ours."""
+"""Points of other programs, measured elsewhere, that the figures of cost studies show next to ours."""
 
 from __future__ import annotations
 

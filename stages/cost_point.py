@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """The kept part of the run with ``cpu_repeat(repeat)`` of the integration and the other costs as attributes, the
-    median time of the recording among them.
+    """The recorded part of the run with ``cpu_repeat(repeat)`` of the integration and the other costs as attributes,
+    the median time of the recording among them.
 
     params: `simulate`, as of the simulate stage, the `quantities` of the study, and whether the point is `brief`, as of
     `dynamics.cost`.  inputs: bundles, and `kernels`, the artifact of `stages.kernels`.  A run that the solver refuses
@@ -44,13 +44,13 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
     done = cost.run
     chosen = [parse(name, scene.owners()) for name in params["quantities"]]
-    kept = quantities.keep(done, chosen)
-    told = {"units": "s", "long_name": "processor time of the integration of a warm run"}
-    kept["cpu_repeat"] = (("repeat",), list(cost.integration), told)
+    recorded = quantities.keep(done, chosen)
+    attributes = {"units": "s", "long_name": "processor time of the integration of a warm run"}
+    recorded["cpu_repeat"] = (("repeat",), list(cost.integration), attributes)
     costs = {"evaluations": done.attrs["evaluations"], "peak_memory": peak_memory()}
     costs["recording_seconds"] = float(np.median(cost.recording))
     costs["compile_seconds"] = inputs["kernels"].attrs["compile_seconds"]
-    return {"nc": kept.assign_attrs(**costs, **_growth(done), **_contacts(scene))}
+    return {"nc": recorded.assign_attrs(**costs, **_growth(done), **_contacts(scene))}
 
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -74,12 +74,12 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
         seconds = float(np.median(dynamics.cost(scene, reduced, silent, brief=True).integration))
     except SolverError as error:
         return {"nc": xr.Dataset(attrs={"refused": str(error)})}
-    kept = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]
+    recorded = done[[name for name in done.data_vars if set(done[name].dims) == {"member", "contact"}]]
     chosen = [parse(name, scene.owners()) for name in params["quantities"]]
     errors = {q.name: e for q in chosen if (e := quantities.standard_error(done, q)) is not None}
-    kept = kept.assign_coords(quantity=list(errors))
-    kept["standard_error"] = (("quantity",), list(errors.values()))
-    return {"nc": kept.assign_attrs(cpu_seconds=seconds)}
+    recorded = recorded.assign_coords(quantity=list(errors))
+    recorded["standard_error"] = (("quantity",), list(errors.values()))
+    return {"nc": recorded.assign_attrs(cpu_seconds=seconds)}
 
 
 def _growth(run: xr.Dataset) -> dict[str, float]:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.progress import Progress
 
-#: contact events are located to this share of the clearance (flexclear.pipeline.dynamics.integrate.contact_events)
+#: contact events are located to this fraction of the clearance (flexclear.pipeline.dynamics.integrate.contact_events)
 LOCATED = 1e-12
 
 
@@ -23,7 +23,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     by another method confirms it.
     """
     from flexclear.pipeline.core.scene.requested_accuracy import Quantity
-    from flexclear.pipeline.post.cost import causes, price, statistics, work_precision
+    from flexclear.pipeline.post.cost import answer, causes, price, statistics, work_precision
     from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
     from flexclear.pipeline.post.plotting.table import files
 
@@ -33,7 +33,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     points = with_reference(points, runs, chosen)
     study = assemble(points, runs, chosen)
     study.attrs |= params["own"] | {"undone": params["undone"], "complete": int(params["complete"])}
-    asis = next(runs[p.key] for p in points if p.key == "as it stands")
+    asis = next(runs[p.key] for p in points if p.key == "as it is")
     study.attrs |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
     ensembles = _ensembles(inputs)
     # the last one is that at the tightest tolerance
@@ -41,11 +41,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     title = params["title"]
     said = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
     said += (f"Not run within the budget: {params['undone']}.",) if params["undone"] else ()
-    study = causes.beside(study, split)
+    study = causes.with_causes(study, split)
     result: dict[str, Any] = {"nc": study}
     result |= files("price", price.price_list(study, f"What accuracy costs: {title}", said))
     result |= files("quantities", price.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
+    result |= answer.figure("accuracy", study, f"What accuracy costs: {title}")
     result |= causes.make("causes", split, f"Where the error comes from: {title}")
     marks = _marks(points, runs, chosen)
     result |= work_precision.make(
@@ -59,12 +60,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def _ensembles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
     """Ensembles that could be made, by what was varied."""
-    found = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
-    return {name: data for name, data in found.items() if "refused" not in data.attrs}
+    ensembles = {name.removeprefix("ensemble:"): data for name, data in inputs.items() if name.startswith("ensemble:")}
+    return {name: data for name, data in ensembles.items() if "refused" not in data.attrs}
 
 
 def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any]) -> tuple[Any, ...]:
-    """The scene as it stands and the paper's choice of method and step, as marked points."""
+    """The scene as it is and the paper's choice of method and step, as marked points."""
     from flexclear.pipeline.post.cost.study import believed, cost, relative_errors
     from flexclear.pipeline.post.cost.work_precision import Mark
 
@@ -80,7 +81,7 @@ def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any])
 def split_of(
     points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any], ensemble: xr.Dataset | None
 ) -> dict[str, dict[str, float]]:
-    """Relative error of the scene as it stands, by quantity and cause."""
+    """Relative error of the scene as it is, by quantity and cause."""
     from flexclear.pipeline.post.cost.split import causes_of
 
     return {q.name: causes_of(q, points, runs, LOCATED, ensemble) for q in chosen}

@@ -17,7 +17,7 @@ from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
 from flexclear.stages import bundle
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 
 LIBRARIES = (
     "numpy",
@@ -58,10 +58,10 @@ RUN = """import sys
 from flexclear import pipeline
 from flexclear.pipeline.core.errors import FlexclearError
 try:
-    found = pipeline.run(sys.argv[1])
+    result = pipeline.run(sys.argv[1])
 except FlexclearError as error:
     sys.exit(str(error))
-print(float(found.position.sel(body="ball", axis="z")[-1]))
+print(float(result.position.sel(body="ball", axis="z")[-1]))
 """
 #: integration is exact to its tolerance, 1e-10 of metres
 CLOSE = 1e-9
@@ -93,7 +93,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(options: argparse.Namespace) -> None:
-    """Print what was found, line by line; UnwellError at the end when something is wrong."""
+    """Print the findings line by line; raise UnwellError at the end when something is wrong."""
     if options.bundle is not None:
         path = bundle.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
         print(f"{path}: the scene's files, versions and what was said; flexclear doctor --repeat {path.name}")
@@ -105,7 +105,7 @@ def command(options: argparse.Namespace) -> None:
             raise UnwellError("it does not end here as it did there")
         return
     if options.compile is not None:
-        names = import_module("flexclear.stages.ahead").compiled(options.compile, workplace())
+        names = import_module("flexclear.stages.ahead").compiled(options.compile, open_workplace())
         print(f"compiled: all that runs of {', '.join(names)} call; {_kernels()[0]}")
         return
     wrong = []
@@ -117,7 +117,7 @@ def command(options: argparse.Namespace) -> None:
 
 
 def findings() -> Iterator[tuple[str, str, bool]]:
-    """Name, what was found, and whether that is well."""
+    """Name, finding, and whether that is right."""
     yield (
         "python",
         f"{platform.python_version()} on {platform.system()} {platform.machine()}",
@@ -177,10 +177,10 @@ def _self_test() -> tuple[str, bool]:
         with tempfile.TemporaryDirectory() as folder:
             (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8", newline="\n")
             # results and kernels have lines of their own
-            apart = {"FLEXCLEAR_RESULTS": folder, "FLEXCLEAR_KERNELS": str(Path(folder) / "kernels")}
+            environment = {"FLEXCLEAR_RESULTS": folder, "FLEXCLEAR_KERNELS": str(Path(folder) / "kernels")}
             done = subprocess.run(
                 [sys.executable, "-W", "ignore", "-c", RUN, str(Path(folder) / "fall.toml")],
-                env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": paths, **apart},
+                env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": paths, **environment},
                 capture_output=True,
                 encoding="utf-8",
                 errors="replace",
@@ -192,7 +192,7 @@ def _self_test() -> tuple[str, bool]:
     if done.returncode or not lines:
         said = done.stderr.strip().splitlines()
         # of a traceback only the last line is for users
-        told = said[-1:] if any(line.startswith("Traceback") for line in said) else said[-4:]
-        return f"a free fall cannot be computed: {' '.join(line.strip() for line in told)}", False
+        last_lines = said[-1:] if any(line.startswith("Traceback") for line in said) else said[-4:]
+        return f"a free fall cannot be computed: {' '.join(line.strip() for line in last_lines)}", False
     fine = abs(float(lines[-1]) - expected) < CLOSE
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine

@@ -10,7 +10,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run, s4_watched, s8_effects
-from flexclear.stages.workplace import Workplace, check, workplace
+from flexclear.stages.workplace import Workplace, check, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -33,15 +33,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring the tables up to date, print them and say where they are."""
-    place = workplace(options)
+    workplace = open_workplace(options)
     for graph in run.graphs(options.scenes, options.set):
-        done, record = bring(graph.scene, place, options.members)
-        folder = place.store.root / done.folder
-        print(place.store.path(done.stage, record.key, "effects.md").read_text(encoding="utf-8"))
-        run.told(folder, {"index.html": "the page", "effects.nc": "all influences", "effects.png": "the chart"})
+        done, record = bring(graph.scene, workplace, options.members)
+        folder = workplace.store.root / done.folder
+        print(workplace.store.path(done.stage, record.key, "effects.md").read_text(encoding="utf-8"))
+        run.print_files(folder, {"index.html": "the page", "effects.nc": "all influences", "effects.png": "the chart"})
 
 
-def bring(scene: Scene, place: Workplace, members: int = s4_watched.MEMBERS) -> tuple[Task, Record]:
+def bring(scene: Scene, workplace: Workplace, members: int = s4_watched.MEMBERS) -> tuple[Task, Record]:
     """All variants, and their differences.  InputError for a scene without effects, or that watches nothing."""
     if members < 2:
         raise InputError(
@@ -57,20 +57,20 @@ def bring(scene: Scene, place: Workplace, members: int = s4_watched.MEMBERS) -> 
     if not chosen:
         raise InputError(str(scene.path or scene.name), "nothing in it is watched", "name quantities in [view] watch")
     by_name = {effect.name: effect for effect in there}
-    wanted = s8_effects.variants_of(there)
-    scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in wanted}
+    requested = s8_effects.variants_of(there)
+    scenes = {gone: variants.without(scene, [by_name[name] for name in gone]) for gone in requested}
     tasks = {gone: s4_watched.task(variant, chosen, members) for gone, variant in scenes.items()}
     done = s8_effects.task(scene, there, chosen, tasks, members)
-    outcome = place.bring([done])
+    outcome = workplace.bring([done])
     check(outcome)
     record = outcome.records[id(done)]
-    picture = place.store.path(done.stage, record.key, "effects.png").read_bytes()
-    words = place.store.path(done.stage, record.key, "effects.md").read_text(encoding="utf-8")
-    publish(place.store.root / done.folder / "index.html", s8_effects.page(scene, words, picture))
+    picture = workplace.store.path(done.stage, record.key, "effects.png").read_bytes()
+    words = workplace.store.path(done.stage, record.key, "effects.md").read_text(encoding="utf-8")
+    publish(workplace.store.root / done.folder / "index.html", s8_effects.page(scene, words, picture))
     return done, record
 
 
-def dataset(scene: Scene, place: Workplace) -> xr.Dataset:
+def dataset(scene: Scene, workplace: Workplace) -> xr.Dataset:
     """The influences, over (effect, other, quantity)."""
-    _, record = bring(scene, place)
-    return place.store.load(record)
+    _, record = bring(scene, workplace)
+    return workplace.store.load(record)

@@ -63,8 +63,8 @@ def _matlab(dataset: xr.Dataset) -> bytes:
     from scipy.io import savemat
 
     arrays = {str(name): array.values for name, array in dataset.variables.items()}
-    kept = {name: values.astype(object) if values.dtype.kind in "UO" else values for name, values in arrays.items()}
-    return _written(lambda file: savemat(file, kept, long_field_names=True))
+    columns = {name: values.astype(object) if values.dtype.kind in "UO" else values for name, values in arrays.items()}
+    return _written(lambda file: savemat(file, columns, long_field_names=True))
 
 
 def _written(write_to: Callable[[Any], object]) -> bytes:

@@ -26,8 +26,8 @@ def index(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress:
 
     An artifact of its own, because asking the modules themselves takes the import of matplotlib.
     """
-    found = {}
+    entries = {}
     for name in params["names"]:
         figure = import_module(f"{FIGURES}.{name}")
-        found[name] = {"needs": list(figure.NEEDS)}
-    return {"index.json": json.dumps(found, indent=1).encode()}
+        entries[name] = {"needs": list(figure.NEEDS)}
+    return {"index.json": json.dumps(entries, indent=1).encode()}

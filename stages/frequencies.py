@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.units import quantity
 from flexclear.stages import as_json, run
-from flexclear.stages.workplace import common_arguments, workplace
+from flexclear.stages.workplace import common_arguments, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -34,8 +34,8 @@ def command(options: argparse.Namespace) -> None:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
-    found = run.linear(graph.scene, time, moving=options.moving, place=workplace(options))
-    print(as_json.as_json(found) if options.json else text(found).rstrip("\n"))
+    modes = run.linear(graph.scene, time, moving=options.moving, workplace=open_workplace(options))
+    print(as_json.as_json(modes) if options.json else text(modes).rstrip("\n"))
 
 
 def text(linear: xr.Dataset) -> str:
@@ -47,15 +47,20 @@ def text(linear: xr.Dataset) -> str:
         f"equilibrium: largest unbalanced force {a['residual']:.3g} N after {a['iterations']} iterations",
         *_freedoms(linear),
     ]
+    if linear.sizes["vibration"]:
+        grows = a["growth"]
+        lines.append(
+            f"unstable: a small motion grows at {grows:.3g} 1/s" if grows > 0.0 else "stable: no small motion grows"
+        )
     if not linear.sizes["vibration"]:
         return "\n".join([*lines, "nothing vibrates: joints and drives hold all bodies"]) + "\n"
     lines += [
         f"{'':>4} {'frequency':>14} {'damping':>10}  most kinetic energy in",
         f"{'':>4} {'Hz':>14} {'ratio':>10}",
     ]
-    share = linear["energy_share"].max("moving_body").values
+    fraction = linear["energy_share"].max("moving_body").values
     columns = [linear[name].values for name in ("vibration", "frequency", "damping_ratio", "decay_rate", "dominant")]
-    for number, hertz, damping, rate, name, part in zip(*columns, share, strict=True):
+    for number, hertz, damping, rate, name, part in zip(*columns, fraction, strict=True):
         # what is damped so far has two rates and no frequency: two rows of one motion
         alone = f", decays at {rate:.3g} 1/s without vibrating" if hertz == 0.0 and rate > 0.0 else ""
         lines.append(f"{number:>4} {hertz:>14.7g} {damping:>10.3g}  {name} ({100.0 * part:.0f} %){alone}")

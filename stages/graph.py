@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -36,8 +35,8 @@ ARTIFACTS |= {"run": "simulate", "fine-modes": "fine_modes"}
 TIGHTER, FINER = 1e-2, 4
 #: the tightest tolerance that makes a difference: beyond, rounding does
 TIGHTEST = 1e-13
-#: a comparison run may take so many times the evaluations of the run that it is compared with
-MOST = 10.0
+#: a comparison run may take so many times the evaluations of the run that it is compared with, and at least so many
+MOST, LEAST = 4, 100_000
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Graph:
     A scene without flexible bodies has no mesh, modes and bundle; one without an ensemble has no
     such task. Raises InputError for names that no family lists and recipes that cannot be read.
 
-    shown: whether the artifacts take their place below results/runs; an edited copy of a scene
+    shown: whether the artifacts are shown below results/runs; an edited copy of a scene
     must not take that of its original.
     recipe: edits of all mesh recipes: `theory`, and a factor for the number of `elements`.
     """
@@ -200,13 +199,13 @@ class Graph:
 
     def up_to(self, stage: str) -> list[Task]:
         """All tasks of the scene up to a stage, that stage included."""
-        wanted = STAGES[: STAGES.index(stage) + 1]
-        return [task for name in wanted for task in self.of(name).values()]
+        requested = STAGES[: STAGES.index(stage) + 1]
+        return [task for name in requested for task in self.of(name).values()]
 
     def of(self, stage: str) -> dict[str, Task]:
         """Tasks of one stage by body; by the empty name where there is one for the whole scene."""
-        found = getattr(self, stage)
-        return found if isinstance(found, dict) else {"": found} if found is not None else {}
+        tasks = getattr(self, stage)
+        return tasks if isinstance(tasks, dict) else {"": tasks} if tasks is not None else {}
 
     def artifact(self, reference: str) -> Task:
         """The task behind ``run``, ``post``, ``modes/rod1`` ...; InputError when there is none."""
@@ -226,9 +225,8 @@ class Graph:
         return self._tighter({})
 
     def tighter(self, evaluations: int) -> Task:
-        """`tight` that may take MOST times so many evaluations, rounded up to a power of ten, which keys can share."""
-        most = 10 ** math.ceil(math.log10(MOST * max(evaluations, 1)))
-        return self._tighter({"evaluations": min(most, self.scene.solver.evaluations)})
+        """`tight` that may take MOST times so many evaluations."""
+        return self._tighter({"evaluations": min(max(MOST * evaluations, LEAST), self.scene.solver.evaluations)})
 
     def _tighter(self, limits: dict[str, float]) -> Task:
         solver = self.scene.solver
@@ -241,7 +239,7 @@ class Graph:
 
     @property
     def has_tighter(self) -> bool:
-        """Whether there is a tighter tolerance that tells the error of a run."""
+        """Whether there is a tighter tolerance that gives the error of a run."""
         return self.scene.solver.step is not None or self.scene.solver.rtol > 10.0 * TIGHTEST
 
     @cached_property

@@ -28,9 +28,9 @@ def deadline(options: argparse.Namespace | None) -> tuple[float, str]:
 def seconds(text: str, option: str) -> float:
     """A time above zero [s], as ``10s``, ``2min`` or ``1h``; InputError for other texts of an option."""
     try:
-        found = quantity(re.sub(r"(?<=[0-9.])(?=[a-z])", " ", text.strip()), "time")
-        if not found > 0.0:
+        result = quantity(re.sub(r"(?<=[0-9.])(?=[a-z])", " ", text.strip()), "time")
+        if not result > 0.0:
             raise ValueError("it must be above zero")
     except ValueError as error:
         raise InputError(f"{option} {text}", f"is no time: {error}", f"write {option} 2h, or '90 min'") from None
-    return found
+    return result

@@ -20,8 +20,8 @@ KINDS = {
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    told = "; ".join(f"{name}: {text}" for name, text in KINDS.items())
-    parser.add_argument("kind", choices=list(KINDS), metavar="KIND", help=told)
+    message = "; ".join(f"{name}: {text}" for name, text in KINDS.items())
+    parser.add_argument("kind", choices=list(KINDS), metavar="KIND", help=message)
     parser.add_argument(
         "folder", nargs="?", type=Path, default=Path(), metavar="FOLDER", help="where; default: the current folder"
     )
@@ -37,7 +37,7 @@ def command(options: argparse.Namespace) -> None:
         f"  flexclear show {scene}        the start pose with all names; nothing is run",
         f"  flexclear check {scene}       every mistake at once; nothing is run",
         f"  flexclear render {scene}      film and pictures",
-        f"  flexclear report {scene}      one page with figures, and beside its ideal twin",
+        f"  flexclear report {scene}      one page with figures, and next to its ideal mechanism",
         sep="\n",
     )
 

@@ -1,4 +1,4 @@
-"""The report of one scene: the answer, then film, figures, comparison with its ideal twin, assumptions, doubts."""
+"""The report of one scene: the answer, then film, figures, comparison with its ideal mechanism, assumptions, doubts."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.post.overview.page import Part
 
-#: general figures, in this order: caption, and what a reader who does not see them is told
+#: general figures, in this order: caption, and what a reader who does not see them reads
 FIGURES = {
     "motion.png": ("Motion", "Displacement, velocity and rotation of the bodies over time"),
     "reactions.png": (
@@ -52,7 +52,7 @@ COST = {
 }
 STABILITY = {
     "switched": "another integrator went on",
-    "stiff_share": "share of the steps that stability made shorter than accuracy would have",
+    "stiff_share": "fraction of the steps that stability made shorter than accuracy would have",
     "redundant_closure_rows": "conditions of closed loops that follow from the others",
     "accuracy_verdict": "accuracy asked for",
 }
@@ -65,7 +65,7 @@ PROVENANCE = {
 
 
 def make(
-    graph: Graph, place: Workplace, *, folder: bool = False, seconds: float | None = None, answers: bool = True
+    graph: Graph, workplace: Workplace, *, folder: bool = False, seconds: float | None = None, answers: bool = True
 ) -> Path:
     """Bring everything that the report of a scene shows up to date; returns the page.
 
@@ -77,21 +77,21 @@ def make(
     compared = None
     if loose(scene) or scene.flexible():
         with in_file(scene.path):
-            compared = compare.bring([scene], place, "both")
+            compared = compare.bring([scene], workplace, "both")
     drawn = graph.render
-    outcome = place.bring([graph.overview, *drawn.values()])
+    outcome = workplace.bring([graph.overview, *drawn.values()])
     if any(failure.task not in drawn.values() for failure in outcome.failures):
         check(outcome)
     for failure in outcome.failures:
-        place.monitor.say(f"not in the report: {failure.message}")
-    run = place.store.load(outcome.records[id(graph.simulate)]) if id(graph.simulate) in outcome.records else None
-    found = _answers(Answers(scene, place, seconds), place) if answers and run is not None else {}
-    text = _page(graph, place, outcome.records, compared, run, found)
-    return publish_page(place.store.root / f"runs/{scene.name}", "report", text, folder=folder)
+        workplace.monitor.say(f"not in the report: {failure.message}")
+    run = workplace.store.load(outcome.records[id(graph.simulate)]) if id(graph.simulate) in outcome.records else None
+    result = _answers(Answers(scene, workplace, seconds), workplace) if answers and run is not None else {}
+    text = _page(graph, workplace, outcome.records, compared, run, result)
+    return publish_page(workplace.store.root / f"runs/{scene.name}", "report", text, folder=folder)
 
 
 def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
-    """Write a page as ``<name>.html``, or as ``<name>/index.html`` with its files beside it."""
+    """Write a page as ``<name>.html``, or as ``<name>/index.html`` with its files next to it."""
     if not folder:
         publish(where / f"{name}.html", page)
         return where / f"{name}.html"
@@ -102,26 +102,26 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
     return where / name / "index.html"
 
 
-def _answers(answers: Answers, place: Workplace) -> dict[str, Answer]:
+def _answers(answers: Answers, workplace: Workplace) -> dict[str, Answer]:
     """Those of the three answers that can be given, by name; why one cannot is said."""
-    found = {}
+    result = {}
     for name in ("accuracy", "stability", "matters"):
         try:
             answer = getattr(answers, name)
         except (InputError, SolverError, FailedTasksError) as error:
-            place.monitor.say(f"not in the report: {name}: {error}")
+            workplace.monitor.say(f"not in the report: {name}: {error}")
             continue
         if answer is not None:
-            found[name] = answer
-    return found
+            result[name] = answer
+    return result
 
 
-def _answered(scene: Scene, found: Mapping[str, Answer]) -> list[Part]:
+def _answered(scene: Scene, result: Mapping[str, Answer]) -> list[Part]:
     """The three sections: each with a sentence that answers, a picture and a table."""
     from flexclear.pipeline.post.overview.page import Part, media
 
     parts = []
-    for name, answer in found.items():
+    for name, answer in result.items():
         words = said(name, answer, scene)
         picture = answer.file(words.picture)
         shown = "" if picture is None else media(words.picture, picture.read_bytes(), words.caption)
@@ -131,7 +131,7 @@ def _answered(scene: Scene, found: Mapping[str, Answer]) -> list[Part]:
 
 def _page(
     graph: Graph,
-    place: Workplace,
+    workplace: Workplace,
     records: Mapping[int, Record],
     compared: compare.Comparison | None,
     run: xr.Dataset | None,
@@ -147,8 +147,8 @@ def _page(
     doubts = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
     assumptions = by_weight(assumed(s5_post.sources(scene)), run)
     parts: list[Any] = [
-        Part("film", "The mechanism moving", _moving(graph, place, records)),
-        Part("run", "The run", _media(place, graph.overview, records, FIGURES)),
+        Part("film", "The mechanism moving", _moving(graph, workplace, records)),
+        Part("run", "The run", _media(workplace, graph.overview, records, FIGURES)),
         *_answered(scene, answers),
         *(compare.parts(compared) if compared is not None else []),
         Part("doubts", "Warnings", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("no.", "warning"))),
@@ -158,13 +158,13 @@ def _page(
             "Effects present and absent",
             listed(effects(parameters(run)), ("effect", "in the scene")) if run is not None else "",
         ),
-        Part("cost", "Computing cost", listed(_told(attributes, COST), ("figure", "value"))),
+        Part("cost", "Computing cost", listed(_rows(attributes, COST), ("figure", "value"))),
         Part(
             "stability",
             "Stability and constraints",
             "" if "stability" in answers else listed(_stability(run), ("figure", "value")),
         ),
-        Part("provenance", "Provenance", listed(_provenance(graph, place, records), ("item", "value"))),
+        Part("provenance", "Provenance", listed(_provenance(graph, workplace, records), ("item", "value"))),
         Part("downloads", "Downloads", downloads(_files(graph, compared))),
     ]
     dataset = None if compared is None else compared.dataset()
@@ -173,62 +173,62 @@ def _page(
     return page(scene.title, lead, parts, answer(dataset, run, doubts, changes))
 
 
-def _told(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:
+def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:
     """Attributes by what they are called; whole numbers in groups of three, shares in per cent."""
-    found = {}
+    rows = {}
     for name, label in names.items():
         value = attributes.get(name)
         if value not in (None, ""):
             whole = isinstance(value, int) or (getattr(value, "dtype", None) is not None and value.dtype.kind in "iu")
             if name.endswith("_share"):
-                found[label] = f"{100.0 * float(value):.3g} %"
+                rows[label] = f"{100.0 * float(value):.3g} %"
             elif whole:
-                found[label] = f"{int(value):,}"
+                rows[label] = f"{int(value):,}"
             else:
-                found[label] = f"{value:.4g}" if isinstance(value, float) else str(value)
-    return found
+                rows[label] = f"{value:.4g}" if isinstance(value, float) else str(value)
+    return rows
 
 
 def _stability(run: xr.Dataset | None) -> dict[str, str]:
     if run is None:
         return {}
-    found = _told(run.attrs, STABILITY)
+    rows = _rows(run.attrs, STABILITY)
     if "horizon" in run:
-        found["predictability"] = sentence(float(run["horizon"]), float(run["time"].values[-1]))
+        rows["predictability"] = sentence(float(run["horizon"]), float(run["time"].values[-1]))
     for name, label, unit in (
         ("energy_error", "largest error of the energy balance", "J"),
         ("constraint_error", "largest error of a closed loop", "m"),
     ):
         if name in run:
-            found[label] = f"{float(abs(run[name]).max()):.2e} {unit}"
-    return found
+            rows[label] = f"{float(abs(run[name]).max()):.2e} {unit}"
+    return rows
 
 
-def _provenance(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> dict[str, str]:
-    found = {"command": f"`flexclear report {graph.scene.path.name if graph.scene.path else graph.scene.name}`"}
+def _provenance(graph: Graph, workplace: Workplace, records: Mapping[int, Record]) -> dict[str, str]:
+    rows = {"command": f"`flexclear report {graph.scene.path.name if graph.scene.path else graph.scene.name}`"}
     record = records.get(id(graph.simulate))
     if record is not None:
-        found |= _told(place.store.load(record).attrs, PROVENANCE)
-        found["digest of the run"] = record.digest
-    found["sources of methods and data"] = f"`flexclear cite {graph.scene.name}`"
-    return found
+        rows |= _rows(workplace.store.load(record).attrs, PROVENANCE)
+        rows["digest of the run"] = record.digest
+    rows["sources of methods and data"] = f"`flexclear cite {graph.scene.name}`"
+    return rows
 
 
 def _files(graph: Graph, compared: compare.Comparison | None) -> dict[str, bytes]:
     """The scene as it was written, with what it extends, its recipes, and the tables; small enough for any page."""
-    found = {}
+    files = {}
     if graph.scene.path is not None:
-        found[graph.scene.path.name] = graph.scene.path.read_bytes()
+        files[graph.scene.path.name] = graph.scene.path.read_bytes()
     for recipe in graph.scene.recipes().values():
-        found[Path(recipe).name] = Path(recipe).read_bytes()
+        files[Path(recipe).name] = Path(recipe).read_bytes()
     if compared is not None:
         for name in ("differences.csv", "costs.csv"):
             if name in compared.record.files:
-                found[name] = compared.file(name).read_bytes()
-    return found
+                files[name] = compared.file(name).read_bytes()
+    return files
 
 
-def _moving(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> str:
+def _moving(graph: Graph, workplace: Workplace, records: Mapping[int, Record]) -> str:
     """The film, and the views that can be turned."""
     from flexclear.pipeline.post.pages import figures_of
 
@@ -239,21 +239,23 @@ def _moving(graph: Graph, place: Workplace, records: Mapping[int, Record]) -> st
             continue
         if what.endswith("html"):
             for name in sorted(record.files):
-                text += figures_of(place.store.path(task.stage, record.key, name).read_text(encoding="utf-8"))
+                text += figures_of(workplace.store.path(task.stage, record.key, name).read_text(encoding="utf-8"))
         elif what == "motion mp4":
             names = {name: ("The mechanism moving", f"Film of {graph.scene.title}") for name in record.files}
-            text = _media(place, task, records, names) + text
+            text = _media(workplace, task, records, names) + text
     return text
 
 
-def _media(place: Workplace, task: Task, records: Mapping[int, Record], captions: Mapping[str, tuple[str, str]]) -> str:
+def _media(
+    workplace: Workplace, task: Task, records: Mapping[int, Record], captions: Mapping[str, tuple[str, str]]
+) -> str:
     from flexclear.pipeline.post.overview.page import media
 
     record = records.get(id(task))
     if record is None:
         return ""
     return "".join(
-        media(name, place.store.path(task.stage, record.key, name).read_bytes(), text, alt)
+        media(name, workplace.store.path(task.stage, record.key, name).read_bytes(), text, alt)
         for name, (text, alt) in captions.items()
         if name in record.files
     )

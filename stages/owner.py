@@ -1,4 +1,4 @@
-"""Which scene file a folder of shown results belongs to: two files of one name must not take each other's place."""
+"""Which scene file a folder of shown results belongs to: two files of one name must not replace each other."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from flexclear.pipeline.core.scene.schema import Scene
 
 def refuse_namesakes(scenes: list[Scene]) -> None:
     """InputError when two files given together have one name."""
-    found: dict[str, Path] = {}
+    folders: dict[str, Path] = {}
     for scene in scenes:
         path, name = _file(scene), portable.folded(scene.name)  # as Windows and macOS name folders
-        if path is not None and found.setdefault(name, path) != path:
+        if path is not None and folders.setdefault(name, path) != path:
             raise InputError(
                 str(path),
-                f"is called '{scene.name}', as {found[name]} is, and their results would take each other's place",
+                f"is called '{scene.name}', as {folders[name]} is, and their results would replace each other",
                 "rename one, or call the command from a folder above both, which names them by their paths",
             )
 

@@ -23,7 +23,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from flexclear.pipeline.post import report
 
     results = Path(params["results"])
-    told = report.run_attributes({scene: results / path for scene, path in params["runs"].items()})
-    attributes = {scene: {**found, **params["origins"][scene]} for scene, found in told.items()}
+    by_scene = report.run_attributes({scene: results / path for scene, path in params["runs"].items()})
+    attributes = {scene: {**attributes_of, **params["origins"][scene]} for scene, attributes_of in by_scene.items()}
     content = report.collect(results, attributes, params["rendered"], TREE)
     return {"index.html": report.page(content), "paper.md": report.paper_markdown(content).encode()}

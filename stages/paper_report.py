@@ -45,7 +45,7 @@ class Scenes:
     def timing(self, family: str) -> Task:
         """Measured times of all scenes that lie directly in a folder below scenes/.
 
-        They are seconds of the processor, and so are measured beside other tasks: alone they would be a third of the
+        They are seconds of the processor, and so are measured while other tasks run: alone they would be a third of the
         whole report's time, with all other cores idle.
         """
         if family not in self.times:
@@ -71,39 +71,40 @@ class Scenes:
 
 
 def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
-    """What only the timing runs on, compiled beside other tasks; kernels of the scenes' own runs are there by then."""
-    found: dict[tuple[str, ...], Task] = {}
+    """What only the timing runs on, compiled while other tasks run; kernels of the scenes' own runs are there by
+    then."""
+    tasks: dict[tuple[str, ...], Task] = {}
     for graph in graphs:
         for scene in (timing.paper_scene(graph.scene), timing.damped_scene(graph.scene, graph.scene.solver.rtol)):
-            found.setdefault(kernels.shared(scene), kernels.task(scene, graph.bodies()))
-    return {f"kernels/{k}": task for k, task in enumerate(found.values())}
+            tasks.setdefault(kernels.shared(scene), kernels.task(scene, graph.bodies()))
+    return {f"kernels/{k}": task for k, task in enumerate(tasks.values())}
 
 
-def bring(place: Workplace) -> Outcome:
+def bring(workplace: Workplace) -> Outcome:
     """Bring everything that the report shows, and the page, up to date; what fails is left out of the page."""
     scenes = Scenes()
-    tasks = report_tasks(place, scenes)  # records go by the identity of tasks, which must not end before
-    shown = place.bring(tasks)
+    tasks = report_tasks(workplace, scenes)  # records go by the identity of tasks, which must not end before
+    shown = workplace.bring(tasks)
     graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in shown.records]
-    made = place.bring([page_task(place, shown.records, graphs)])
+    made = workplace.bring([page_task(workplace, shown.records, graphs)])
     check(made)
     return Outcome({**shown.records, **made.records}, shown.failures)
 
 
-def report_tasks(place: Workplace, scenes: Scenes) -> list[Task]:
+def report_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
     """All figures, tables and pictures. What takes longest comes first, with all that it needs: film and times."""
-    figures = figure_tasks(place, scenes)
+    figures = figure_tasks(workplace, scenes)
     times = [task for task in figures if any(above.stage == "timing" for above in task.inputs.values())]
     others = [task for task in figures if task not in times]
     return [*scenes.graph(HEADLINE).of("render").values(), *times, *others]
 
 
-def figure_tasks(place: Workplace, scenes: Scenes) -> list[Task]:
+def figure_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
     """One task for each figure and table."""
-    return [_figure_task(name, entry, scenes) for name, entry in figure_index(place).items()]
+    return [_figure_task(name, entry, scenes) for name, entry in figure_index(workplace).items()]
 
 
-def figure_index(place: Workplace) -> Mapping[str, Mapping[str, Any]]:
+def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
     """What each figure and table needs, see `stages.figure.index`."""
     names = list(import_module(FIGURES).NAMES)
     task = Task(
@@ -115,14 +116,16 @@ def figure_index(place: Workplace) -> Mapping[str, Mapping[str, Any]]:
         modules=tuple(f"{FIGURES}.{name}" for name in names),
         folder="",
     )
-    outcome = place.bring([task])
+    outcome = workplace.bring([task])
     check(outcome)
     record = outcome.records[id(task)]
-    found: dict[str, dict[str, Any]] = json.loads(place.store.path(task.stage, record.key, "index.json").read_bytes())
-    return found
+    index: dict[str, dict[str, Any]] = json.loads(
+        workplace.store.path(task.stage, record.key, "index.json").read_bytes()
+    )
+    return index
 
 
-def page_task(place: Workplace, records: Mapping[int, Record], graphs: list[Graph]) -> Task:
+def page_task(workplace: Workplace, records: Mapping[int, Record], graphs: list[Graph]) -> Task:
     """The page; it is written again when anything that it shows has changed."""
     return Task(
         stage="report",
@@ -130,7 +133,7 @@ def page_task(place: Workplace, records: Mapping[int, Record], graphs: list[Grap
         part="page",
         run="flexclear.stages.page:run",
         params={
-            "results": str(place.store.root),
+            "results": str(workplace.store.root),
             "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},
             "origins": {graph.scene.name: s5_post.origins(graph.scene) for graph in graphs},
             "rendered": HEADLINE,

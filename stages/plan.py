@@ -1,4 +1,5 @@
-"""``flexclear plan``: which effects, modes and tolerance a scene's wanted accuracy calls for, and by what evidence."""
+"""``flexclear plan``: which effects, modes and tolerance a scene's requested accuracy calls for, and by what
+evidence."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import limit, run, s4_watched, s8_plan
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import FailedTasksError, Workplace, check, workplace
+from flexclear.stages.workplace import FailedTasksError, Workplace, check, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -49,25 +50,25 @@ def command(options: argparse.Namespace) -> None:
         if len(options.scenes) > 1:
             raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "plan the scenes one by one")
         run.check_target(options.out)
-    place = workplace(options)
+    workplace = open_workplace(options)
     missed = list[str]()
     budget = limit.seconds(options.budget, "--budget")
     for graph in run.graphs(options.scenes, options.set):
         if graph.scene.accuracy is None and not options.verify and options.out is None:
-            print(levels(graph.scene, place))
+            print(levels(graph.scene, workplace))
             continue
-        found = bring(graph.scene, place)
-        print(found.text())
+        planned = bring(graph.scene, workplace)
+        print(planned.text())
         if options.out is not None:
-            publish(options.out, found.file(options.out))
+            publish(options.out, planned.file(options.out))
         if options.verify:
-            missed += verify(found, place, budget)
-        found.tell()
+            missed += verify(planned, workplace, budget)
+        planned.tell()
     if missed:
         raise run.MissedAccuracyError("\n".join(missed))
 
 
-def levels(scene: Scene, place: Workplace) -> str:
+def levels(scene: Scene, workplace: Workplace) -> str:
     """What three accuracies of all watched quantities call for, as a table.
 
     Raises InputError for a scene without effects, or that watches nothing.
@@ -78,7 +79,7 @@ def levels(scene: Scene, place: Workplace) -> str:
     plans: dict[str, xr.Dataset | str] = {}
     for level in LEVELS:
         try:
-            plans[level] = bring(asking(scene, level), place).dataset()
+            plans[level] = bring(asking(scene, level), workplace).dataset()
         except (InputError, FailedTasksError) as error:
             if not variants.effects(scene):
                 raise
@@ -96,9 +97,9 @@ def asking(scene: Scene, level: str) -> Scene:
     return asked
 
 
-def told(wanted: list[Graph], place: Workplace) -> list[Planned]:
+def planned_scenes(requested: list[Graph], workplace: Workplace) -> list[Planned]:
     """The plans of scenes, brought up to date and printed."""
-    plans = [bring(graph.scene, place) for graph in wanted]
+    plans = [bring(graph.scene, workplace) for graph in requested]
     print(*(plan.text() for plan in plans), sep="\n")
     return plans
 
@@ -111,12 +112,12 @@ class Planned:
     planned: Scene
     task: Task
     record: Record
-    place: Workplace
+    workplace: Workplace
 
     @property
     def folder(self) -> Path:
         """Where its files are shown."""
-        return self.place.store.root / self.task.folder
+        return self.workplace.store.root / self.task.folder
 
     @property
     def target(self) -> Path:
@@ -125,31 +126,34 @@ class Planned:
 
     def dataset(self) -> xr.Dataset:
         """Influences, decisions and evidence (`pipeline.post.plan.dataset`)."""
-        return self.place.store.load(self.record)
+        return self.workplace.store.load(self.record)
 
-    def kept(self, name: str) -> Path:
+    def stored(self, name: str) -> Path:
         """One of its files, in the store."""
-        return self.place.store.path(self.task.stage, self.record.key, name)
+        return self.workplace.store.path(self.task.stage, self.record.key, name)
 
     def text(self) -> str:
         """The table of decisions."""
-        return self.kept("plan.md").read_text(encoding="utf-8")
+        return self.stored("plan.md").read_text(encoding="utf-8")
 
     def file(self, target: Path) -> bytes:
-        """The planned scene's file as it stands at a place; it extends the full scene's."""
+        """The planned scene's file for a given path; it extends the full scene's."""
         assert self.scene.path is not None
-        head = ("written by flexclear plan", "what the accuracy wanted of the full scene does not call for is left out")
+        head = (
+            "written by flexclear plan",
+            "what the requested accuracy of the full scene does not call for is left out",
+        )
         base = load_scene(self.scene.path)
         return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
 
     def missed(self) -> list[str]:
         """Verify the plan; see `verify`."""
-        return verify(self, self.place)
+        return verify(self, self.workplace)
 
     def tell(self) -> None:
         """One line on what was written where."""
         files = {"index.html": "the page", self.target.name: "the planned scene", "plan.nc": "all influences"}
-        run.told(self.folder, files)
+        run.print_files(self.folder, files)
 
 
 def _example(scene: Scene) -> str:
@@ -159,8 +163,8 @@ def _example(scene: Scene) -> str:
     return f'{body}.position = "10 um"'
 
 
-def bring(scene: Scene, place: Workplace) -> Planned:
-    """The plan of a scene, brought up to date; the planned scene's file and the page beside it.
+def bring(scene: Scene, workplace: Workplace) -> Planned:
+    """The plan of a scene, brought up to date; the planned scene's file and the page next to it.
 
     Raises InputError for a scene without `[accuracy]` or effects, or whose accuracy nothing meets or everything does,
     and what its runs raise.
@@ -177,26 +181,26 @@ def bring(scene: Scene, place: Workplace) -> Planned:
             where, "has no effect that could be left out: no clearance, flexible body, friction, gravity or stop"
         )
     task = s8_plan.task(scene)
-    outcome = place.bring([task])
+    outcome = workplace.bring([task])
     check(outcome)
     record = outcome.records[id(task)]
-    found = Planned(scene, of(scene, place.store.load(record)), task, record, place)
+    planned = Planned(scene, of(scene, workplace.store.load(record)), task, record, workplace)
     if scene.path is not None:
-        publish(found.target, found.file(found.target))
-        publish(found.folder / "index.html", page(found))
-    return found
+        publish(planned.target, planned.file(planned.target))
+        publish(planned.folder / "index.html", page(planned))
+    return planned
 
 
 def of(scene: Scene, plan: xr.Dataset) -> Scene:
-    """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities told."""
-    told = s8_plan.from_dataset(plan)
-    bare = variants.without(scene, variants.named(scene, told["gone"], f"{scene.name} [plan]"))
-    fewer = lessened(variants.with_modes(bare, told["modes"]), told["apart"])
+    """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities set."""
+    decided = s8_plan.from_dataset(plan)
+    bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
+    fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
     there = {name for names in owners.values() for name in names}
     watch = [q.name for q in scene.watched() if q.owner in there and (q.kind in _kinds(owners, q.owner))]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
-    solver: dict[str, Any] = {key: told[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in told}
+    solver: dict[str, Any] = {key: decided[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in decided}
     if "evaluations" in scene.solver.model_fields_set:
         solver["evaluations"] = scene.solver.evaluations  # a limit that the scene sets itself
     result = edited(
@@ -220,7 +224,7 @@ def _kinds(owners: dict[str, tuple[str, ...]], name: str) -> set[str]:
     return {kind for kind, of_kind in KINDS.items() if name in owners[of_kind.owner]}
 
 
-def page(found: Planned) -> bytes:
+def page(planned: Planned) -> bytes:
     """The page of a plan: in words, the chart, the table, the planned scene."""
     import html
 
@@ -229,37 +233,37 @@ def page(found: Planned) -> bytes:
     from flexclear.pipeline.post.plan import words
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
-    picture = media("plan.png", found.kept("plan.png").read_bytes(), "Estimated influence of each effect, at most")
-    text = html.escape(found.file(found.target).decode())
+    picture = media("plan.png", planned.stored("plan.png").read_bytes(), "Estimated influence of each effect, at most")
+    text = html.escape(planned.file(planned.target).decode())
     parts = [
         Part("chart", "Influences", picture),
-        Part("decisions", "Decisions", as_html(from_markdown(found.text()))),
+        Part("decisions", "Decisions", as_html(from_markdown(planned.text()))),
         Part("scene", "The planned scene", f"<figure><pre class='scroll'>{text}</pre></figure>"),
     ]
-    return made(f"Plan: {found.scene.title}", words(found.dataset()), parts)
+    return made(f"Plan: {planned.scene.title}", words(planned.dataset()), parts)
 
 
-def verify(found: Planned, place: Workplace, budget: float = BUDGET) -> list[str]:
-    """Run the full and the planned scene, print how far they are apart, and return what was missed, in words.
+def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> list[str]:
+    """Run the full and the planned scene, print how much they differ, and return what was missed, in words.
 
     budget: time for members that decide the verdicts [s].
     """
     from flexclear.pipeline.post.plan import MISSED, verdict, verified
     from flexclear.pipeline.post.plotting.table import as_markdown
 
-    compared = beside(found, place, budget)
+    compared = errors_of(planned, workplace, budget)
     print(as_markdown(verified(compared)))
-    wanted = found.scene.accuracy
+    requested = planned.scene.accuracy
     columns = ("quantity", "unit", "error", "chance", "wanted")
     over = [
-        f"{found.scene.name}: the plan misses {name}: {error:.3g} instead of {most:.3g} {unit}"
+        f"{planned.scene.name}: the plan misses {name}: {error:.3g} instead of {most:.3g} {unit}"
         for name, unit, error, chance, most in zip(*(compared[key].values for key in columns), strict=True)
         if verdict(error, chance, most) == MISSED
     ]
-    return over if wanted is None or not wanted.allow_missed else []
+    return over if requested is None or not requested.allow_missed else []
 
 
-def beside(found: Planned, place: Workplace, budget: float = BUDGET) -> xr.Dataset:
+def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> xr.Dataset:
     """Distance of the planned run from the full one by quantity, each over members where it has contacts.
 
     Members are added until every verdict is decided, as long as the next ones fit into the budget [s].
@@ -269,48 +273,48 @@ def beside(found: Planned, place: Workplace, budget: float = BUDGET) -> xr.Datas
     begun, last = time.monotonic(), 0.0
     for members in MEMBERS:
         round_begun = time.monotonic()
-        result = _compared(found, place, members)
+        result = _compared(planned, workplace, members)
         last = time.monotonic() - round_begun
         open_ = [verdict(*values) == UNDECIDED for values in _columns(result)]
-        loose = found.scene.contacts() or found.scene.stop
+        loose = planned.scene.contacts() or planned.scene.stop
         if not any(open_) or not loose or time.monotonic() - begun + 2.0 * last > budget:
             break
     return result
 
 
 def _columns(result: xr.Dataset) -> list[tuple[float, float, float]]:
-    """Error, chance and what is wanted, by quantity."""
+    """Error, chance and what is requested, by quantity."""
     columns = (result[key].values for key in ("error", "chance", "wanted"))
     return [(float(e), float(c), float(w)) for e, c, w in zip(*columns, strict=True)]
 
 
-def _compared(found: Planned, place: Workplace, members: int) -> xr.Dataset:
+def _compared(results: Planned, workplace: Workplace, members: int) -> xr.Dataset:
     """Distance of the planned run from the full one over so many members."""
     from flexclear.pipeline.core import effect_size
     from flexclear.pipeline.core.errors import SolverError
     from flexclear.pipeline.core.scene.requested_accuracy import parse
 
-    assert found.scene.accuracy is not None
-    names = list(found.scene.accuracy.quantities)
-    chosen = [parse(name, found.scene.owners()) for name in names]
-    full = edited(found.scene, {"accuracy": None})
-    tasks = [s4_watched.task(scene, chosen, members) for scene in (full, found.planned)]
-    outcome = place.bring(tasks)
+    assert results.scene.accuracy is not None
+    names = list(results.scene.accuracy.quantities)
+    chosen = [parse(name, results.scene.owners()) for name in names]
+    full = edited(results.scene, {"accuracy": None})
+    tasks = [s4_watched.task(scene, chosen, members) for scene in (full, results.planned)]
+    outcome = workplace.bring(tasks)
     check(outcome)
     one, two = (
-        s4_watched.point(place.store.load(outcome.records[id(task)]), scene, chosen)
-        for task, scene in zip(tasks, (full, found.planned), strict=True)
+        s4_watched.point(workplace.store.load(outcome.records[id(task)]), scene, chosen)
+        for task, scene in zip(tasks, (full, results.planned), strict=True)
     )
     for point, what in ((one, "full"), (two, "planned")):
         if point.refused:
-            raise SolverError(f"{found.scene.name}: the {what} run is refused: {point.refused}")
-    plan = found.dataset()
-    apart = [effect_size.influence(two, one, q, members) for q in chosen]
+            raise SolverError(f"{results.scene.name}: the {what} run is refused: {point.refused}")
+    plan = results.dataset()
+    difference = [effect_size.influence(two, one, q, members) for q in chosen]
     result = plan[["wanted"]].copy()
     for k, q in enumerate(chosen):
-        want = found.scene.accuracy.quantities[q.name]
+        want = results.scene.accuracy.quantities[q.name]
         if want.relative is not None:  # what it is relative to is known now
             result["wanted"][k] = want.relative * effect_size.size(one, q)
-    result["error"] = (("quantity",), [i.difference for i in apart])
-    result["chance"] = (("quantity",), [i.uncertainty for i in apart])
+    result["error"] = (("quantity",), [i.difference for i in difference])
+    result["chance"] = (("quantity",), [i.uncertainty for i in difference])
     return result.assign_attrs(full_evaluations=one.evaluations, planned_evaluations=two.evaluations, members=members)

@@ -12,7 +12,7 @@ from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
 from flexclear.stages.s6_render import FORMATS
-from flexclear.stages.workplace import Workplace, check, near, workplace
+from flexclear.stages.workplace import Workplace, check, open_workplace, relative
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
@@ -42,27 +42,27 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring them up to date and say where they are."""
-    wanted = _wanted(options.what, options.format)
+    requested = _requested(options.what, options.format)
     if options.at is not None and options.what != "vibrations":
         raise InputError("--at", "belongs to --what vibrations")
     try:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
-    graphs, place = run.graphs(options.scenes, options.set), workplace(options)
-    tasks = {graph.scene.name: _tasks(graph, wanted, options.what is not None, time) for graph in graphs}
-    made = [task for found in tasks.values() for task in found]
-    if len(graphs) > 1 and wanted == [("modes", "html")]:
+    graphs, workplace = run.graphs(options.scenes, options.set), open_workplace(options)
+    tasks = {graph.scene.name: _tasks(graph, requested, options.what is not None, time) for graph in graphs}
+    made = [task for group in tasks.values() for task in group]
+    if len(graphs) > 1 and requested == [("modes", "html")]:
         made.append(_beside(graphs))
-    outcome = place.bring(made)
+    outcome = workplace.bring(made)
     for task in made:
         record = outcome.records.get(id(task))
         if record is not None:
-            _tell(place, task.folder, list(record.files))
+            _tell(workplace, task.folder, list(record.files))
     check(outcome)
 
 
-def _wanted(what: str | None, kind: str | None) -> list[tuple[str, str]]:
+def _requested(what: str | None, kind: str | None) -> list[tuple[str, str]]:
     """What is to be made.  Raises InputError for what cannot be shown so."""
     if what is None and kind is None:
         return list(USUAL)
@@ -77,9 +77,9 @@ def _wanted(what: str | None, kind: str | None) -> list[tuple[str, str]]:
     return [(what, kind)]
 
 
-def _tasks(graph: Graph, wanted: list[tuple[str, str]], asked: bool, time: float | None) -> list:
+def _tasks(graph: Graph, requested: list[tuple[str, str]], asked: bool, time: float | None) -> list:
     """One task for each; of what is usual, modes only where there are some."""
-    there = [pair for pair in wanted if asked or pair[0] != "modes" or graph.scene.flexible()]
+    there = [pair for pair in requested if asked or pair[0] != "modes" or graph.scene.flexible()]
     with run.in_file(graph.scene.path):
         return [graph.picture(what, kind, time) for what, kind in there]
 
@@ -92,21 +92,21 @@ def _beside(graphs: list[Graph]) -> Task:
         scene=graphs[-1].scene.name,
         part="modes of all",
         run="flexclear.stages.s6_render:run",
-        params={"what": "modes", "format": "html", "title": "Mode sets beside each other"},
+        params={"what": "modes", "format": "html", "title": "Mode sets next to each other"},
         inputs=bundles,
         folder=f"compare/{run.joined([graph.scene.name for graph in graphs])}",
     )
 
 
-def _tell(place: Workplace, folder: str, files: list[str]) -> None:
+def _tell(workplace: Workplace, folder: str, files: list[str]) -> None:
     shown = [name for name in sorted(files) if not name.endswith(".vtp")]
     rest = len(files) - len(shown)
-    print(f"{near(place.store.root / folder)}: {', '.join(shown)}{f' and {rest} files beside' if rest else ''}")
+    print(f"{relative(workplace.store.root / folder)}: {', '.join(shown)}{f' and {rest} more files' if rest else ''}")
 
 
-def rendered(scene: Scene, place: Workplace | None = None) -> Path:
+def rendered(scene: Scene, workplace: Workplace | None = None) -> Path:
     """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
-    place, wanted = place or workplace(), Graph(scene)
+    workplace, requested = workplace or open_workplace(), Graph(scene)
     run.require_names(scene)
-    check(place.bring(list(wanted.render.values()), jobs=1))
-    return place.store.root / wanted.simulate.folder
+    check(workplace.bring(list(requested.render.values()), jobs=1))
+    return workplace.store.root / requested.simulate.folder

@@ -10,7 +10,7 @@ import argparse
 from pathlib import Path
 
 from flexclear.pipeline.post.render import gl
-from flexclear.stages.workplace import Workplace, check, common_arguments, near, workplace
+from flexclear.stages.workplace import Workplace, check, common_arguments, open_workplace, relative
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -35,30 +35,30 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
-    place = workplace(options)
+    workplace = open_workplace(options)
     if not options.scenes:
-        print(near(make(place, folder=options.folder)))
+        print(relative(make(workplace, folder=options.folder)))
         return
     from flexclear.stages import limit, own_report, run
 
     seconds = None if options.budget is None else limit.seconds(options.budget, "--budget")
     for graph in run.graphs(options.scenes, options.set):
         answers = options.answers != "none"
-        print(near(own_report.make(graph, place, folder=options.folder, seconds=seconds, answers=answers)))
+        print(relative(own_report.make(graph, workplace, folder=options.folder, seconds=seconds, answers=answers)))
 
 
-def make(place: Workplace, *, folder: bool = False) -> Path:
-    """Bring everything that the report shows up to date; returns the page; with `folder` one with files beside it.
+def make(workplace: Workplace, *, folder: bool = False) -> Path:
+    """Bring everything that the report shows up to date; returns the page; with `folder` one with files next to it.
 
     What fails is left out of the page and raised (FailedTasksError) after the page is written.
     """
     from flexclear.stages import paper_report
 
-    outcome = paper_report.bring(place)
+    outcome = paper_report.bring(workplace)
     if gl.state().endswith("none"):
-        place.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
+        workplace.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
     check(outcome)
-    target = place.store.root / "report" / "index.html"
+    target = workplace.store.root / "report" / "index.html"
     if not folder:
         return target
     from flexclear.stages.own_report import publish_page

@@ -24,7 +24,7 @@ from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages import export, owner
 from flexclear.stages.graph import STAGES, Graph
 from flexclear.stages.s5_post import origins
-from flexclear.stages.workplace import Workplace, check, common_arguments, near, workplace
+from flexclear.stages.workplace import Workplace, check, common_arguments, open_workplace, relative
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -46,7 +46,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="write the run here: .nc or .mat; .csv, .parquet, .xlsx",
     )
-    parser.add_argument("--planned", action="store_true", help="plan first, and run what the wanted accuracy calls for")
+    parser.add_argument(
+        "--planned", action="store_true", help="plan first, and run what the requested accuracy calls for"
+    )
     parser.add_argument("--verify", action="store_true", help="with --planned: run the full scene, tell the true error")
 
 
@@ -58,26 +60,26 @@ def command(options: argparse.Namespace) -> None:
         export.check_format(options.out)
         check_target(options.out)
     if options.verify and not options.planned:
-        raise InputError("--verify", "tells the true error of a plan, and no plan is asked for", "add --planned")
-    wanted = graphs(options.scenes, options.set)
-    place = workplace(options)
-    plans = import_module("flexclear.stages.plan").told(wanted, place) if options.planned else []
-    wanted = [Graph(plan.planned) for plan in plans] or wanted
-    for graph in wanted:
-        check_run(graph.scene, place.store.root)
-        taken = owner.claim(graph.scene, place.store)
+        raise InputError("--verify", "reports the true error of a plan, and no plan is requested", "add --planned")
+    requested = graphs(options.scenes, options.set)
+    workplace = open_workplace(options)
+    plans = import_module("flexclear.stages.plan").planned_scenes(requested, workplace) if options.planned else []
+    requested = [Graph(plan.planned) for plan in plans] or requested
+    for graph in requested:
+        check_run(graph.scene, workplace.store.root)
+        taken = owner.claim(graph.scene, workplace.store)
         if taken is not None:
-            place.monitor.say(taken)
-    outcome = place.bring([task for graph in wanted for task in graph.up_to(options.to)])
+            workplace.monitor.say(taken)
+    outcome = workplace.bring([task for graph in requested for task in graph.up_to(options.to)])
     check(outcome)
     if options.to == "bundle":
-        print("\n\n".join(filter(None, (deficits(graph, place, outcome) for graph in wanted))))
+        print("\n\n".join(filter(None, (deficits(graph, workplace, outcome) for graph in requested))))
     if options.out is not None:
-        copy_run(wanted[0], place, options.out)
-    for graph in wanted if options.to in ("simulate", "ensemble", "post") else ():
-        told(place.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
+        copy_run(requested[0], workplace, options.out)
+    for graph in requested if options.to in ("simulate", "ensemble", "post") else ():
+        print_files(workplace.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
     missed = [text for plan in plans if options.verify for text in plan.missed()]
-    conclude(wanted, place, outcome, missed)
+    conclude(requested, workplace, outcome, missed)
 
 
 def scene_arguments(parser: argparse.ArgumentParser) -> None:
@@ -86,11 +88,11 @@ def scene_arguments(parser: argparse.ArgumentParser) -> None:
     common_arguments(parser)
 
 
-def told(folder: Path, files: Mapping[str, str]) -> None:
+def print_files(folder: Path, files: Mapping[str, str]) -> None:
     """One line on what was written where, of those files that are there."""
     there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
     if there:
-        print(f"{near(folder)}: {', '.join(there)}")
+        print(f"{relative(folder)}: {', '.join(there)}")
 
 
 def joined(names: Sequence[str]) -> str:
@@ -99,7 +101,7 @@ def joined(names: Sequence[str]) -> str:
 
 
 class MissedAccuracyError(SolverError):
-    """Runs are not as accurate as their scenes ask; what there is is kept, and says so."""
+    """Runs are not as accurate as their scenes ask; the runs are stored, with their verdicts."""
 
 
 def find_scene(name: str) -> Path:
@@ -120,26 +122,26 @@ def _known(name: str) -> str:
     return suggestion(name, sorted(p.relative_to(scenes).with_suffix("").as_posix() for p in scenes.rglob("*.toml")))
 
 
-def run(scene: Scene, place: Workplace | None = None) -> xr.Dataset:
+def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
     """Dataset of the simulate stage, brought up to date; titled and named as the scene is.
 
-    An edited scene (`override`) is cached like any other but does not take the place of its file's
+    An edited scene (`override`) is cached like any other but does not replace its file's
     results under results/runs.  Raises FlexclearError.
     """
     require_names(scene)
-    place = place or workplace()
+    workplace = workplace or open_workplace()
     import_module("flexclear.pipeline.core.artifacts.modal")  # gives the dataset its accessor
     task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: workers would run a caller's script again from its top
-    outcome = place.bring([task], jobs=1)
+    outcome = workplace.bring([task], jobs=1)
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(
+    return workplace.store.load(outcome.records[id(task)]).assign_attrs(
         title=scene.title, scene=scene.name, **origins(scene)
     )
 
 
 def graph(scene: Scene) -> Graph:
-    """The tasks of a scene; an edited one does not take the place of its file's results under results/runs."""
+    """The tasks of a scene; an edited one does not replace its file's results under results/runs."""
     require_names(scene)
     return Graph(scene, shown=scene.path is None or as_in_its_file(scene))
 
@@ -166,7 +168,7 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
         if len(path.relative_to(folder).parts) <= 2 and not path.stem.endswith(PARTIAL)
     )
     if not files:
-        raise InputError(name, f"there are no results in {near(folder)}", f"flexclear run {name}")
+        raise InputError(name, f"there are no results in {relative(folder)}", f"flexclear run {name}")
     if _of_another_run(folder):
         files = [path for path in files if path != folder / "post.nc"]
     # read and closed: the garbage collector closes what stays open, inside of whatever NetCDF call runs then
@@ -181,28 +183,28 @@ def _of_another_run(folder: Path) -> bool:
     return post is not None and made is not None and post.facts.get("input run") != made.digest
 
 
-def bundles(scene: Scene, place: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:
+def bundles(scene: Scene, workplace: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:
     """The reduced flexible bodies of a scene by name, brought up to date.
 
     jobs: as of `Workplace.bring`; one is this process, since workers would run a caller's script again from its top.
     Raises FlexclearError.
     """
-    place, graph = place or workplace(), Graph(scene, shown=False)
-    outcome = place.bring(list(graph.bundle.values()), jobs)
+    workplace, graph = workplace or open_workplace(), Graph(scene, shown=False)
+    outcome = workplace.bring(list(graph.bundle.values()), jobs)
     check(outcome)
-    return _loaded(graph, place, outcome)
+    return _loaded(graph, workplace, outcome)
 
 
-def _loaded(graph: Graph, place: Workplace, outcome: Outcome) -> dict[str, xr.Dataset]:
-    return {body: place.store.load(outcome.records[id(task)]) for body, task in graph.bundle.items()}
+def _loaded(graph: Graph, workplace: Workplace, outcome: Outcome) -> dict[str, xr.Dataset]:
+    return {body: workplace.store.load(outcome.records[id(task)]) for body, task in graph.bundle.items()}
 
 
-def deficits(graph: Graph, place: Workplace, outcome: Outcome) -> str:
+def deficits(graph: Graph, workplace: Workplace, outcome: Outcome) -> str:
     """What the scene's bundles lack, one table for each flexible body."""
     from flexclear.pipeline.core.artifacts.deficits import table
 
-    found = _loaded(graph, place, outcome)
-    return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in found.items())
+    reduced = _loaded(graph, workplace, outcome)
+    return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
 
 
 def linear(
@@ -212,22 +214,22 @@ def linear(
     *,
     moving: bool = False,
     vibrations: bool = True,
-    place: Workplace | None = None,
+    workplace: Workplace | None = None,
 ) -> xr.Dataset:
     """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is."""
     if time is not None and not scene.time.start <= time <= scene.time.end:
         raise InputError(
             "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
         )
-    place = place or workplace()
+    workplace = workplace or open_workplace()
     graph = Graph(scene, shown=as_in_its_file(scene))
     task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
-    outcome = place.bring([task])
+    outcome = workplace.bring([task])
     check(outcome)
-    return place.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
+    return workplace.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
 
 
-def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
+def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
     """Tell what the scenes' runs are to be doubted for, as the last thing that a command says.
 
     Raises MissedAccuracyError, after that, for runs that are not as accurate as asked, and for what `plans` miss.
@@ -238,12 +240,12 @@ def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome, plans:
         if record is None:
             continue
         for sentence in filter(None, record.said.get("warnings", "").split("\n")):
-            place.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
-        verdict, wanted = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
-        if verdict != "met" and wanted is not None:
-            text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is kept"
-            if wanted.allow_missed:
-                place.monitor.say(text)
+            workplace.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
+        verdict, requested = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
+        if verdict != "met" and requested is not None:
+            text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is stored"
+            if requested.allow_missed:
+                workplace.monitor.say(text)
             else:
                 missed.append(f"{text}\n  hint: ask for less, or write allow_missed = true in [accuracy]")
     if missed:
@@ -251,28 +253,28 @@ def conclude(graphs: Sequence[Graph], place: Workplace, outcome: Outcome, plans:
 
 
 def as_in_its_file(scene: Scene) -> bool:
-    """Whether a scene is what its file says, so that its results take their place below results/runs."""
+    """Whether a scene is what its file says, so that its results are shown below results/runs."""
     return scene.path is not None and load_scene(scene.path) == scene
 
 
 def overrides(settings: Sequence[str]) -> dict[str, object]:
     """``KEY=VALUE`` texts as edits of a scene; a value is what TOML reads, else text. InputError for other texts."""
-    found: dict[str, object] = {}
+    changes: dict[str, object] = {}
     for text in settings:
         key, sign, value = text.partition("=")
         if not sign or not key.strip():
             raise InputError(f"--set {text}", "is no KEY=VALUE", "write --set joint.A1.clearance='0.2 mm'")
         try:
-            found[key.strip()] = tomllib.loads(f"value = {value}")["value"]
+            changes[key.strip()] = tomllib.loads(f"value = {value}")["value"]
         except ValueError:  # no TOML, or a number of more digits than Python reads
-            found[key.strip()] = value.strip()
+            changes[key.strip()] = value.strip()
         except RecursionError:
             raise InputError(f"--set {text}", "nests tables or lists too deeply to be read") from None
-    return found
+    return changes
 
 
 def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
-    """The scene called `name` with `settings` changed; its own name then tells them, and so do its results."""
+    """The scene called `name` with `settings` changed; its own name then contains them, and so do its results."""
     scene = load_scene(find_scene(name), overrides(settings))
     if settings:
         scene._name = f"{scene.name},{_edits(settings)}"
@@ -281,13 +283,14 @@ def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
 
 def _edits(settings: Sequence[str]) -> str:
     """What was changed, as part of a folder's name: of what is long the beginning, and a digest of the whole."""
-    told = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # which Windows leaves out
-    return told if len(told.encode()) <= LONGEST_EDITS else f"{told[:40]},{sha256(told.encode())[:16]}"
+    suffix = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # which Windows leaves out
+    return suffix if len(suffix.encode()) <= LONGEST_EDITS else f"{suffix[:40]},{sha256(suffix.encode())[:16]}"
 
 
 def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
-    """Graphs of the scenes, each once, with `settings` (KEY=VALUE) changed; the mistakes of all are told together."""
-    found: dict[Path | str, Graph] = {}
+    """Graphs of the scenes, each once, with `settings` (KEY=VALUE) changed; the mistakes of all are reported
+    together."""
+    by_scene: dict[Path | str, Graph] = {}
     wrong: list[InputError] = []
     for name in names:
         try:
@@ -296,21 +299,21 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
             with in_file(graph.scene.path):
                 graph.up_to("post")
             path = graph.scene.path
-            found[graph.scene.name if path is None or settings else path.resolve()] = graph
+            by_scene[graph.scene.name if path is None or settings else path.resolve()] = graph
         except InputErrors as errors:
             wrong.extend(errors.errors)
         except InputError as error:
             wrong.append(error)
     if wrong:
-        told = [lines.located(error) for error in wrong]
-        raise told[0] if len(told) == 1 else InputErrors(told)
-    owner.refuse_namesakes([graph.scene for graph in found.values()])
-    return list(found.values())
+        messages = [lines.located(error) for error in wrong]
+        raise messages[0] if len(messages) == 1 else InputErrors(messages)
+    owner.refuse_namesakes([graph.scene for graph in by_scene.values()])
+    return list(by_scene.values())
 
 
 @contextmanager
 def in_file(path: Path | None) -> Iterator[None]:
-    """Errors whose place names no file are placed in this one."""
+    """Errors without a file in their location get this one."""
     try:
         yield
     except InputError as error:
@@ -328,7 +331,7 @@ def require_names(scene: Scene) -> None:
 
 
 def recipe_frames(mesh: str) -> list[str] | None:
-    """Names of the frames in a mesh recipe; None where it cannot be read, which is told elsewhere."""
+    """Names of the frames in a mesh recipe; None where it cannot be read, which is reported elsewhere."""
     try:
         frames = read_toml(Path(mesh)).get("frames")
     except InputError:
@@ -336,22 +339,22 @@ def recipe_frames(mesh: str) -> list[str] | None:
     return list(frames) if isinstance(frames, dict) else None
 
 
-def copy_run(graph: Graph, place: Workplace, target: Path) -> None:
+def copy_run(graph: Graph, workplace: Workplace, target: Path) -> None:
     """Write the dataset of the run to a file of the user's, titled, and atomically like any other."""
-    dataset = run(graph.scene, place)
+    dataset = run(graph.scene, workplace)
     with disk_limits(target.parent):
         export.write(dataset, target)
 
 
 def check_target(target: Path, option: str = "--out") -> None:
     """InputError when a file cannot be put there; asked before the work, not after it."""
-    place = f"{option} {target}"
+    where = f"{option} {target}"
     try:
         if not target.parent.is_dir():
-            raise InputError(place, "its folder does not exist", f"mkdir -p {target.parent}")
+            raise InputError(where, "its folder does not exist", f"mkdir -p {target.parent}")
         if target.is_dir():
-            raise InputError(place, "is a folder", "name a file in it")
-        if target.exists() and not target.is_file():  # a new file would take the place of a device
-            raise InputError(place, "is no ordinary file", "name a file, and look at it when it is there")
+            raise InputError(where, "is a folder", "name a file in it")
+        if target.exists() and not target.is_file():  # a new file would replace a device
+            raise InputError(where, "is no ordinary file", "name a file, and look at it when it is there")
     except OSError as error:
-        raise InputError(place, f"can be no file: {error.strerror}", "name another one") from None
+        raise InputError(where, f"can be no file: {error.strerror}", "name another one") from None

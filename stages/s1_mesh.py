@@ -27,10 +27,10 @@ FILES = ("file", "stiffness", "mass", "unknowns")
 
 
 def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """The recipe's content; its name and folder do not matter, nor do its sources, which `sources` tells.
+    """The recipe's content; its name and folder do not matter, nor do its sources, which `sources` returns.
 
     Raises InputError when it cannot be read, or a source is no text.
-    edits: values that take the place of the recipe's; of `elements` a factor, which recipes without them go without.
+    edits: values that replace the recipe's; of `elements` a factor, which recipes without them go without.
     """
     table = read_toml(recipe)
     require_kind(table, recipe, RECIPE)
@@ -45,14 +45,14 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
     return {"recipe": provenance.without(table | changes)}
 
 
-def sources(recipe: Path, place: str = "") -> dict[str, str]:
-    """Where the values of a recipe come from: place of the part or value -> text; InputError for what is no text."""
+def sources(recipe: Path, where: str = "") -> dict[str, str]:
+    """Where the values of a recipe come from: path of the part or value -> text; InputError for what is no text."""
     table = read_toml(recipe)
     wrong = provenance.mistaken(table)
     if wrong is not None:
         problem = "expected text, or a table of texts by key"
         raise InputError(f"{recipe} [{wrong}]", problem, 'write source = "Table 2"')
-    return provenance.told(table, place)
+    return provenance.sources(table, where)
 
 
 def check_size(recipe: Path, limits: Limits, edits: Mapping[str, Any] | None = None) -> None:

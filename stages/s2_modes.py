@@ -19,7 +19,7 @@ CONDITIONS = "flexclear.pipeline.structure.modes.reference"
 
 
 def params(body: FlexibleBody) -> dict[str, Any]:
-    """Which coordinates are kept; nothing else of the body."""
+    """The selected coordinates; nothing else of the body."""
     return body.modes.model_dump(mode="json", exclude={"source"}, exclude_none=True)
 
 
@@ -32,7 +32,7 @@ def modules(body: FlexibleBody, where: str) -> tuple[str, ...]:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The modes (schema MODES) as ``nc``, and their shapes for ParaView as ``vtu``."""
     from flexclear.pipeline.structure.modes import paraview
-    from flexclear.pipeline.structure.modes.select import Wanted
+    from flexclear.pipeline.structure.modes.select import ModeRequest
     from flexclear.pipeline.structure.modes.solution import solve
 
     count = params.get("count")
@@ -40,7 +40,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         inputs["mesh"],
         params["reference"],
         interfaces=params.get("interfaces"),
-        wanted=Wanted(
+        requested=ModeRequest(
             count=None if count == "all" else count,
             up_to=params.get("up_to"),
             compliance=params.get("compliance"),

@@ -1,4 +1,4 @@
-"""Beside stage 3: mesh -> mass, inertia and frames of the body as a rigid one."""
+"""Next to stage 3: mesh -> mass, inertia and frames of the body as a rigid one."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 
 def filled(bodies: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> dict[str, Any]:
-    """The table of bodies with the numbers of those that inputs ``rigid/<body>`` describe in place of their recipes."""
+    """The table of bodies with the numbers of those that inputs ``rigid/<body>`` describe instead of their recipes."""
     from flexclear.pipeline.core.algebra import matrix_to_quaternion
 
     result = dict(bodies)

@@ -1,4 +1,4 @@
-"""Beside stage 4: scene and bundles -> equilibrium in one pose and the natural vibrations about it."""
+"""Next to stage 4: scene and bundles -> equilibrium in one pose and the natural vibrations about it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LEFT_OUT = ("output", "ensemble")
 def params(
     scene: Scene, time: float | None, drives: Mapping[str, float] | None, *, moving: bool, vibrations: bool
 ) -> dict[str, Any]:
-    """The scene as the engine sees it, and where it is looked at."""
+    """The scene as the engine sees it, and where it is examined."""
     common = s4_simulate.params(scene)
     table = {name: part for name, part in common["scene"].items() if name not in LEFT_OUT}
     pose = {"time": time, "drives": dict(drives or {}), "moving": moving, "vibrations": vibrations}

@@ -1,4 +1,4 @@
-"""Beside stage 4: scene and bundles -> sections of its periodic motion."""
+"""Next to stage 4: scene and bundles -> sections of its periodic motion."""
 
 from __future__ import annotations
 

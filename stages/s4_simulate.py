@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
 
-#: limits of a scene that is made again without being told its own: what it asks for was judged when it was read
+#: limits of a scene that is made again without its own: what it asks for was judged when it was read
 JUDGED = {"rows": sys.maxsize, "members": sys.maxsize}
 
 
 def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
-    """What the engine sees of a scene. Titles, views, shapes, limits, sources, and places and names of files are not
+    """What the engine sees of a scene. Titles, views, shapes, limits, sources, and paths of files are not
     part of it, nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run,
     nor whether that may be missed."""
     unseen = ("title", "description", "view", "limits", "accuracy" if ensemble else "ensemble")
@@ -51,7 +51,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is told, and kept."""
+    """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is reported, and
+    kept."""
     from flexclear.pipeline import dynamics
 
     scene, reduced = rebuild(params, inputs), bundles(inputs)
@@ -60,9 +61,9 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     for text in lacks:
         progress(None, text)
     with stopping.until(scene.limits.time, scene.limits.time_words):
-        found = dynamics.simulated(scene, reduced, progress)
-    told = "\n".join(filter(None, [str(found.attrs.get("warnings", "")), *lacks]))
-    return {"nc": found.assign_attrs(warnings=told) if told else found}
+        simulated = dynamics.simulated(scene, reduced, progress)
+    warnings = "\n".join(filter(None, [str(simulated.attrs.get("warnings", "")), *lacks]))
+    return {"nc": simulated.assign_attrs(warnings=warnings) if warnings else simulated}
 
 
 def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[str]:
@@ -71,13 +72,13 @@ def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[
         return []
     from flexclear.pipeline.core.artifacts import deficits
 
-    found = []
+    messages = []
     for body, bundle in reduced.items():
         ends = (end.partition(".") for joint in scene.joint.values() for end in joint.between)
         used = [frame for owner, _, frame in ends if owner == body]
         if used and "compliance_share" in bundle:
-            found += deficits.warnings(bundle, used, body)
-    return found
+            messages += deficits.warnings(bundle, used, body)
+    return messages
 
 
 def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -96,7 +97,7 @@ def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
 
 
 def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None = None) -> Scene:
-    """The scene again, from what `params` kept of it; its title is its name, where that is told.
+    """The scene again, from `params`; its title is its name, where that is reported.
 
     inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
     """
@@ -104,7 +105,7 @@ def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None =
 
     table, name = params["scene"], str(params.get("name", "scene"))
     body = s3_rigid.filled(table["body"], inputs or {})
-    told = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
-    scene = Scene.model_validate({**table, **told})
+    mine = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
+    scene = Scene.model_validate({**table, **mine})
     scene._name = name
     return scene

@@ -1,4 +1,4 @@
-"""Beside stage 4: a variant of a scene -> what is watched of it, over members where it has contacts."""
+"""Next to stage 4: a variant of a scene -> what is watched of it, over members where it has contacts."""
 
 from __future__ import annotations
 
@@ -56,27 +56,27 @@ def _members(scene: Scene, members: int) -> int:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """One point as a dataset; refusals of the solver are in it, since they, too, say what an effect does."""
     from flexclear.pipeline.core.artifacts.points import batch
-    from flexclear.pipeline.core.effect_size import kept
+    from flexclear.pipeline.core.effect_size import recorded
     from flexclear.pipeline.core.scene.requested_accuracy import Quantity
 
     scene = s4_simulate.rebuild(params["simulate"], inputs)
     chosen = [Quantity(*pair) for pair in params["quantities"]]
     progress(None, f"{scene.summary()}")
     point = watch(scene, s4_simulate.bundles(inputs), chosen, params["members"])
-    return {"nc": batch({"point": point}, kept(scene.owners(), chosen))}
+    return {"nc": batch({"point": point}, recorded(scene.owners(), chosen))}
 
 
 def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int) -> Point:
-    """The run of a scene, in this process; `members` as told by the caller, none where there is no contact."""
-    from flexclear.pipeline.core.effect_size import kept, members_apart
+    """The run of a scene, in this process; `members` as given by the caller, none where there is no contact."""
+    from flexclear.pipeline.core.effect_size import recorded, with_members
     from flexclear.pipeline.dynamics.record.point import Runner
 
-    return Runner(bundles, kept(scene.owners(), chosen), _members(scene, members)).run(members_apart(scene))
+    return Runner(bundles, recorded(scene.owners(), chosen), _members(scene, members)).run(with_members(scene))
 
 
 def point(stored: xr.Dataset, scene: Scene, chosen: Sequence[Quantity]) -> Point:
     """The point in an artifact of `run`."""
     from flexclear.pipeline.core.artifacts.points import unpacked
-    from flexclear.pipeline.core.effect_size import kept
+    from flexclear.pipeline.core.effect_size import recorded
 
-    return unpacked(stored, kept(scene.owners(), chosen))["point"]
+    return unpacked(stored, recorded(scene.owners(), chosen))["point"]

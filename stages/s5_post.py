@@ -22,24 +22,24 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, LabelledArrays], progres
     """The post dataset (schema POST), with what the scene says of where its values come from."""
     from flexclear.pipeline.post import derived
 
-    return {"nc": derived(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["told"])}
+    return {"nc": derived(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["attributes"])}
 
 
 def params(scene: Scene) -> dict[str, Any]:
-    """Attributes that no run depends on: `sources` and `assumptions`, place in the scene -> text, as JSON."""
-    return {"told": origins(scene)}
+    """Attributes that no run depends on: `sources` and `assumptions`, path in the scene -> text, as JSON."""
+    return {"attributes": origins(scene)}
 
 
 def origins(scene: Scene) -> dict[str, str]:
     """Where values come from, as attributes of datasets."""
     texts = sources(scene)
-    found = {"sources": texts, "assumptions": assumed(texts)}
-    return {name: json.dumps(by_place, sort_keys=True) for name, by_place in found.items()}
+    origin = {"sources": texts, "assumptions": assumed(texts)}
+    return {name: json.dumps(by_place, sort_keys=True) for name, by_place in origin.items()}
 
 
 def sources(scene: Scene) -> dict[str, str]:
-    """Where values come from, those of mesh recipes included: place -> text."""
-    found = scene.sources()
+    """Where values come from, those of mesh recipes included: path -> text."""
+    by_path = scene.sources()
     for body, recipe in scene.recipes().items():
-        found |= s1_mesh.sources(Path(recipe), f"body.{body}.recipe")
-    return found
+        by_path |= s1_mesh.sources(Path(recipe), f"body.{body}.recipe")
+    return by_path

@@ -1,4 +1,4 @@
-"""Beside stage 5: sections of a periodic motion -> what motion it is, and a figure."""
+"""Next to stage 5: sections of a periodic motion -> what motion it is, and a figure."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
 
-#: what can be shown, as what; kept here, too, because asking the modules that draw takes their import
+#: what can be shown, as what; repeated here, because asking the modules that draw takes their import
 FORMATS: dict[str, tuple[str, ...]] = {
     "motion": ("png", "gif", "mp4", "html", "gltf", "pvd"),
     "modes": ("png", "gif", "mp4", "html", "gltf", "pvd"),
@@ -40,36 +40,36 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
 
     Raises InputError for files of shapes that are not there.
     """
-    found: dict[str, Any] = {"what": what, "format": kind}
+    values: dict[str, Any] = {"what": what, "format": kind}
     if what in ("motion", "vibrations") and kind in ("png", "gif", "mp4"):
-        found["gl"] = gl_state()
+        values["gl"] = gl_state()
     if kind == "html":
-        found["title"] = scene.title
+        values["title"] = scene.title
     if what != "modes":
-        found["bodies"] = _looks(scene)
+        values["bodies"] = _looks(scene)
     if scene.view is not None and what != "modes":
         asked = scene.view.model_dump(mode="json", include=set(SEEN), exclude_none=True)
-        found |= {"view": asked} if asked else {}
+        values |= {"view": asked} if asked else {}
     if (what == "joint" and kind in ("png", "html")) or (what == "motion" and kind in ("gif", "mp4")):
-        found["watched"] = list(dict.fromkeys(quantity.owner for quantity in scene.watched()))
-    return found
+        values["watched"] = list(dict.fromkeys(quantity.owner for quantity in scene.watched()))
+    return values
 
 
 def _looks(scene: Scene) -> dict[str, Any]:
     """Shapes and colours of bodies, where the scene gives some; files by their names, since their content counts."""
-    found = {}
+    looks = {}
     for name, body in scene.body.items():
-        told = body.model_dump(mode="json", include=set(UNSEEN), exclude_none=True)
-        for k, shape in enumerate(told.get("geometry", ())):
+        look = body.model_dump(mode="json", include=set(UNSEEN), exclude_none=True)
+        for k, shape in enumerate(look.get("geometry", ())):
             if shape["type"] == "file" and not is_file(Path(shape["file"])):
                 raise InputError(
                     f"{scene.path or scene.name} [body.{name}.geometry.{k}]",
                     f"there is no file {shape['file']}",
                     "paths are relative to the scene",
                 )
-        if told:
-            found[name] = told
-    return found
+        if look:
+            looks[name] = look
+    return looks
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def params(scene: Scene) -> dict[str, Any]:
-    """What is looked at."""
+    """What is examined."""
     return {"watched": [[quantity.owner, quantity.kind] for quantity in scene.watched()]}
 
 

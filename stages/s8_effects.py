@@ -68,13 +68,13 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     chosen = [Quantity(*pair) for pair in params["quantities"]]
     points = {}
     for k, gone in enumerate(params["variants"]):
-        kept = effect_size.kept(params["owners"][k], chosen)
-        points[frozenset(gone)] = unpacked(inputs[f"variant{k}"], kept)["point"]
+        recorded = effect_size.recorded(params["owners"][k], chosen)
+        points[frozenset(gone)] = unpacked(inputs[f"variant{k}"], recorded)["point"]
     progress(None, "comparing")
-    found = effect_sizes.assemble(effects, chosen, points, params["members"], params["units"])
+    dataset = effect_sizes.assemble(effects, chosen, points, params["members"], params["units"])
     title = f"What each effect does: {params['title']}"
-    result: dict[str, Any] = {"nc": found} | files("effects", effect_sizes.table(found))
-    return result | effect_sizes.chart("effects", found, title)
+    result: dict[str, Any] = {"nc": dataset} | files("effects", effect_sizes.table(dataset))
+    return result | effect_sizes.chart("effects", dataset, title)
 
 
 def page(scene: Scene, words: str, picture: bytes) -> bytes:

@@ -61,11 +61,11 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     chosen = [Quantity(*pair) for pair in params["quantities"]]
 
     def point(name: str, members: int) -> Any:
-        kept = effect_size.kept(params["owners"][name], chosen)
-        return unpacked(inputs[f"{name}:{members}"], kept)["point"]
+        recorded = effect_size.recorded(params["owners"][name], chosen)
+        return unpacked(inputs[f"{name}:{members}"], recorded)["point"]
 
     pairs = {name: matters.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
-    found = matters.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
-    result: dict[str, Any] = {"nc": found} | files("matters", matters.table(found))
-    shown = found.assign_coords(effect=found["words"].values)
+    results = matters.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
+    result: dict[str, Any] = {"nc": results} | files("matters", matters.table(results))
+    shown = results.assign_coords(effect=results["words"].values)
     return result | effect_sizes.chart("matters", shown, f"What each effect does: {params['title']}")

@@ -1,4 +1,4 @@
-"""Beside stage 4: a scene with `[accuracy]` -> which of its effects that calls for."""
+"""Next to stage 4: a scene with `[accuracy]` -> which of its effects that calls for."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def task(scene: Scene) -> Task:
             "simulate": simulate,
             "title": scene.title,
             "elements": counts,
-            "units": {q.name: unit_of(scene, q) for q in scene.wanted()},
+            "units": {q.name: unit_of(scene, q) for q in scene.requested()},
         },
         context={"name": scene.name, "limits": scene.limits.written()},
         inputs=inputs,
@@ -69,9 +69,9 @@ def task(scene: Scene) -> Task:
 
 def elements(scene: Scene) -> dict[str, int]:
     """Numbers of finite elements of flexible bodies whose recipe says one, and which may have twice as many."""
-    found = {body: read_toml(Path(part.mesh)).get("elements") for body, part in scene.flexible().items()}
+    counts = {body: read_toml(Path(part.mesh)).get("elements") for body, part in scene.flexible().items()}
     most = scene.limits.cells // TWICE
-    return {body: n for body, n in found.items() if isinstance(n, int) and n <= most}
+    return {body: n for body, n in counts.items() if isinstance(n, int) and n <= most}
 
 
 def levels(scene: Scene) -> tuple[dict[str, int], ...]:
@@ -108,11 +108,11 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from flexclear.pipeline.post.effect_sizes import chart
     from flexclear.pipeline.post.plotting.table import files
 
-    found = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
+    dataset = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
     progress(None, "chart")
-    wanted = dict(zip(found["quantity"].values.tolist(), found["wanted"].values.tolist(), strict=True))
-    result: dict[str, Any] = {"nc": found} | files("plan", shown.table(found))
-    return result | chart("plan", shown.drawn(found), f"What the accuracy calls for: {params['title']}", wanted)
+    requested = dict(zip(dataset["quantity"].values.tolist(), dataset["wanted"].values.tolist(), strict=True))
+    result: dict[str, Any] = {"nc": dataset} | files("plan", shown.table(dataset))
+    return result | chart("plan", shown.drawn(dataset), f"What the accuracy calls for: {params['title']}", requested)
 
 
 def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> Any:
@@ -135,13 +135,13 @@ def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progres
 
 def less(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
     """Bundles of fewer modes, by level, the fewest first, and body; those that have no fewer are left out."""
-    found: dict[int, dict[str, xr.Dataset]] = {}
+    fewer: dict[int, dict[str, xr.Dataset]] = {}
     for name, data in inputs.items():
         if name.startswith(FEWER):
             level, _, body = name.removeprefix(FEWER).partition("/")
             if data.sizes["mode"] < inputs[f"bundle/{body}"].sizes["mode"]:
-                found.setdefault(int(level), {})[body] = data
-    return [found[level] for level in sorted(found)]
+                fewer.setdefault(int(level), {})[body] = data
+    return [fewer[level] for level in sorted(fewer)]
 
 
 def _meshed(simulate: Mapping[str, Any], name: str) -> bool:
@@ -149,7 +149,7 @@ def _meshed(simulate: Mapping[str, Any], name: str) -> bool:
     return bool(simulate["scene"]["body"][name.removeprefix(s3_rigid.PREFIX)]["type"] == "rigid")
 
 
-def from_dataset(found: xr.Dataset) -> dict[str, Any]:
+def from_dataset(planned: xr.Dataset) -> dict[str, Any]:
     """What of a plan makes its scene: names of effects that go, modes, integrator and tolerance."""
-    told: dict[str, Any] = json.loads(found.attrs["planned"])
-    return told
+    choice: dict[str, Any] = json.loads(planned.attrs["planned"])
+    return choice

@@ -20,9 +20,9 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     from flexclear.pipeline.post import stability
 
-    found = stability.checks(inputs["run"], inputs.get("study"))
-    columns = {name: ("check", [str(getattr(c, name)) for c in found]) for name in ("value", "limit", "verdict")}
-    columns["remedy"] = ("check", [c.advice for c in found])
-    attributes = {"Conventions": "CF-1.11", "answer": stability.answer(inputs["run"], found)}
-    data = xr.Dataset(columns, {"check": [c.name for c in found]}, attributes)
+    result = stability.checks(inputs["run"], inputs.get("study"))
+    columns = {name: ("check", [str(getattr(c, name)) for c in result]) for name in ("value", "limit", "verdict")}
+    columns["remedy"] = ("check", [c.advice for c in result])
+    attributes = {"Conventions": "CF-1.11", "answer": stability.answer(inputs["run"], result)}
+    data = xr.Dataset(columns, {"check": [c.name for c in result]}, attributes)
     return {"nc": data} | stability.figure(inputs["run"])

@@ -11,7 +11,7 @@ from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.stages import as_json, limit, run
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check, said_arguments, workplace
+from flexclear.stages.workplace import Workplace, check, open_workplace, said_arguments
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
 
 #: options and the keys of `[sections]` that they replace
-COUNTS = {"periods": "periods that are kept", "transient": "periods before them that are not"}
+COUNTS = {"periods": "recorded periods", "transient": "periods before them that are not"}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -39,21 +39,23 @@ def command(options: argparse.Namespace) -> None:
     asked = {name: getattr(options, name) for name in (*COUNTS, "period") if getattr(options, name) is not None}
     if options.page is not None:
         run.check_target(options.page, "--page")
-    place = workplace(options)
+    workplace = open_workplace(options)
     scenes = [with_sections(graph.scene, asked) for graph in run.graphs(options.scenes)]
     tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
-    outcome = place.bring([graph.verdict for graph in tasks.values()])
+    outcome = workplace.bring([graph.verdict for graph in tasks.values()])
     check(outcome)
-    kept = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
+    records = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
     judged = {name: outcome.records[id(graph.verdict)] for name, graph in tasks.items()}
-    verdicts = {name: place.store.load(record) for name, record in judged.items()}
+    verdicts = {name: workplace.store.load(record) for name, record in judged.items()}
     print(as_json.as_json(verdicts) if options.json else "\n\n".join(text(*judged) for judged in verdicts.items()))
     if options.page is not None:
         pictures = {
-            name: place.store.path(record.stage, record.key, "sections.png").read_bytes()
+            name: workplace.store.path(record.stage, record.key, "sections.png").read_bytes()
             for name, record in judged.items()
         }
-        write_page(verdicts, {name: place.store.load(record) for name, record in kept.items()}, pictures, options.page)
+        write_page(
+            verdicts, {name: workplace.store.load(record) for name, record in records.items()}, pictures, options.page
+        )
 
 
 def with_sections(scene: Scene, asked: Mapping[str, object]) -> Scene:
@@ -65,7 +67,7 @@ def with_sections(scene: Scene, asked: Mapping[str, object]) -> Scene:
 def write_page(
     verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Dataset], pictures: Mapping[str, bytes], page: Path
 ) -> None:
-    """The verdicts as a page, with the figures (PNG) and a table (CSV) in a folder of its name beside it."""
+    """The verdicts as a page, with the figures (PNG) and a table (CSV) in a folder of its name next to it."""
     from flexclear.pipeline.post.verdict_page import csv_text, markdown
 
     folder = page.parent / page.stem
@@ -77,15 +79,15 @@ def write_page(
         publish(page, markdown(verdicts, sections, page.as_posix(), page.stem).encode())
 
 
-def judge(scene: Scene, place: Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:
+def judge(scene: Scene, workplace: Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:
     """Sections (schema SECTIONS) and verdict (schema VERDICT) of a scene, brought up to date as `run` is."""
-    place = place or workplace()
+    workplace = workplace or open_workplace()
     graph = Graph(scene, shown=run.as_in_its_file(scene))
-    outcome = place.bring([graph.sections, graph.verdict], jobs=1)
+    outcome = workplace.bring([graph.sections, graph.verdict], jobs=1)
     check(outcome)
-    made = [place.store.load(outcome.records[id(task)]) for task in (graph.sections, graph.verdict)]
-    kept, judged = (data.assign_attrs(title=scene.title, scene=scene.name) for data in made)
-    return kept, judged
+    made = [workplace.store.load(outcome.records[id(task)]) for task in (graph.sections, graph.verdict)]
+    sections, judged = (data.assign_attrs(title=scene.title, scene=scene.name) for data in made)
+    return sections, judged
 
 
 def text(scene: str, verdict: xr.Dataset) -> str:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from flexclear.pipeline.core.errors import InputError, ResourceError
 from flexclear.pipeline.core.scene import lines
 from flexclear.stages import run, s1_mesh, s3_rigid, s6_render
-from flexclear.stages.workplace import near
+from flexclear.stages.workplace import relative
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,7 +48,7 @@ def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> I
         seen, refused = viewed(scene)
     files = files_of(scene, seen, Path.cwd() if folder is None else folder, quiet=quiet)
     if not quiet:
-        print(f"{scene.summary()}: {', '.join(near(file) for file in files)}")
+        print(f"{scene.summary()}: {', '.join(relative(file) for file in files)}")
     for gap in seen.gaps:
         print(f"flexclear: joint {gap.joint} does not fit at the start: {gap.said}", file=sys.stderr)
     if refused is not None and scene.path is not None and refused.place.startswith("["):

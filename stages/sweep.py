@@ -1,4 +1,4 @@
-"""``flexclear sweep``: many points of one scene, each kept as soon as it is done."""
+"""``flexclear sweep``: many points of one scene, each stored as soon as it is done."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
 from flexclear.stages import export, limit, run, sweep_large, sweep_plan
 from flexclear.stages.sweep_engine import Engine, Job, engine, now
-from flexclear.stages.workplace import Workplace, near, said_arguments, workplace
+from flexclear.stages.workplace import Workplace, open_workplace, relative, said_arguments
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 NAME = "sweep"
 #: what a sweep without a file is called
 UNNAMED = "sweep"
-#: finished points are stored after so many seconds, later after that share of the time so far
-OFTEN, SHARE = 2.0, 0.01
+#: finished points are stored after so many seconds, later after that fraction of the time so far
+OFTEN, FRACTION = 2.0, 0.01
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -61,15 +61,15 @@ def command(options: argparse.Namespace) -> None:
         else:
             export.check_format(options.out, (".nc", sweep_large.SUFFIX))
             run.check_target(options.out)
-    place = workplace(options)
+    workplace = open_workplace(options)
     paths = [run.find_scene(name) for name in options.sweeps]
-    wanted = [sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path)]]
-    if options.out is not None and options.out.suffix != sweep_large.SUFFIX and sweep_large.is_large(wanted[0]):
+    requested = [sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path)]]
+    if options.out is not None and options.out.suffix != sweep_large.SUFFIX and sweep_large.is_large(requested[0]):
         raise InputError(f"--out {options.out}", "the dataset is larger than memory", "let its name end in .zarr")
-    with engine(width(options.workers), options.scheduler) as workers, place.limited():
-        for path, plan in zip(paths, wanted, strict=True):
-            folder = place.store.root / "sweeps" / scene_name(path).removeprefix("sweeps/")
-            _show(plan, bring(plan, workers, place, folder), folder, options.out)
+    with engine(width(options.workers), options.scheduler) as workers, workplace.limited():
+        for path, plan in zip(paths, requested, strict=True):
+            folder = workplace.store.root / "sweeps" / scene_name(path).removeprefix("sweeps/")
+            _show(plan, bring(plan, workers, workplace, folder), folder, options.out)
 
 
 def width(asked: int | None) -> int:
@@ -80,14 +80,14 @@ def width(asked: int | None) -> int:
 
 
 def read(path: Path) -> tuple[Sweep, Scene]:
-    """A sweep file and its scene, which is looked for beside the file, then below scenes/."""
+    """A sweep file and its scene, which is searched for next to the file, then below scenes/."""
     sweep = load_sweep(path)
-    beside = path.parent / sweep.scene
+    own_path = path.parent / sweep.scene
     try:
-        found = beside if is_file(beside) else run.find_scene(sweep.scene)
+        scene_path = own_path if is_file(own_path) else run.find_scene(sweep.scene)
     except InputError as error:
         raise InputError(f"{path} [scene]", f"'{sweep.scene}' {error.problem}", error.remedy) from None
-    return sweep, load_scene(found)
+    return sweep, load_scene(scene_path)
 
 
 def of_scene(
@@ -97,16 +97,16 @@ def of_scene(
     from flexclear.pipeline.core.scene.sweep import read_sweep
 
     plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, UNNAMED), scene, UNNAMED)
-    with engine(width(workers), scheduler) as found:
-        return bring(plan, found, workplace())
+    with engine(width(workers), scheduler) as runner:
+        return bring(plan, runner, open_workplace())
 
 
 @dataclass
 class _Desk:
-    """Where finished points arrive: they are stored now and then, and told."""
+    """Where finished points arrive: they are stored now and then, and reported."""
 
     plan: sweep_plan.Plan
-    place: Workplace
+    workplace: Workplace
     total: int
     done: dict[str, Point]
     waiting: list[tuple[Job, Point]] = field(default_factory=list)
@@ -126,11 +126,11 @@ class _Desk:
         self.fresh += len(finished)
         self.refused += sum(bool(point.refused) for _, point in finished)
         since = now() - self.begun
-        if now() - self.stored > max(OFTEN, SHARE * since):
+        if now() - self.stored > max(OFTEN, FRACTION * since):
             self.store()
-        told = f", {self.refused} refused" if self.refused else ""
+        text = f", {self.refused} refused" if self.refused else ""
         rate = self.fresh / since if since > 0.0 else 0.0
-        tell(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{told}, {rate:.3g}/s")
+        tell(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{text}, {rate:.3g}/s")
 
     def store(self) -> None:
         """Put what waits into the cache, family by family."""
@@ -138,11 +138,11 @@ class _Desk:
         for family in self.plan.families:
             mine = {job.key: point for job, point in self.waiting if job.family == family.key}
             if mine:
-                family.keep(mine, self.place.store, self.plan.kept)
+                family.keep(mine, self.workplace.store, self.plan.recorded)
         self.waiting = []
 
 
-def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path | None = None) -> xr.Dataset:
+def bring(plan: sweep_plan.Plan, workers: Engine, workplace: Workplace, folder: Path | None = None) -> xr.Dataset:
     """The dataset of a sweep, brought up to date point by point.
 
     folder: where dataset and figures are shown; on Ctrl-C it is left there with the points that are finished. A dataset
@@ -152,27 +152,31 @@ def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path
     large = folder is not None and sweep_large.is_large(plan)
     if folder is None:
         sweep_large.require_small(plan)
-    ready = sweep_plan.prepare(plan, place)
+    ready = sweep_plan.prepare(plan, workplace)
     with ExitStack() as locks:
         for family in ready.families:
             locks.enter_context(
-                place.store.lock(*family.folder, lambda: place.monitor.say("waiting for another sweep"))
+                workplace.store.lock(*family.folder, lambda: workplace.monitor.say("waiting for another sweep"))
             )
         if folder is not None:
-            shown = str(folder.relative_to(place.store.root))
-            place.store.show_families(shown, {family.folder[0]: family.facts for family in ready.families})
-        kept = () if large else plan.kept
-        found = {key: point for family in ready.families for key, point in family.find(place.store, kept).items()}
-        wanted = {job.key: job for job in ready.jobs}
-        desk = _Desk(ready, place, len(wanted), {key: found[key] for key in wanted if key in found}, large=large)
-        missing = [job for key, job in wanted.items() if key not in desk.done]
+            shown = str(folder.relative_to(workplace.store.root))
+            workplace.store.show_families(shown, {family.folder[0]: family.facts for family in ready.families})
+        recorded = () if large else plan.recorded
+        points = {
+            key: point for family in ready.families for key, point in family.find(workplace.store, recorded).items()
+        }
+        requested = {job.key: job for job in ready.jobs}
+        desk = _Desk(
+            ready, workplace, len(requested), {key: points[key] for key in requested if key in points}, large=large
+        )
+        missing = [job for key, job in requested.items() if key not in desk.done]
         try:
             if missing:
                 _run(desk, workers, missing)
         finally:
             desk.store()
             if folder is not None and large:
-                result = sweep_large.written(ready, place.store, desk.done, folder / f"{NAME}{sweep_large.SUFFIX}")
+                result = sweep_large.written(ready, workplace.store, desk.done, folder / f"{NAME}{sweep_large.SUFFIX}")
                 (folder / f"{NAME}.nc").unlink(missing_ok=True)
             else:
                 result = ready.dataset(desk.done)
@@ -182,7 +186,7 @@ def bring(plan: sweep_plan.Plan, workers: Engine, place: Workplace, folder: Path
 
 
 def _run(desk: _Desk, workers: Engine, missing: list[Job]) -> None:
-    monitor = desk.place.monitor
+    monitor = desk.workplace.monitor
     monitor.start(1)
     sweep, scene = desk.plan.sweep, desk.plan.scene
     name = monitor.begin(scene.name if sweep.name == UNNAMED else sweep.name, "sweep")
@@ -204,7 +208,7 @@ def _publish(result: xr.Dataset, folder: Path) -> None:
 
 
 def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | None) -> None:
-    """Figures beside the dataset, and a summary on the screen."""
+    """Figures next to the dataset, and a summary on the screen."""
     from flexclear.pipeline.core.artifacts.store import publish
     from flexclear.pipeline.post.sweep import figures
 
@@ -230,7 +234,7 @@ def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | N
 def summary(plan: sweep_plan.Plan, result: xr.Dataset, file: Path) -> Iterator[str]:
     """Points, refusals by their reason, and where the dataset is."""
     refused = [str(reason) for reason in result["reason"].values.ravel() if reason]
-    shown = [near(path) for path in (file, file.with_suffix(".png")) if path.exists()]
+    shown = [relative(path) for path in (file, file.with_suffix(".png")) if path.exists()]
     yield f"{plan.sweep.name}: {result['status'].size} points, {len(refused)} refused; {', '.join(shown)}"
     kinds: dict[str, list[str]] = {}
     for reason in refused:

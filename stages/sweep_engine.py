@@ -19,13 +19,14 @@ from flexclear.pipeline.core.workflow.schedule import TICK
 from flexclear.stages.sweep_points import source_digest, work
 
 #: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
-SHARE, MOST, QUEUED = 0.5, 1000, 2
-#: towards the end less is handed out, a share of what is left, so that all workers finish together; least seconds of it
+BATCH_SECONDS, MOST, QUEUED = 0.5, 1000, 2
+#: towards the end less is handed out, a fraction of what is left, so that all workers finish together; least seconds of
+#: it
 LEAST = 0.02
-#: evaluations of a point from which on it is run beside others, and of all that wait, for which code is made
+#: evaluations of a point from which on it is run together with others, and of all that wait, for which code is made
 WORTH, WORTH_CODE = 5_000, 5_000_000
 #: so many, where each worker has as many, and seconds of work of several times as many: fewer wait for their last ones
-ABREAST, SHARE_ABREAST = 8, 5.0
+ABREAST, BATCH_SECONDS_TOGETHER = 8, 5.0
 #: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
 PER_WORKER = 5e-3
 #: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
@@ -40,7 +41,7 @@ LOSSES = 3
 
 @dataclass(frozen=True)
 class Job:
-    """A point to be run. family: its key; point: place of the scene -> value; journal: where it keeps its work."""
+    """A point to be run. family: its key; point: path in the scene -> value; journal: where it keeps its work."""
 
     key: str
     family: str
@@ -67,7 +68,7 @@ class Engine:
     renew: Callable[[], None] = lambda: None
 
     def run(self, jobs: Sequence[Job], families: dict[str, bytes], done: Done) -> None:
-        """Run points; `done` is told finished ones and their processor time [s], in any order of the batches.
+        """Run points; `done` receives finished ones and their processor time [s], in any order of the batches.
 
         families: what `stages.sweep_points.work` is given of each.  Raises ResourceError when workers keep dying,
         StoppedError when all is to stop.
@@ -96,15 +97,15 @@ class Engine:
                     running.clear()
                     lost += 1
                     if lost > LOSSES:
-                        told = f"worker processes were killed {lost} times in a row; is the memory full?"
-                        raise ResourceError(told) from None
+                        text = f"worker processes were killed {lost} times in a row; is the memory full?"
+                        raise ResourceError(text) from None
                     waiting += [list(reversed(batch)) for batch in again]
                     self.renew()
                     break
                 done(list(zip(mine, points, strict=True)), seconds)
                 evaluations = sum(point.evaluations for point in points) / len(points)
                 first, lost = not pace, 0  # what the first one took held compiling and fetching
-                pace = max(1e-6, seconds / len(mine)) if not first else SHARE / 2.0
+                pace = max(1e-6, seconds / len(mine)) if not first else BATCH_SECONDS / 2.0
 
     def _given(
         self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool, abreast: bool
@@ -121,10 +122,10 @@ class Engine:
 
 def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
     """Jobs in stretches of one family, the next one last."""
-    found: dict[str, list[Job]] = {}
+    families: dict[str, list[Job]] = {}
     for job in jobs:
-        found.setdefault(job.family, []).append(job)
-    return [list(reversed(mine)) for mine in reversed(found.values())]
+        families.setdefault(job.family, []).append(job)
+    return [list(reversed(mine)) for mine in reversed(families.values())]
 
 
 def _portion(left: int, pace: float, width: int, abreast: bool) -> int:
@@ -133,8 +134,8 @@ def _portion(left: int, pace: float, width: int, abreast: bool) -> int:
     abreast: whether they are run side by side; of few, most would wait for the last one.
     """
     asking = PER_WORKER * width
-    share = SHARE_ABREAST if abreast else SHARE
-    seconds = min(max(share, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
+    seconds_of_work = BATCH_SECONDS_TOGETHER if abreast else BATCH_SECONDS
+    seconds = min(max(seconds_of_work, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
     if abreast and left < ABREAST * width:  # the last ones
         return max(ABREAST // 2, ceil(left / width))
     if abreast:
@@ -154,8 +155,8 @@ def _take(waiting: list[list[Job]], count: int) -> list[Job]:
 def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
     """The engine of a sweep: a Dask cluster at an address, that many processes here, or this one."""
     if scheduler is not None:
-        with _cluster(scheduler) as found:
-            yield found
+        with _cluster(scheduler) as runner:
+            yield runner
         return
     if width == 1:
         yield Engine(_here, lambda: 1)
@@ -188,34 +189,34 @@ def _here(*given: Any) -> Future[Any]:
 @contextmanager
 def _cluster(address: str) -> Iterator[Engine]:
     """The workers of a Dask scheduler; InputError when there are none, or they run other sources."""
-    place = f"--scheduler {address}"
+    where = f"--scheduler {address}"
     try:
         from distributed import Client, KilledWorker
         from distributed.client import FutureCancelledError
     except ImportError:
-        raise InputError(place, "dask.distributed is not installed", "pip install 'flexclear[cluster]'") from None
+        raise InputError(where, "dask.distributed is not installed", "pip install 'flexclear[cluster]'") from None
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
-            place, f"no scheduler answers there ({type(error).__name__})", "start one with `dask scheduler`"
+            where, f"no scheduler answers there ({type(error).__name__})", "start one with `dask scheduler`"
         ) from None
     try:
-        yield _on_cluster(client, place)
+        yield _on_cluster(client, where)
     except KilledWorker as error:
-        told = f"{place}: workers died again and again over a task ({error}); is their memory full?"
-        raise ResourceError(told) from None
+        text = f"{where}: workers died again and again over a task ({error}); is their memory full?"
+        raise ResourceError(text) from None
     except (CancelledError, FutureCancelledError):
-        raise ResourceError(f"{place}: the scheduler has gone; what was finished is kept") from None
+        raise ResourceError(f"{where}: the scheduler has gone; finished results are stored") from None
     except ImportError as error:  # of a worker that has joined since
-        raise InputError(place, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
+        raise InputError(where, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
     finally:
         client.close()
 
 
-def _on_cluster(client: Any, place: str) -> Engine:
+def _on_cluster(client: Any, where: str) -> Engine:
     """The engine of a cluster; points that are lost with a worker are run by another one, as its scheduler sees to."""
-    executor, seen = client.get_executor(), [now(), _threads(client, place)]
+    executor, seen = client.get_executor(), [now(), _threads(client, where)]
     held: dict[str, Any] = {}
 
     def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
@@ -234,18 +235,18 @@ def _on_cluster(client: Any, place: str) -> Engine:
     return Engine(submit, width, here=False)
 
 
-def _threads(client: Any, place: str) -> int:
+def _threads(client: Any, where: str) -> int:
     """Tasks that the workers run at a time; InputError where there are none, or they run other sources."""
     threads = sum(client.nthreads().values())
     if not threads:
-        raise InputError(place, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
-    found = client.run(source_digest, on_error="return")
-    for worker, digest in found.items():
+        raise InputError(where, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
+    digests = client.run(source_digest, on_error="return")
+    for worker, digest in digests.items():
         if isinstance(digest, Exception):
-            raise InputError(place, f"worker {worker} cannot import flexclear: {digest}", "install it where it runs")
-    others = [worker for worker, digest in found.items() if digest != source_digest()]
+            raise InputError(where, f"worker {worker} cannot import flexclear: {digest}", "install it where it runs")
+    others = [worker for worker, digest in digests.items() if digest != source_digest()]
     if others:
-        raise InputError(place, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")
+        raise InputError(where, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")
     return int(threads)
 
 

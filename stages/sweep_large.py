@@ -27,15 +27,15 @@ if TYPE_CHECKING:
 SUFFIX = ".zarr"
 #: a dataset in one file is in memory so many times: points, arrays, the bytes of the file, and what is read back
 HELD = 4.0
-#: bytes of a slab; batches of points that are kept while slabs are put together
+#: bytes of a slab; batches of points in memory while slabs are put together
 SLAB, BATCHES = 1 << 26, 8
 INSTALL = "pip install 'flexclear[zarr]'"
 
 
-def require_zarr(place: str) -> None:
+def require_zarr(where: str) -> None:
     """InputError where the form cannot be written."""
     if find_spec("zarr") is None:
-        raise InputError(place, "Zarr is not installed", INSTALL)
+        raise InputError(where, "Zarr is not installed", INSTALL)
 
 
 def is_large(plan: Plan) -> bool:
@@ -43,7 +43,7 @@ def is_large(plan: Plan) -> bool:
 
     Raises ResourceError where it cannot be written in slabs either.
     """
-    allowed = plan.scene.limits.memory or machine.SHARE * machine.memory()
+    allowed = plan.scene.limits.memory or machine.FRACTION * machine.memory()
     need = HELD * plan_size(plan)
     if need > allowed and find_spec("zarr") is None:
         machine.require_memory(need, "the sweep's dataset", f"keep less, or {INSTALL}: it is then on disk", allowed)
@@ -57,9 +57,9 @@ def require_small(plan: Plan) -> None:
 
 
 def plan_size(plan: Plan) -> float:
-    """Bytes of all that is kept."""
+    """Bytes of all recorded values."""
     lengths = dimensions(plan.time, plan.sections)
-    each = sum(prod(lengths[dim] for dim in one.dims) for one in plan.kept) * len(plan.shares)
+    each = sum(prod(lengths[dim] for dim in one.dims) for one in plan.recorded) * len(plan.statistics)
     return 8.0 * each * prod(plan.design.shape)
 
 
@@ -95,7 +95,7 @@ def written(plan: Plan, store: Store, done: Mapping[str, Point], path: Path) -> 
 
 def _slabs(plan: Plan, store: Store, done: Mapping[str, Point]) -> Iterator[xr.Dataset]:
     places = dict(_places(plan, store))
-    opened = lru_cache(BATCHES)(lambda k: unpacked(store.load(records[k]), plan.kept))
+    opened = lru_cache(BATCHES)(lambda k: unpacked(store.load(records[k]), plan.recorded))
     records = {record.key: record for record in places.values()}
     complete = int(all(job.key in done for job in plan.jobs))
     count = plan.design.shape[0]
@@ -113,12 +113,12 @@ def _places(plan: Plan, store: Store) -> Iterator[tuple[str, Record]]:
             yield from ((str(key), record) for key in batch["key"].values)
 
 
-def write_copy(path: Path, found: xr.Dataset) -> None:
+def write_copy(path: Path, dataset: xr.Dataset) -> None:
     """A dataset, in memory or lazily opened, in Zarr's form."""
-    along = str(found["status"].dims[0])
-    count = found.sizes[along]
-    rows = ceil(count / max(1, ceil(found.nbytes / SLAB)))
-    write(path, (found.isel({along: slice(k, k + rows)}).load() for k in range(0, count, rows)), along)
+    along = str(dataset["status"].dims[0])
+    count = dataset.sizes[along]
+    rows = ceil(count / max(1, ceil(dataset.nbytes / SLAB)))
+    write(path, (dataset.isel({along: slice(k, k + rows)}).load() for k in range(0, count, rows)), along)
 
 
 def stripped(point: Point) -> Point:

@@ -1,4 +1,4 @@
-"""What a sweep comes to: its points checked, told apart by the flexible bodies they need, and named by content."""
+"""What a sweep comes to: its points checked, distinguished by the flexible bodies they need, and named by content."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.limits import check_members
 from flexclear.pipeline.core.scene.load import edited, with_numbers
-from flexclear.pipeline.core.scene.output_quantities import Kept, parse_kept
+from flexclear.pipeline.core.scene.output_quantities import Recorded, parse_recorded
 from flexclear.pipeline.core.scene.schema import Sections
 from flexclear.pipeline.core.workflow.task import Task, facts, key
 from flexclear.pipeline.core.workflow.workers import without_main
@@ -37,11 +37,11 @@ if TYPE_CHECKING:
 
 #: numeric values of a parameter that are all checked beforehand; of more, the least and the largest
 CHECKED = 200
-#: what a place of the scene decides that cannot be in one series
+#: what a path in the scene decides that cannot be in one series
 TIMES = ("time.start", "time.end", "output.interval")
 #: and what decides how many sections there are
 COUNTS = ("sections.periods",)
-#: stands for what is varied in the facts of a family
+#: represents what is varied in the facts of a family
 VARIED = "varied"
 
 
@@ -62,21 +62,21 @@ class Family:
         """Stage of its batches in the store, and a name there that no batch has."""
         return f"sweep/{self.key}", FAMILY
 
-    def keep(self, points: Mapping[str, Point], store: Store, kept: Sequence[Kept]) -> None:
+    def keep(self, points: Mapping[str, Point], store: Store, recorded: Sequence[Recorded]) -> None:
         """Store finished points as one artifact."""
         from flexclear.pipeline.core.artifacts.points import batch
 
         name = hashlib.sha256("".join(sorted(points)).encode()).hexdigest()[:32]
-        store.put(self.folder[0], name, {"nc": batch(points, kept)}, self.facts)
+        store.put(self.folder[0], name, {"nc": batch(points, recorded)}, self.facts)
 
-    def find(self, store: Store, kept: Sequence[Kept]) -> dict[str, Point]:
-        """All points of the family that are stored and sound, with their values of what is `kept`."""
+    def find(self, store: Store, recorded: Sequence[Recorded]) -> dict[str, Point]:
+        """All points of the family that are stored and sound, with their values of the `recorded` quantities."""
         from flexclear.pipeline.core.artifacts.points import unpacked
 
-        found: dict[str, Point] = {}
+        points: dict[str, Point] = {}
         for _, batch in self.batches(store):
-            found |= unpacked(batch, kept)
-        return found
+            points |= unpacked(batch, recorded)
+        return points
 
     def batches(self, store: Store) -> Iterator[tuple[Record, xr.Dataset]]:
         """What `keep` has stored, as far as it is sound."""
@@ -88,7 +88,7 @@ class Family:
 
 @dataclass(frozen=True)
 class Plan:
-    """A sweep whose places, values and quantities are known to fit its scene.
+    """A sweep whose paths, values and quantities are known to fit its scene.
 
     scene: with what is set, at the first point.  turning: names of the quantities that are about an axis, not along.
     families, jobs: once the flexible bodies are there; see `prepare`.
@@ -97,7 +97,7 @@ class Plan:
     sweep: Sweep
     scene: Scene
     design: Design
-    kept: tuple[Kept, ...]
+    recorded: tuple[Recorded, ...]
     turning: frozenset[str]
     families: tuple[Family, ...] = ()
     jobs: tuple[Job, ...] = ()
@@ -112,7 +112,15 @@ class Plan:
         attributes |= {"members": self.sweep.members} if self.sweep.members else {}
         keys = [job.key for job in self.jobs]
         return results.dataset(
-            self.design, self.kept, keys, points, self.time, self.sections, self.turning, attributes, self.shares
+            self.design,
+            self.recorded,
+            keys,
+            points,
+            self.time,
+            self.sections,
+            self.turning,
+            attributes,
+            self.statistics,
         )
 
     def rows(self, first: int, last: int) -> Plan:
@@ -124,27 +132,27 @@ class Plan:
 
     @property
     def time(self) -> np.ndarray:
-        """Of the series that are kept [s]."""
+        """Of the recorded series [s]."""
         from flexclear.pipeline.core.quantities import regular_times
 
         return regular_times(self.scene.time, self.scene.output)
 
     @property
     def sections(self) -> int:
-        """How many there are of each point, where they are kept."""
+        """How many there are of each point, where they are recorded."""
         return (self.scene.sections or Sections()).periods
 
     @property
-    def shares(self) -> list[str]:
+    def statistics(self) -> list[str]:
         """Of `points.SHARES`, those that are asked for."""
         asked = {"values": True, "error": self.sweep.error, "deviation": self.sweep.members}
-        return [share for share, wanted in asked.items() if wanted]
+        return [statistic for statistic, requested in asked.items() if requested]
 
 
 def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     """The plan of a sweep, all of it checked before anything is run.
 
-    where: the sweep's file, for messages.  Raises InputError for places that the scene does not have, values that it
+    where: the sweep's file, for messages.  Raises InputError for paths that the scene does not have, values that it
     refuses, and quantities that nothing of it has.
     """
     try:
@@ -155,20 +163,20 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     made = design(sweep)
     _check_values(base, made, where)
     base = edited(base, made.points()[0])
-    kept = tuple(_kept(base, name, where) for name in sweep.keep)
-    _check_kept(sweep, base, made, kept, where)
-    return Plan(sweep, base, made, kept, _turning(base, made, kept, where))
+    recorded = tuple(_kept(base, name, where) for name in sweep.keep)
+    _check_recorded(sweep, base, made, recorded, where)
+    return Plan(sweep, base, made, recorded, _turning(base, made, recorded, where))
 
 
-def _placed(place: str, error: InputError) -> InputError:
+def _placed(where: str, error: InputError) -> InputError:
     problem, remedy = getattr(error, "problem", str(error)), getattr(error, "remedy", None)
-    return InputError(place, problem, remedy)
+    return InputError(where, problem, remedy)
 
 
 def _check_values(base: Scene, made: Design, where: str) -> None:
-    """InputError for a value that the scene does not take; of many points of a sample the extreme ones are looked at.
+    """InputError for a value that the scene does not take; of many points of a sample the extreme ones are examined.
 
-    In a grid each value stands beside the first ones of the others: what some combinations mean for the mechanism is
+    In a grid each value is next to the first ones of the others: what some combinations mean for the mechanism is
     found when they are run.
     """
     points = made.points()
@@ -203,17 +211,17 @@ def _looked_at(axis: Axis) -> Sequence[int]:
     return by_size[0], by_size[-1]
 
 
-def _kept(base: Scene, name: str, where: str) -> Kept:
+def _kept(base: Scene, name: str, where: str) -> Recorded:
     try:
-        return parse_kept(name, base.owners())
+        return parse_recorded(name, base.owners())
     except ValueError as error:
         raise InputError(f"{where} [keep]", str(error)) from None
 
 
-def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], where: str) -> None:
-    varied = {place for axis in made.axes for place in axis.places}
+def _check_recorded(sweep: Sweep, base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> None:
+    varied = {path for axis in made.axes for path in axis.places}
     timed = sorted(varied & set(TIMES))
-    for one in kept:
+    for one in recorded:
         if one.reduction == "series" and timed:
             raise InputError(
                 f"{where} [keep]",
@@ -226,7 +234,7 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
             raise InputError(
                 f"{where} [keep]", f"'{one.quantity.owner}' leads a frame along a path and has no single force"
             )
-    sections = [one.reduction == "sections" for one in kept]
+    sections = [one.reduction == "sections" for one in recorded]
     if any(sections) and not (all(sections) and not sweep.members and not sweep.error):
         raise InputError(
             f"{where} [keep]",
@@ -238,7 +246,7 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
         raise InputError(
             f"{where} [members]", "members differ by a ball's offset, but the scene has no clearance joint", "remove it"
         )
-    if sweep.members and any(one.quantity.kind == "orientation" for one in kept):
+    if sweep.members and any(one.quantity.kind == "orientation" for one in recorded):
         raise InputError(f"{where} [keep]", "orientations have no mean over members", "keep a position instead")
     if sweep.error and base.solver.step is not None:
         raise InputError(
@@ -246,20 +254,20 @@ def _check_kept(sweep: Sweep, base: Scene, made: Design, kept: Sequence[Kept], w
         )
 
 
-def _turning(base: Scene, made: Design, kept: Sequence[Kept], where: str) -> frozenset[str]:
+def _turning(base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> frozenset[str]:
     """Names of the quantities that are about an axis; InputError for one that is so at some of the points only."""
     from flexclear.pipeline.dynamics.model.driving import turns
 
-    found = frozenset(one.quantity.name for one in kept if turns(base, one.quantity))
+    turning = frozenset(one.quantity.name for one in recorded if turns(base, one.quantity))
     for axis, scene in _worded(base, made):
-        for one in kept:
-            if turns(scene, one.quantity) != (one.quantity.name in found):
+        for one in recorded:
+            if turns(scene, one.quantity) != (one.quantity.name in turning):
                 raise InputError(
                     f"{where} [vary.{axis.name}]",
                     f"'{one.name}' is a force at some points and a torque at others",
                     "make two sweeps of it",
                 )
-    return found
+    return turning
 
 
 def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
@@ -272,19 +280,19 @@ def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
             yield axis, edited(base, chosen)
 
 
-def prepare(wanted: Plan, place: Workplace) -> Plan:
+def prepare(requested: Plan, workplace: Workplace) -> Plan:
     """The plan with its families, whose flexible bodies are brought up to date first, and its points by key."""
-    points = wanted.design.points()
-    groups = _groups(wanted.scene, points)
-    graphs = {text: Graph(edited(wanted.scene, first), shown=False) for text, first in groups.items()}
+    points = requested.design.points()
+    groups = _groups(requested.scene, points)
+    graphs = {text: Graph(edited(requested.scene, first), shown=False) for text, first in groups.items()}
     with without_main():
-        outcome = place.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
+        outcome = workplace.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
     check(outcome)
-    modules = _modules(wanted)
+    modules = _modules(requested)
     families = {}
     for text, graph in graphs.items():
         records = {name: outcome.records[id(task)] for name, task in graph.simulate.inputs.items()}
-        sections = any(one.reduction == "sections" for one in wanted.kept)
+        sections = any(one.reduction == "sections" for one in requested.recorded)
         simulate = s4_simulate.params(graph.scene, sections=sections)
         task = Task(
             stage="sweep",
@@ -292,34 +300,34 @@ def prepare(wanted: Plan, place: Workplace) -> Plan:
             run="flexclear.stages.sweep_points:work",
             params={
                 "simulate": _without_varied(simulate, points[0], groups[text]),
-                "keep": [one.name for one in wanted.kept],
-                "members": wanted.sweep.members or 0,
-                "error": wanted.sweep.error,
+                "keep": [one.name for one in requested.recorded],
+                "members": requested.sweep.members or 0,
+                "error": requested.sweep.error,
             },
             folder="",
             modules=modules,
         )
-        found = facts(task, {name: record.digest for name, record in records.items()}, place.sources)
-        inputs = {name: place.store.load(record) for name, record in records.items()}
-        keep = tuple(one.name for one in wanted.kept)
+        given = facts(task, {name: record.digest for name, record in records.items()}, workplace.sources)
+        inputs = {name: workplace.store.load(record) for name, record in records.items()}
+        keep = tuple(one.name for one in requested.recorded)
         limited = {**simulate, "limits": graph.scene.limits.written()}  # no facts, and a point may ask for more
-        work = Work(key(found), limited, inputs, keep, wanted.sweep.members or 0, wanted.sweep.error)
-        families[text] = Family(work, found)
+        work = Work(key(given), limited, inputs, keep, requested.sweep.members or 0, requested.sweep.error)
+        families[text] = Family(work, given)
     jobs = []
     for point in points:
-        text, own = _group(wanted.scene, point)
+        text, own = _group(requested.scene, point)
         family = families[text].key
         # what decides the bodies is in the family's scene, whose bodies are numbers by now
         rest = {name: value for name, value in point.items() if name not in own}
         name, (stage, _) = _point_key(family, point), families[text].folder
-        jobs.append(Job(name, family, rest, place.store.path(stage, name, "part").with_suffix("")))
-    return replace(wanted, families=tuple(families.values()), jobs=tuple(jobs))
+        jobs.append(Job(name, family, rest, workplace.store.path(stage, name, "part").with_suffix("")))
+    return replace(requested, families=tuple(families.values()), jobs=tuple(jobs))
 
 
 def _group(scene: Scene, point: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
     """Those values of a point that decide the bodies which recipes describe, and their text."""
     bodies = tuple(f"body.{name}." for name in scene.recipes())
-    mine = {place: value for place, value in point.items() if place.startswith(bodies)} if bodies else {}
+    mine = {where: value for where, value in point.items() if where.startswith(bodies)} if bodies else {}
     return json.dumps(mine, sort_keys=True, default=str), mine
 
 
@@ -327,12 +335,12 @@ def _groups(scene: Scene, points: Sequence[Mapping[str, Any]]) -> dict[str, dict
     return dict(_group(scene, point) for point in points)
 
 
-def _modules(wanted: Plan) -> tuple[str, ...]:
+def _modules(requested: Plan) -> tuple[str, ...]:
     """Modules that any point reaches by the names of its parts: values that are no numbers may name others."""
-    found = set(s4_simulate.modules(wanted.scene))
-    for _, scene in _worded(wanted.scene, wanted.design):
-        found |= set(s4_simulate.modules(scene))
-    return tuple(sorted(found))
+    modules = set(s4_simulate.modules(requested.scene))
+    for _, scene in _worded(requested.scene, requested.design):
+        modules |= set(s4_simulate.modules(scene))
+    return tuple(sorted(modules))
 
 
 def _without_varied(simulate: Mapping[str, Any], point: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
@@ -341,11 +349,11 @@ def _without_varied(simulate: Mapping[str, Any], point: Mapping[str, Any], own: 
     own: values that are those of a whole family.
     """
     table = copy.deepcopy(dict(simulate))
-    for place in point:
-        node, keys = table["scene"], place.split(".")
+    for where in point:
+        node, keys = table["scene"], where.split(".")
         for name in keys[:-1]:
             node = node[int(name) if isinstance(node, list) else name]
-        if place not in own:
+        if where not in own:
             node[int(keys[-1]) if isinstance(node, list) else keys[-1]] = VARIED
     return table
 

@@ -42,17 +42,17 @@ class Family:
 
 @lru_cache(maxsize=RUNNERS)
 def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
-    """The scene of a family and what runs its points; kept by a worker, since it holds the compiled functions."""
+    """The scene of a family and what runs its points; stored by a worker, since it holds the compiled functions."""
     import pickle
 
-    from flexclear.pipeline.core.scene.output_quantities import parse_kept
+    from flexclear.pipeline.core.scene.output_quantities import parse_recorded
     from flexclear.pipeline.dynamics.record.point import Runner
     from flexclear.stages.s4_simulate import bundles, rebuild
 
     family: Family = pickle.loads(packed)
     scene = rebuild(family.simulate, family.inputs)
-    kept = [parse_kept(name, scene.owners()) for name in family.keep]
-    return scene, Runner(bundles(family.inputs), kept, family.members, family.error)
+    recorded = [parse_recorded(name, scene.owners()) for name in family.keep]
+    return scene, Runner(bundles(family.inputs), recorded, family.members, family.error)
 
 
 def work(
@@ -66,7 +66,7 @@ def work(
 ) -> tuple[list[Point], float]:
     """Points of a family, and the processor time that they took [s].
 
-    packed: the pickled `Family`.  points: place of the scene -> value.  alone: whether no other worker is busy.
+    packed: the pickled `Family`.  points: path in the scene -> value.  alone: whether no other worker is busy.
     journals: of each point, where it keeps its unfinished work (`folder/key`), if it does; none by default.
     abreast: whether they are worth to be run side by side; no point depends on it.
     sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as
@@ -84,27 +84,27 @@ def work(
     scene, runner = _opened(key, packed)
     begun, own = time.process_time(), list(journals or [None] * len(points))
     if not abreast:
-        found = [_point(runner, scene, point, where) for point, where in zip(points, own, strict=True)]
+        results = [_point(runner, scene, point, where) for point, where in zip(points, own, strict=True)]
     else:
-        found = _abreast(runner, scene, points, own)
+        results = _abreast(runner, scene, points, own)
     for where in filter(None, own):
         journal.remove(where)
-    return found, time.process_time() - begun
+    return results, time.process_time() - begun
 
 
 def _abreast(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]], own: list[Path | None]) -> list[Point]:
     """Points side by side, each in a thread, where that can be."""
     from flexclear.pipeline.core.workflow.cores import side_by_side
 
-    with runner.abreast(scene, len(points)) as crews:
+    with runner.abreast(scene, len(points)) as groups:
 
         def one(k: int, alive: Progress) -> Point:
-            if crews is None:
+            if groups is None:
                 return _point(runner, scene, points[k], own[k], alive=alive)
-            with crews.place() as place:
-                return _point(runner, scene, points[k], own[k], place, alive)
+            with groups.place() as where:
+                return _point(runner, scene, points[k], own[k], where, alive)
 
-        return side_by_side(one, len(points), lambda _: None, 1 if crews is None else crews.lanes)
+        return side_by_side(one, len(points), lambda _: None, 1 if groups is None else groups.lanes)
 
 
 def _point(
@@ -112,10 +112,10 @@ def _point(
     scene: Scene,
     point: Mapping[str, Any],
     own: Path | None,
-    place: Place | None = None,
+    where: Place | None = None,
     alive: Progress = silent,
 ) -> Point:
-    """A point; what it has done so far, also when it is done, is kept where it has a journal."""
+    """A point; what it has done so far, also when it is done, is stored where it has a journal."""
     from flexclear.pipeline.core.errors import InputError
     from flexclear.pipeline.core.scene.load import with_numbers
 
@@ -124,11 +124,11 @@ def _point(
     except InputError as error:
         return Point({}, {}, {}, 0, str(error))
     if own is None:
-        return runner.run(edited, place, alive)
-    with journal.kept(own.parent, own.name) as kept:
-        found = runner.run(edited, place, alive)
-        kept.write()  # others of its batch may take long
-        return found
+        return runner.run(edited, where, alive)
+    with journal.storage(own.parent, own.name) as storage:
+        result = runner.run(edited, where, alive)
+        storage.write()  # others of its batch may take long
+        return result
 
 
 @cache

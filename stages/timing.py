@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
 
-#: equal error: of the velocity of the body with most joints, relative, over this first share of the run, where
+#: equal error: of the velocity of the body with most joints, relative, over this first fraction of the run, where
 #: all scenes can still be predicted point by point
-EQUAL_ERROR, SHARE = 1e-6, 0.05
-#: this share of a run, unmeasured, fetches its code
+EQUAL_ERROR, FRACTION = 1e-6, 0.05
+#: this fraction of a run, unmeasured, fetches its code
 WARM = 0.01
 #: Wang & Wang (2019), sec. 5: predictor-corrector with this step [s]; which one, they do not say
 PAPER: Mapping[str, Any] = {"integrator": "adams-bashforth-moulton", "step": 1e-5}
 #: their Table 6 prints a tolerance of the integration, too [m], as variable steps have; a method that damps what it
-#: does not resolve then takes few of them where a rod rings. Of what it is a share they do not say: the stroke of
+#: does not resolve then takes few of them where a rod rings. Of what it is a fraction they do not say: the stroke of
 #: eq. (35) [m], or the mechanism's size
 TOLERANCE, DAMPED, STROKE = 4e-6, "radau", 0.06
 #: the three ways, as variables are called
@@ -34,8 +34,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """CPU time [s] of integration and of recording of warm runs, evaluations, steps, largest error of the energy.
 
     Variables begin with the way: ``equal_*`` at equal error, ``step_*`` at equal steps, ``tolerance_*`` by a damped
-    method at the paper's tolerance as a share of the stroke, whatever becomes of the energy, ``size_*`` the same as a
-    share of the mechanism's size.
+    method at the paper's tolerance as a fraction of the stroke, whatever becomes of the energy, ``size_*`` the same as
+    a fraction of the mechanism's size.
 
     params: one entry of `params` per scene.  inputs: bundles as ``<scene>:bundle/<body>``; kernels, which are only
     waited for.  A scene that a way cannot integrate has NaN there, and the reason in the attribute `refused`; repeats
@@ -56,15 +56,15 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         tolerance["tolerance"][name] = damped.solver.rtol
         tolerance["size"][name] = TOLERANCE / equal.length
         costs["size"][name], _ = _measured(damped_scene(scene, TOLERANCE / equal.length), reduced, checked=False)
-        for way, wanted in (("step", paper_scene(scene)), ("tolerance", damped)):
-            costs[way][name], why = _measured(wanted, reduced, checked=way == "step")
+        for way, requested in (("step", paper_scene(scene)), ("tolerance", damped)):
+            costs[way][name], why = _measured(requested, reduced, checked=way == "step")
             refused += [f"{name}: {why}"] if why else []
     data: dict[str, Any] = {}
-    for way, found in costs.items():
-        data |= _variables(way, list(found.values()))
+    for way, costs_of_way in costs.items():
+        data |= _variables(way, list(costs_of_way.values()))
     for way, values in tolerance.items():
         data[f"{way}_rtol"] = (("scene",), list(values.values()), {"units": "1"})
-    attributes = {"Conventions": "CF-1.11", "equal_error": EQUAL_ERROR, "share": SHARE, "step": PAPER["step"]}
+    attributes = {"Conventions": "CF-1.11", "equal_error": EQUAL_ERROR, "share": FRACTION, "step": PAPER["step"]}
     attributes |= {"tolerance": TOLERANCE, "damped": DAMPED, "refused": "; ".join(refused)}
     return {"nc": xr.Dataset(data, coords={"scene": list(params)}, attrs=attributes)}
 
@@ -73,13 +73,13 @@ def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
     """Variables of one way, in the order of the scenes."""
     import numpy as np
 
-    def told(name: str) -> list[float]:
+    def of_scenes(name: str) -> list[float]:
         return [float(cost.run.attrs[name]) if cost else float("nan") for cost in costs]
 
     error = [float(np.abs(cost.run["energy_error"]).max()) if cost else float("nan") for cost in costs]
-    found: dict[str, Any] = {
-        f"{way}_evaluations": (("scene",), told("evaluations"), {"units": "1"}),
-        f"{way}_steps": (("scene",), told("steps"), {"units": "1"}),
+    variables: dict[str, Any] = {
+        f"{way}_evaluations": (("scene",), of_scenes("evaluations"), {"units": "1"}),
+        f"{way}_steps": (("scene",), of_scenes("steps"), {"units": "1"}),
         f"{way}_energy_error": (("scene",), error, {"units": "J"}),
     }
     for part, dim in (("integration", "repeat"), ("recording", "recorded")):
@@ -87,8 +87,8 @@ def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
         seconds = np.full((len(costs), max(1, *map(len, repeats))), np.nan)
         for row, values in zip(seconds, repeats, strict=True):
             row[: len(values)] = values
-        found[f"{way}_{part}_seconds"] = (("scene", f"{way}_{dim}"), seconds, {"units": "s"})
-    return found
+        variables[f"{way}_{part}_seconds"] = (("scene", f"{way}_{dim}"), seconds, {"units": "s"})
+    return variables
 
 
 def _measured(scene: Scene, bundles: Mapping[str, xr.Dataset], *, checked: bool) -> tuple[Cost | None, str]:
@@ -119,17 +119,17 @@ def _at_equal_error(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[fl
 
 
 def equal_tolerance(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> float:
-    """The tolerance at which a scene has the common error over the first share of its run."""
+    """The tolerance at which a scene has the common error over the first fraction of its run."""
     from flexclear.pipeline import dynamics
 
-    velocity = next(q.name for q in scene.wanted() if q.kind == "velocity")
-    wanted = {"time.end": _share(scene, SHARE), "accuracy": {velocity: {"relative": EQUAL_ERROR}}}
-    return float(dynamics.simulate(_edited(scene, wanted), bundles, silent).attrs["accuracy_rtol"])
+    velocity = next(q.name for q in scene.requested() if q.kind == "velocity")
+    requested = {"time.end": _share(scene, FRACTION), "accuracy": {velocity: {"relative": EQUAL_ERROR}}}
+    return float(dynamics.simulate(_edited(scene, requested), bundles, silent).attrs["accuracy_rtol"])
 
 
-def _share(scene: Scene, share: float) -> float:
-    """The end of the first share of a run [s]."""
-    return scene.time.start + share * (scene.time.end - scene.time.start)
+def _share(scene: Scene, fraction: float) -> float:
+    """The end of the first fraction of a run [s]."""
+    return scene.time.start + fraction * (scene.time.end - scene.time.start)
 
 
 def _edited(scene: Scene, edit: Mapping[str, Any]) -> Scene:

@@ -9,7 +9,7 @@ from flexclear.pipeline.core.errors import shown
 from flexclear.pipeline.core.workflow.execute import states
 from flexclear.stages import as_json, run
 from flexclear.stages.graph import STAGES
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,19 +21,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print the state of every stage."""
-    place, found = workplace(options), dict[str, dict[str, list[str]]]()
+    workplace, reasons = open_workplace(options), dict[str, dict[str, list[str]]]()
     for graph in run.graphs(options.scenes, options.set):
-        stages = states(graph.up_to(options.to), place.store, place.sources)
-        found[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
-    print(as_json.as_json(found) if options.json else text(found))
+        stages = states(graph.up_to(options.to), workplace.store, workplace.sources)
+        reasons[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
+    print(as_json.as_json(reasons) if options.json else text(reasons))
 
 
-def text(found: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
+def text(reasons: Mapping[str, Mapping[str, Sequence[str]]]) -> str:
     """For each scene its stages, and why each would run again."""
-    told = []
-    for scene, stages in found.items():
-        told.append(scene)
+    lines = []
+    for scene, stages in reasons.items():
+        lines.append(scene)
         for label, why in stages.items():
             first, *others = map(shown, why or ["fresh"])
-            told += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in others)]
-    return "\n".join(told)
+            lines += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in others)]
+    return "\n".join(lines)

@@ -1,4 +1,5 @@
-"""Where commands work: arguments that all of them take, the store, the sources, who is told; bringing tasks up to date.
+"""Where commands work: arguments that all of them take, the store, the sources, whom it reports to; bringing tasks up
+to date.
 
 No scene is read here, so that a command that finds all of its results as they were does not import what reads them.
 """
@@ -45,16 +46,16 @@ def said_arguments(parser: argparse.ArgumentParser) -> None:
     said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
 
 
-def near(path: Path) -> str:
+def relative(path: Path) -> str:
     """A path as seen from the current folder, where it lies below it."""
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
 
 
 @dataclass(frozen=True)
 class Workplace:
-    """Where artifacts are kept, where the source lies, and who is told about progress.
+    """Where artifacts are stored, where the source lies, and the monitor of progress.
 
-    end: when the command is to stop, by the monotonic clock [s], and what is told then.
+    end: when the command is to stop, by the monotonic clock [s], and the message printed then.
     """
 
     store: Store
@@ -75,14 +76,14 @@ class Workplace:
 
 
 class FailedTasksError(FlexclearError):
-    """Some tasks failed; each is told, and the first decides the exit code."""
+    """Some tasks failed; each is reported, and the first decides the exit code."""
 
     def __init__(self, failures: tuple[Failure, ...]) -> None:
         super().__init__("\n".join(failure.message for failure in failures))
         self.exit_code = failures[0].exit_code
 
 
-def workplace(options: argparse.Namespace | None = None) -> Workplace:
+def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
     """The usual one, with results where `results_root` says.
 
     options: of a command, with `jobs`, its `limit` and how much is said.

@@ -118,8 +118,8 @@ def browser() -> Iterator[Browser]:
         try:
             root = f"http://127.0.0.1:{_port(process)}"
             options = {"binary": program, "args": [*OPTIONS, f"--user-data-dir={folder}/profile"]}
-            wanted = {"goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"}}
-            made = Browser(root).ask("POST", "/session", capabilities={"alwaysMatch": wanted})
+            requested = {"goog:chromeOptions": options, "goog:loggingPrefs": {"browser": "ALL", "performance": "ALL"}}
+            made = Browser(root).ask("POST", "/session", capabilities={"alwaysMatch": requested})
             window = Browser(f"{root}/session/{made['sessionId']}")
             try:
                 yield window

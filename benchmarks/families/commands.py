@@ -71,9 +71,9 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
         for case in cases:
             command = COMMANDS[case.name]
             parts = {} if command.loop else json.loads(_run(command, Path(folder), fresh, "benchmarks.command_parts"))
-            shares = {name: parts.pop(name, 0.0) for name in SHOWN} if parts else {}
+            fractions = {name: parts.pop(name, 0.0) for name in SHOWN} if parts else {}
             wall = Times(tuple(waits[case.name][-ROUNDS:])).told("s")
-            yield case, [{"cpu": times[case.name].told("s"), "wall": wall, "processors": cores(), "parts": shares}]
+            yield case, [{"cpu": times[case.name].told("s"), "wall": wall, "processors": cores(), "parts": fractions}]
 
 
 def _timed(command: Command, folder: Path, fresh: Iterator[float], waits: list[float]) -> Callable[[], float]:

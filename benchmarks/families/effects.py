@@ -64,10 +64,10 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 def _influences() -> list[Record]:
     from flexclear.stages import effects, run
-    from flexclear.stages.workplace import workplace
+    from flexclear.stages.workplace import open_workplace
 
     scene = edited(load_scene(run.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
-    found = effects.dataset(scene, workplace())
+    found = effects.dataset(scene, open_workplace())
     records = []
     for quantity in WATCHED:
         part = found.sel(quantity=quantity)
@@ -75,11 +75,13 @@ def _influences() -> list[Record]:
         for name, effect in (("rod", ROD), ("play", PLAY)):
             other = PLAY if effect == ROD else ROD
             for kind in ("dropped", "added"):
-                for share in ("", "_uncertainty"):
-                    record[f"{name}_{kind}{share}"] = float(part[f"{kind}{share}"].sel(effect=effect, other=effect))
-            for share in ("", "_uncertainty"):
-                record[f"{name}_interaction{share}"] = float(
-                    part[f"interaction{share}"].sel(effect=effect, other=other)
+                for fraction in ("", "_uncertainty"):
+                    record[f"{name}_{kind}{fraction}"] = float(
+                        part[f"{kind}{fraction}"].sel(effect=effect, other=effect)
+                    )
+            for fraction in ("", "_uncertainty"):
+                record[f"{name}_interaction{fraction}"] = float(
+                    part[f"interaction{fraction}"].sel(effect=effect, other=other)
                 )
         # JSON has no infinity: events that are not the same
         records.append({key: None if _endless(value) else value for key, value in record.items()})

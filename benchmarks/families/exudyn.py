@@ -136,9 +136,9 @@ def _records(case: Case, here: Mechanism, peer: Peer) -> Iterator[Record]:
         what = {"integrator": r.integrator, "rtol": r.rtol, "evaluations": r.evaluations, "s": r.seconds}
         yield {"by": "flexclear", **what, **_numbers(r.error)}
     best = [done[k] for k in front([(r.outcome.seconds, r.error.position, r.error.velocity) for r in done if r.error])]
-    wanted = {level: _candidates(done, level) for level in LEVELS}
+    requested = {level: _candidates(done, level) for level in LEVELS}
     for run in tried:
-        levels = [level for level, runs in wanted.items() if run in runs]
+        levels = [level for level, runs in requested.items() if run in runs]
         record = {"by": "exudyn", "method": run.method, "step": run.step}
         if run.error is None:
             yield record | {"failed": run.outcome.failure}
@@ -203,14 +203,14 @@ def _candidates(done: list[Run], level: float) -> list[Run]:
 def _compared(run: Run, levels: list[float], peer: Peer, sampling: float, ours: list[Rung]) -> Record:
     """One of their runs, and next to it, in turns, ours that is no worse and ours that reach some levels."""
     assert run.error is not None
-    wanted = {"equal": errors.cheapest(ours, partial(_no_worse, run.error))}
-    wanted |= {str(level): errors.cheapest(ours, partial(_reaches, level)) for level in levels}
+    requested = {"equal": errors.cheapest(ours, partial(_no_worse, run.error))}
+    requested |= {str(level): errors.cheapest(ours, partial(_reaches, level)) for level in levels}
     timers: dict[str, dict[str, Callable[[], float]]] = {}
-    for name, rung in wanted.items():
+    for name, rung in requested.items():
         if rung is not None:
             timers.setdefault(_name(rung), {}).update(_timers(rung, whole=name == "equal"))
     theirs, times = _side_by_side(partial(peer.run, run.method, run.step, sampling), run.outcome, timers)
-    matches = {name: _match(rung, theirs, times[_name(rung)]) for name, rung in wanted.items() if rung}
+    matches = {name: _match(rung, theirs, times[_name(rung)]) for name, rung in requested.items() if rung}
     return {"s": theirs, **_numbers(run.error), "ours": matches}
 
 

@@ -29,7 +29,7 @@ SEED, SCENES = 9, 60
 #: starts of runs with contacts
 MEMBERS = 3
 #: a miss by more than this is wrong, and so much may planning cost: of the full run, or a second
-WORST, SHARE, SECOND = 3.0, 0.2, 1.0
+WORST, FRACTION, SECOND = 3.0, 0.2, 1.0
 #: what a run is warmed up over, as a share of its time
 WARM = 0.002
 #: processor times of full runs between which savings are told apart [s]
@@ -51,11 +51,11 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 def _measured(seed: int, number: int, folder: Path) -> Record:
     from flexclear.stages import plan, s8_plan
-    from flexclear.stages.workplace import check, workplace
+    from flexclear.stages.workplace import check, open_workplace
 
     made = drawn(seed, number, folder / "recipes")
     scene, told = made.scene, dict(made.told)
-    place = workplace()
+    place = open_workplace()
     try:
         task = s8_plan.task(scene)
         outcome = place.bring(list(task.inputs.values()), 1)
@@ -70,20 +70,20 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
     from flexclear.pipeline.dynamics.model.driving import unit_of
     from flexclear.pipeline.post.plan import dataset
 
-    planned = plan.of(scene, dataset(decided, scene.title, {q.name: unit_of(scene, q) for q in scene.wanted()}))
+    planned = plan.of(scene, dataset(decided, scene.title, {q.name: unit_of(scene, q) for q in scene.requested()}))
     full = edited(scene, {"accuracy": None})
     chosen = [parse(name, scene.owners()) for name in made.told["wanted"]]
     one, full_cpu = _run(full, inputs, chosen)
     two, planned_cpu = _run(planned, _reduced(inputs, decided.modes), chosen)
     if one.refused or two.refused:
         return {**told, "verdict": WRONG if two.refused else REFUSED, "reason": one.refused or two.refused}
-    shares, chances = {}, {}
+    fractions, chances = {}, {}
     for q in chosen:
         apart = effect_size.influence(two, one, q, MEMBERS)
         asked = made.told["wanted"][q.name]
-        wanted = asked["absolute"] if "absolute" in asked else asked["relative"] * effect_size.size(one, q)
-        shares[q.name], chances[q.name] = apart.difference / wanted, apart.uncertainty / wanted
-    worst = max(shares.values())
+        requested = asked["absolute"] if "absolute" in asked else asked["relative"] * effect_size.size(one, q)
+        fractions[q.name], chances[q.name] = apart.difference / requested, apart.uncertainty / requested
+    worst = max(fractions.values())
     return {
         **told,
         "share": worst,
@@ -110,7 +110,7 @@ def _planned(params: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, float
     return found, time.process_time() - begun
 
 
-def _silent(share: float | None, text: str) -> None:
+def _silent(fraction: float | None, text: str) -> None:
     """Says nothing."""
 
 
@@ -147,7 +147,7 @@ def show(records: list[Record]) -> dict[str, str]:
         return {"summary": "Not measured.", "misses": ""}
     within = [r for r in done if r["share"] <= 1.0]
     saved = [r["saving"] for r in done]
-    cheap = [r for r in done if r["plan_s"] <= max(SECOND, SHARE * r["full_s"])]
+    cheap = [r for r in done if r["plan_s"] <= max(SECOND, FRACTION * r["full_s"])]
     unsure = [r for r in within if r["chance"] > 1.0]
     text = (
         f"{len(done)} scenes: {len(within)} ({len(within) / len(done):.0%}) within what is wanted, worst miss "

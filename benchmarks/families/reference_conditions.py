@@ -66,8 +66,8 @@ def _peak_right(rows: list[Row], place: int, condition: str) -> bool:
 
 def _unsettled(rows: list[Row], place: int) -> float:
     here = claims.Rows([], [r for r in rows if r["place_mm"] == place])
-    share = claims.unsettled(here) / here.best()["peak_force"]
-    return 0.0 if math.isnan(share) else share
+    fraction = claims.unsettled(here) / here.best()["peak_force"]
+    return 0.0 if math.isnan(fraction) else fraction
 
 
 def _enough(rows: list[Row]) -> int | None:
@@ -94,8 +94,8 @@ def _statics(rows: dict[str, list[Row]]) -> str:
     for condition in CONDITIONS:
         for n in (7, COUNT, max(COUNTS)):
             near = [_nearest(found, place, condition, n) for place in PLACES]
-            shares = [" ".join(_share(r[d]) for d in ("z", "x", "rz")) for r in near]
-            body.append([condition, "/".join(dict.fromkeys(str(r["count"]) for r in near)), *shares])
+            fractions = [" ".join(_share(r[d]) for d in ("z", "x", "rz")) for r in near]
+            body.append([condition, "/".join(dict.fromkeys(str(r["count"]) for r in near)), *fractions])
     full = [", ".join(f"{at(found, place, FULL)[d]:.3g}" for d in ("z", "x", "rz")) for place in PLACES]
     head = ("condition", "coordinates", *(f"{place} mm" for place in PLACES))
     complete = [c for c in CONDITIONS if _least(found, c, COUNT) >= COMPLETE]

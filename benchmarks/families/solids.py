@@ -52,7 +52,7 @@ class Parts:
         self.seconds = dict.fromkeys(PARTS, 0.0)
         self._now, self._since = 0, time.process_time()
 
-    def __call__(self, share: float | None, text: str) -> None:
+    def __call__(self, fraction: float | None, text: str) -> None:
         """Progress callback of the stages."""
         now = time.process_time()
         self.seconds[list(PARTS)[self._now]] += now - self._since

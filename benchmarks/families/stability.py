@@ -14,7 +14,7 @@ from flexclear.pipeline.post.plotting.table import pipe_table
 
 TEXT = """{seeds}Parameters and results of every case, to the last digit: [its log](../benchmarks/log/stability.jsonl).
 
-- **{finished} of {total} finished**, {refused} were refused ({share:.1f} %), {wrong} finished wrong or failed.
+- **{finished} of {total} finished**, {refused} were refused ({fraction:.1f} %), {wrong} finished wrong or failed.
 - Largest energy error of a finished run: {ledger:.1e} of the largest energy in its ledger, median {middle:.1e} (more
   than {limit:g} counts as wrong); largest opening of a loop {closure:.1e} m (more than {open:g} counts as wrong).
 - {compared} finished runs were repeated at a hundred times tighter tolerance: up to the horizon the platform's
@@ -39,7 +39,7 @@ def show(records: list[Record]) -> str:
         total=len(records),
         finished=verdicts[FINISHED],
         refused=verdicts[REFUSED],
-        share=100.0 * verdicts[REFUSED] / len(records),
+        fraction=100.0 * verdicts[REFUSED] / len(records),
         wrong=verdicts[WRONG],
         ledger=ledger.max(initial=0.0),
         middle=float(np.median(ledger)) if len(ledger) else 0.0,

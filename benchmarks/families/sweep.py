@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import percent, table
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
-from flexclear.pipeline.core.scene.output_quantities import parse_kept
+from flexclear.pipeline.core.scene.output_quantities import parse_recorded
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.dynamics.compile.functions import Entry
 from flexclear.pipeline.dynamics.record.point import Runner
@@ -93,7 +93,7 @@ def _point(kind: Kind) -> Record:
 def _runner(kind: Kind) -> Callable[[float], None]:
     """Runs a point as a worker does."""
     scene = with_numbers(load_scene(TREE / "flexclear" / "scenes" / f"{kind.scene}.toml"), kind.set)
-    runner = Runner({}, [parse_kept(name, scene.owners()) for name in kind.keep])
+    runner = Runner({}, [parse_recorded(name, scene.owners()) for name in kind.keep])
 
     def run(value: float) -> None:
         point = runner.run(with_numbers(scene, {kind.place: value}))

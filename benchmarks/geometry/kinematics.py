@@ -127,11 +127,11 @@ def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
     u, v, w = b - a, d - c, a - c
     uu, uv, vv, uw, vw = (np.sum(x * y, axis=1) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
     free = np.maximum(uu * vv - uv**2, 1e-300)
-    shares = [((uv * vw - vv * uw) / free, (uu * vw - uv * uw) / free)]
-    shares += [(np.full(len(a), e), np.clip((vw + e * uv) / vv, 0.0, 1.0)) for e in (0.0, 1.0)]
-    shares += [(np.clip((e * uv - uw) / uu, 0.0, 1.0), np.full(len(a), e)) for e in (0.0, 1.0)]
+    fractions = [((uv * vw - vv * uw) / free, (uu * vw - uv * uw) / free)]
+    fractions += [(np.full(len(a), e), np.clip((vw + e * uv) / vv, 0.0, 1.0)) for e in (0.0, 1.0)]
+    fractions += [(np.clip((e * uv - uw) / uu, 0.0, 1.0), np.full(len(a), e)) for e in (0.0, 1.0)]
     least = np.inf
-    for s, t in shares:
+    for s, t in fractions:
         inside = (s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)
         distance = np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
         least = min(least, float(distance[inside].min(initial=np.inf)))

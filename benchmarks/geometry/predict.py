@@ -17,7 +17,7 @@ from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
 from flexclear.pipeline.post.models import JOINT, PLATFORM
 from flexclear.stages import run as stages
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 
 #: coefficients of restitution, none of which the paper prints
 RESTITUTION = (0.5, 0.7, 0.9)
@@ -48,8 +48,8 @@ def rigid(layout: Layout, choice: Open) -> Record:
     load = {"load": {"gravity": GRAVITY}} if choice.gravity else {}
     try:
         ideal = dynamics.simulate(scenes.scene("sps4/ideal", layout, load), {}, silent)
-        wanted = scenes.scene("sps4/csj", layout, choice.edits(), aside=STARTS[choice.start])
-        run = dynamics.simulate(wanted, {}, silent)
+        requested = scenes.scene("sps4/csj", layout, choice.edits(), aside=STARTS[choice.start])
+        run = dynamics.simulate(requested, {}, silent)
     except SolverError as error:
         return {"verdict": REFUSED, "reason": str(error)}
     return _told(max_deviation(run, ideal, PLATFORM)) | _peaks(run, ideal)
@@ -57,9 +57,9 @@ def rigid(layout: Layout, choice: Open) -> Record:
 
 def flexible(layout: Layout, name: str) -> Record:
     """Means over an ensemble of each member's largest deviations from the ideal mechanism, and their spread."""
-    wanted = scenes.scene(f"sps4/{FLEXIBLE[name]}", layout, {"ensemble.members": MEMBERS})
+    requested = scenes.scene(f"sps4/{FLEXIBLE[name]}", layout, {"ensemble.members": MEMBERS})
     ideal = dynamics.simulate(scenes.scene("sps4/ideal", layout), {}, silent)
-    members = dynamics.ensemble(wanted, stages.bundles(wanted, workplace(), jobs=None), silent)
+    members = dynamics.ensemble(requested, stages.bundles(requested, open_workplace(), jobs=None), silent)
     each = [_told(deviation) for deviation in ensemble_deviations(members, ideal, PLATFORM)]
     found = {name: [one[name] for one in each] for name in each[0]}
     found["peak_force"] = members.peak_force.sel(contact=JOINT).values.tolist()

@@ -142,8 +142,10 @@ def _suited(which: str) -> Callable[[Rows], tuple[bool, str]]:
 
 def _dominates(rows: Rows) -> tuple[bool, str]:
     far, csj = rows.named("far", FULL), rows.named("clearance", RIGID)
-    share = {name: far[name] / csj[name] for name in ("angle", "displacement", "velocity")}
-    return max(share["angle"], share["displacement"]) < SMALL, ", ".join(f"{n} {_percent(s)}" for n, s in share.items())
+    fraction = {name: far[name] / csj[name] for name in ("angle", "displacement", "velocity")}
+    return max(fraction["angle"], fraction["displacement"]) < SMALL, ", ".join(
+        f"{n} {_percent(s)}" for n, s in fraction.items()
+    )
 
 
 def _insensitive(rows: Rows) -> tuple[bool, str]:
@@ -203,10 +205,10 @@ def _twice(rows: Rows) -> tuple[bool, str]:
     return 2.0 / COST < ratio < 2.0 * COST, f"{ratio:.1f} times the rigid model's time of integration (free-free)"
 
 
-def _percent(share: float) -> str:
-    if not np.isfinite(share):
+def _percent(fraction: float) -> str:
+    if not np.isfinite(fraction):
         return "-"
-    return f"{100.0 * share:.3g} %" if share >= SHOWN else f"under {100.0 * SHOWN:g} %"
+    return f"{100.0 * fraction:.3g} %" if fraction >= SHOWN else f"under {100.0 * SHOWN:g} %"
 
 
 def _mean(row: Row, name: str) -> str:

@@ -48,8 +48,8 @@ def _compliance(rows: list[Row]) -> Any:
             ax = axes[line, column]
             for condition in CONDITIONS:
                 points = [r for r in rows if (r["place_mm"], r["condition"]) == (place, condition)]
-                count, share = ([r[name] for r in points] for name in ("count", direction))
-                ax.step(count, share, where="post", color=COLORS[condition], label=condition, linewidth=1.6)
+                count, fraction = ([r[name] for r in points] for name in ("count", direction))
+                ax.step(count, fraction, where="post", color=COLORS[condition], label=condition, linewidth=1.6)
             ax.set_title(f"{label}, joint at {place} mm", fontsize=10)
             ax.set_ylim(-0.03, 1.05)
             _plain(ax)

@@ -28,7 +28,7 @@ from benchmarks.reference_conditions.design import (
 )
 from flexclear import pipeline
 from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
-from flexclear.stages.run import Workplace, check, workplace
+from flexclear.stages.run import Workplace, check, open_workplace
 
 #: directions in the axes of the rod's frames, z along the rod: axial, bending, torsion
 DIRECTIONS = ("z", "x", "rz")
@@ -78,8 +78,8 @@ def static_rows() -> Iterator[Row]:
         yield {"place_mm": place, "condition": FULL, "count": 0} | row
         for condition in CONDITIONS:
             for count in design.whole_counts(place, condition, max(COUNTS)):
-                share = design.solved(Case(place, condition, count))["compliance_share"]
-                yield {"place_mm": place, "condition": condition, "count": count} | _compliance(share, place)
+                fraction = design.solved(Case(place, condition, count))["compliance_share"]
+                yield {"place_mm": place, "condition": condition, "count": count} | _compliance(fraction, place)
 
 
 def _compliance(values: xr.DataArray, place: int) -> Row:
@@ -107,7 +107,7 @@ def frequency_rows() -> Iterator[Row]:
 
 def far_rows() -> Iterator[Row]:
     """Ideal joints: deviation from the rigid mechanism, and from the mechanism with the full rod."""
-    runs = bring(design.far(), workplace())
+    runs = bring(design.far(), open_workplace())
     for case, run in runs.items():
         rigid, full = runs[Case(case.place, RIGID)], runs[Case(case.place, FULL)]
         effect = max_deviation(run, rigid, BODY)
@@ -124,7 +124,7 @@ def clearance_rows(members: int) -> Iterator[Row]:
 
     members: of each ensemble; of sets beyond 13 coordinates, half of them.
     """
-    place = workplace()
+    place = open_workplace()
     runs = bring(design.clearance(members), place)
     rigid = bring([Case(where, RIGID) for where in PLACES], place)
     for case, run in runs.items():
@@ -149,7 +149,7 @@ def _with_clearance(case: Case, run: xr.Dataset, ideal: xr.Dataset) -> Row:
 
 def layout_rows(members: int) -> Iterator[Row]:
     """Ideal joints and clearance for each of `design.layouts`; of ideal joints deviations from rigid."""
-    place = workplace()
+    place = open_workplace()
     for number, layout in enumerate(design.layouts()):
         runs = bring(design.of_layout(layout, members), place)
         ideal = next(run for case, run in runs.items() if case.condition == RIGID and not case.clearance)

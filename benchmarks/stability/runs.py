@@ -23,7 +23,7 @@ from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.stages.graph import Graph
-from flexclear.stages.run import Workplace, bundles, workplace
+from flexclear.stages.run import Workplace, bundles, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -83,7 +83,7 @@ def run_case(parameters: Parameters, compiled: Callable[[], None] = lambda: None
 @cache
 def _place() -> Workplace:
     """The usual one, for as long as this process lives; nobody watches it."""
-    return replace(workplace(), monitor=Monitor(io.StringIO()))
+    return replace(open_workplace(), monitor=Monitor(io.StringIO()))
 
 
 def _deviation(parameters: Parameters, described: Scene, run: xr.Dataset) -> float:

@@ -90,7 +90,7 @@ def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
 
 
 def continued(q: np.ndarray) -> np.ndarray:
-    """Unit quaternions (time, ..., 4) without jumps of sign; the first one's is kept."""
+    """Unit quaternions (time, ..., 4) without jumps of sign; the first one's sign stays."""
     flips = np.einsum("t...i,t...i->t...", q[1:], q[:-1]) < 0.0
     if flips.any():
         q = q.copy()
@@ -156,15 +156,17 @@ def axis_to_matrix(axis: Sequence[float]) -> np.ndarray:
     square = x * x + y * y  # of the sine of the angle between the two
     if z < 0.0 and square < _OPPOSITE:  # which way to turn is then a matter of rounding
         return axes_to_matrix({"z": [x, y, z], "x": [1.0, 0.0, 0.0]})
-    share = 1.0 / (1.0 + z) if z >= 0.0 else (1.0 - z) / square
-    return np.array([[1.0 - share * x * x, -share * x * y, x], [-share * x * y, 1.0 - share * y * y, y], [-x, -y, z]])
+    fraction = 1.0 / (1.0 + z) if z >= 0.0 else (1.0 - z) / square
+    return np.array(
+        [[1.0 - fraction * x * x, -fraction * x * y, x], [-fraction * x * y, 1.0 - fraction * y * y, y], [-x, -y, z]]
+    )
 
 
 def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Angle of the rotation that takes pose a to pose b [rad], shape (...,), in [0, pi].
 
     a, b: unit quaternions, shape (..., 4).  Accurate for small angles too: the angle is taken from
-    the vector part, not from an arc cosine near 1.
+    the vector part, not from an arc cosine close to 1.
     """
     relative = quaternion_product(quaternion_conjugate(a), b)
     return 2.0 * np.arctan2(np.linalg.norm(relative[..., 1:], axis=-1), np.abs(relative[..., 0]))

@@ -1,4 +1,4 @@
-"""What a plan decides: of each effect whether it is kept, by what evidence, and how the planned scene is integrated."""
+"""What a plan decides: of each effect whether it stays, by what evidence, and how the planned scene is integrated."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ EVIDENCE = {
     PILOT: "short runs with and without it",
     NONE: "not looked into",
 }
-#: why an effect is kept of which no run was made
+#: why an effect stays for which no run was made
 NOT_WORTH = "to leave it out would save no time worth the look"
 
 
@@ -34,9 +34,10 @@ class Decision:
 
 @dataclass(frozen=True)
 class Mesh:
-    """The finite elements of a body. given: how many it has.  called_for: how many what is wanted calls for.
+    """The finite elements of a body. given: how many it has.  called_for: how many what is requested calls for.
 
-    frequency, compliance: largest errors of its mesh, as shares, of its kept frequencies and of its frames' compliance.
+    frequency, compliance: largest errors of its mesh, as fractions, of its retained frequencies and of its frames'
+    compliance.
     error: estimated error that the mesh makes in each quantity, at most [SI].
     """
 
@@ -49,24 +50,24 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Plan:
-    """All decisions. wanted: by quantity [SI].  integrator, rtol: of the planned run.
+    """All decisions. requested: by quantity [SI].  integrator, rtol: of the planned run.
 
-    modes: elastic coordinates of kept flexible bodies that need fewer than they have.
+    modes: elastic coordinates of flexible bodies that stay that need fewer than they have.
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
-    the plan has run.  runs: how many.  apart: places of parts that nothing couples to what is asked for.
+    the plan has run.  runs: how many.  uncoupled: names of parts that nothing couples to the requested quantities.
     meshes: finite elements of flexible bodies whose recipes tell them.  ledger_tolerance: of the planned run, where it
     is not the usual one.  dearer: in words, why it takes more evaluations than with the scene's own integrator.
     """
 
     decisions: tuple[Decision, ...]
-    wanted: Mapping[str, float]
+    requested: Mapping[str, float]
     integrator: str
     rtol: float
     integration: Mapping[str, float]
     modes: Mapping[str, int]
     evaluations: int
     runs: int
-    apart: tuple[str, ...] = ()
+    uncoupled: tuple[str, ...] = ()
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
     ledger_tolerance: float | None = None
     dearer: str = ""

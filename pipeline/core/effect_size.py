@@ -22,18 +22,18 @@ from scipy.special import stdtrit
 
 from flexclear.pipeline.core.algebra import rotation_between
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.output_quantities import Kept, parse_kept
+from flexclear.pipeline.core.scene.output_quantities import Recorded, parse_recorded
 from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 
 #: a difference of means that chance alone makes less often than this counts: of hundred independent looks one in ten
 RARE = 1e-3
-#: share of a series over which the spread of members is pooled
+#: fraction of a series over which the spread of members is pooled
 POOLED = 0.05
-#: by how much members start apart: a share of the clearance, and the least [m]
-SHARE, LEAST = 1e-3, 1e-8
-#: what is kept of a quantity to compare it by: the series, and of what impacts make large its extreme, which is read
-#: where it is and not at an output
+#: by how much members start apart: a fraction of the clearance, and the least [m]
+FRACTION, LEAST = 1e-3, 1e-8
+#: what is recorded of a quantity to compare it by: the series, and of what impacts make large its extreme, which is
+#: read where it is and not at an output
 OF_KIND = {
     "position": ("series",),
     "orientation": ("series",),
@@ -46,7 +46,7 @@ OTHERS = ("series", "largest")
 
 @dataclass(frozen=True, slots=True)
 class Influence:
-    """How far two variants are apart, in the quantity's SI unit, and what of it may be chance.
+    """How much two variants differ, in the quantity's SI unit, and what of it may be chance.
 
     difference: infinite when one of them lacks the quantity, or the numbers of impacts differ.
     """
@@ -65,30 +65,30 @@ def chance(members: int) -> float:
     return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * RARE))
 
 
-def members_apart(scene: Scene) -> Scene:
+def with_members(scene: Scene) -> Scene:
     """The scene with members that start a hair apart: a thousandth of its least clearance, at least 1e-8 m.
 
     No start is known better; and members that are nearer to each other than the errors of a loose tolerance would make
     these look like influences.
     """
     clearances = [joint.clearance for joint in scene.contacts().values()]
-    apart = max(LEAST, SHARE * min(clearances, default=0.0))
-    changed = scene.model_copy(update={"ensemble": Ensemble(perturbation=apart)})
+    perturbation = max(LEAST, FRACTION * min(clearances, default=0.0))
+    changed = scene.model_copy(update={"ensemble": Ensemble(perturbation=perturbation)})
     changed._name, changed._path = scene.name, scene.path
     return changed
 
 
-def kept(owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) -> list[Kept]:
-    """What is kept of a run to compare it by; quantities that its scene does not have are left out.
+def recorded(owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
+    """Recorded values of a run to compare it by; quantities that its scene does not have are left out.
 
     owners: of the scene, by what they are.
     """
     there = [q for q in chosen if q.owner in owners[KINDS[q.kind].owner]]
-    return [parse_kept(f"{q.name}.{r}", owners) for q in there for r in OF_KIND.get(q.kind, OTHERS)]
+    return [parse_recorded(f"{q.name}.{r}", owners) for q in there for r in OF_KIND.get(q.kind, OTHERS)]
 
 
 def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
-    """How far two variants are apart in a quantity.
+    """How much two variants differ in a quantity.
 
     members: starts of each that were run; a point without deviations counts as one that is known.
     """
@@ -114,8 +114,8 @@ def _apart(a: Point, b: Point, name: str, members: int, *, turning: bool) -> Inf
     else:
         distance = np.linalg.norm(one - two, axis=1)
     error = chance(members) * _pooled(error)
-    told = np.sqrt(np.maximum(0.0, distance**2 - error**2))
-    return Influence(float(told.max(initial=0.0)), float(error.max(initial=0.0)))
+    distances = np.sqrt(np.maximum(0.0, distance**2 - error**2))
+    return Influence(float(distances.max(initial=0.0)), float(error.max(initial=0.0)))
 
 
 def _pooled(error: np.ndarray) -> np.ndarray:

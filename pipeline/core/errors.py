@@ -12,7 +12,7 @@ INTERRUPTED = 130
 
 def shown(text: str, longest: int = LONGEST) -> str:
     """Text as it may stand on a terminal: control characters spelt out, the middle of what is long left out."""
-    if len(text) > longest:  # first, since what is left is looked at character by character
+    if len(text) > longest:  # first, since what is left is examined character by character
         text = _short(text, longest)
     text = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
     return _short(text, longest) if len(text.encode(errors="replace")) > longest else text
@@ -31,7 +31,7 @@ class FlexclearError(Exception):
 
 
 class InputError(FlexclearError):
-    """The user's input is wrong: names place, value, rule and remedy.
+    """The user's input is wrong: names location, value, rule and remedy.
 
     place: file and key, e.g. ``scenes/a.toml [joint.A1.clearance]``.
     problem: what is wrong, with the offending value and the rule it breaks.
@@ -52,13 +52,13 @@ class InputErrors(InputError):  # noqa: N818 - several of them
 
     def __init__(self, errors: list[InputError]) -> None:
         self.errors = errors
-        told: list[str] = []
+        lines: list[str] = []
         for error in errors:
-            if told and sum(len(text.encode()) + 1 for text in (*told, str(error))) > TOGETHER:
-                told.append(f"... and {len(errors) - len(told)} more")
+            if lines and sum(len(text.encode()) + 1 for text in (*lines, str(error))) > TOGETHER:
+                lines.append(f"... and {len(errors) - len(lines)} more")
                 break
-            told.append(str(error))
-        FlexclearError.__init__(self, "\n".join(told))
+            lines.append(str(error))
+        FlexclearError.__init__(self, "\n".join(lines))
 
 
 class SolverError(FlexclearError):

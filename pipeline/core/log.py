@@ -1,8 +1,8 @@
-"""The one logger of this program, ``flexclear``: what is told besides results, line by line.
+"""The one logger of this program, ``flexclear``: what is reported besides results, line by line.
 
 Warnings are WARNING, progress is INFO, every step of it DEBUG. The command's -q and -v choose among these; from Python,
 ``logging.getLogger("flexclear").setLevel(logging.WARNING)`` does. Records go to stderr by the handler here, and to the
-root logger only where ``propagate`` is set; another handler may take its place.
+root logger only where ``propagate`` is set; another handler may replace it.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class _Stderr:
 
 
 class _Plain(logging.Formatter):
-    """What is told may come from files of others: no control characters, and of what is long the ends."""
+    """Clean a text that may come from files of others: no control characters, and only the ends of a long one."""
 
     def format(self, record: logging.LogRecord) -> str:
         return shown(super().format(record), TOGETHER)

@@ -9,8 +9,8 @@ from flexclear.pipeline.core.system import free_space, memory
 
 __all__ = ["disk", "memory", "require_disk", "require_memory", "size"]
 
-#: share of what is left that one piece of work may take
-SHARE = 0.8
+#: fraction of what is left that one piece of work may take
+FRACTION = 0.8
 
 
 def disk(folder: Path) -> int:
@@ -20,14 +20,14 @@ def disk(folder: Path) -> int:
 
 def require_memory(need: float, what: str, remedy: str, limit: float | None = None) -> None:
     """ResourceError when `what` needs more bytes than are allowed; limit: default `SHARE` of what is left."""
-    allowed = SHARE * memory() if limit is None else limit
+    allowed = FRACTION * memory() if limit is None else limit
     if need > allowed:
         raise ResourceError(f"{what} takes about {size(need)} of memory, and {size(allowed)} are allowed; {remedy}")
 
 
 def require_disk(need: float, what: str, folder: Path, remedy: str, limit: float | None = None) -> None:
     """ResourceError when `what` needs more bytes on disk than are allowed; limit: as of `require_memory`."""
-    allowed = SHARE * disk(folder) if limit is None else limit
+    allowed = FRACTION * disk(folder) if limit is None else limit
     if need > allowed:
         raise ResourceError(
             f"{what} takes about {size(need)} of the disk of {folder}, and {size(allowed)} are allowed; {remedy}"

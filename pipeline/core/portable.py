@@ -1,4 +1,4 @@
-"""Names of files that every system takes and tells apart: results are sent from one to another."""
+"""Names of files that every system takes and distinguishes: results are sent from one to another."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ DEVICES = frozenset(["con", "prn", "aux", "nul", *(f"{port}{k}" for port in ("co
 
 
 def folded(name: str) -> str:
-    """What stands for all names that some system takes for the same: capitals and small letters, composed or not."""
+    """What represents all names that some system takes for the same: capitals and small letters, composed or not."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 

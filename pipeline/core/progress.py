@@ -1,10 +1,10 @@
-"""How work tells how far it has come."""
+"""How work reports its progress."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-#: told the done share of the work (None: unknown) and what is being done
+#: receives the finished fraction of the work (None: unknown) and what is being done
 Progress = Callable[[float | None, str], None]
 
 

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.output import Output
     from flexclear.pipeline.core.scene.schema import TimeSpan
 
-#: two output times are the same when they differ by less than this share of the latest: rounding of sums and products
-#: only. Times of events are outputs, too, and those of two accurate runs are so near that a coarser measure would take
-#: them for one, and the motion in between for an error
+#: two output times are the same when they differ by less than this fraction of the latest: rounding of sums and
+#: products only. Times of events are outputs, too, and those of two accurate runs are so near that a coarser measure
+#: would take them for one, and the motion in between for an error
 SAME_TIME = 1e-13
 #: closings with an approach above this count as impacts [m/s]
 IMPACT = 1e-4
@@ -154,23 +154,23 @@ def scale(run: xr.Dataset, quantity: Quantity) -> float:
 
 def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
     """The part of a run that `error` and `scale` need for these quantities."""
-    found: dict[str, xr.DataArray] = {}
+    recorded: dict[str, xr.DataArray] = {}
     for owner in ("body", "joint", "drive"):
         mine = [q for q in chosen if KINDS[q.kind].owner == owner]
         names = sorted({q.owner for q in mine})
-        found |= {KINDS[q.kind].variable: run[KINDS[q.kind].variable].sel({owner: names}) for q in mine}
+        recorded |= {KINDS[q.kind].variable: run[KINDS[q.kind].variable].sel({owner: names}) for q in mine}
     if any(KINDS[q.kind].owner == "contact" for q in chosen):
-        found |= {str(name): run[name] for name in run.data_vars if str(name).startswith("event_")}
-        found |= {name: run[name] for name in ("contact_impulse",) if name in run}
+        recorded |= {str(name): run[name] for name in run.data_vars if str(name).startswith("event_")}
+        recorded |= {name: run[name] for name in ("contact_impulse",) if name in run}
     if "horizon" in run:
-        found["horizon"] = run["horizon"]
+        recorded["horizon"] = run["horizon"]
     import xarray as xr  # here, since a run needs none of it
 
-    return xr.Dataset(found)
+    return xr.Dataset(recorded)
 
 
 def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
-    """What is kept of a series (`pipeline.core.scene.output_quantities`); shape () or (components,).
+    """Recorded values of a series (`pipeline.core.scene.output_quantities`); shape () or (components,).
 
     time: shape (n,), increasing; its steps are the weights of means.  values: shape (n, components).
     """

@@ -81,15 +81,15 @@ def module_name(name: str) -> str:
 
 def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
     """'did you mean ...?' for the name that is meant, or the nearest one, or a list of those there are."""
-    for words, meant, told in ELSEWHERE:
+    for words, meant, advice in ELSEWHERE:
         if name in words and meant in known:
-            return f"did you mean '{meant}'?" + (f" {told}" if told else "")
+            return f"did you mean '{meant}'?" + (f" {advice}" if advice else "")
     import difflib  # here, since a right name needs none
 
     # the comparison takes the product of both lengths
-    near = difflib.get_close_matches(name, list(known), n=1) if len(name) <= LONGEST_NAME else []
-    if near:
-        return f"did you mean '{near[0]}'?"
+    matches = difflib.get_close_matches(name, list(known), n=1) if len(name) <= LONGEST_NAME else []
+    if matches:
+        return f"did you mean '{matches[0]}'?"
     names = sorted(known)
     more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
     return "known: " + ", ".join(names[:LISTED]) + more if names else "there are none"

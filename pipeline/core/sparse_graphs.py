@@ -10,7 +10,7 @@ import numpy as np
 
 def components(joined: np.ndarray) -> list[list[int]]:
     """Nodes of each connected part, ascending, parts by their first node; joined: (n, n), true between neighbours."""
-    waiting, found = set(range(len(joined))), list[list[int]]()
+    waiting, groups = set(range(len(joined))), list[list[int]]()
     either = joined | joined.T
     while waiting:
         part, new = set[int](), {min(waiting)}
@@ -18,8 +18,8 @@ def components(joined: np.ndarray) -> list[list[int]]:
             part |= new
             waiting -= new
             new = set(np.flatnonzero(either[sorted(new)].any(axis=0)).tolist()) & waiting
-        found.append(sorted(part))
-    return found
+        groups.append(sorted(part))
+    return groups
 
 
 def reverse_cuthill_mckee(joined: np.ndarray) -> list[int]:

@@ -21,11 +21,12 @@ from typing import Any
 FICLONE = 0x40049409
 #: the request that the system send a signal when the parent dies (linux/prctl.h)
 PR_SET_PDEATHSIG = 1
-#: what the GNU C library calls the sizes from which on memory is given back, and when (malloc.h); how much is kept [B]
+#: what the GNU C library calls the sizes from which on memory is given back, and when (malloc.h); how much is retained
+#: [B]
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, KEPT = -1, -3, 64 << 20
 #: where Windows keeps whether paths may be long, and characters of a path when they may and when not
 FILE_SYSTEM, LONG_PATH, SHORT_PATH = r"SYSTEM\CurrentControlSet\Control\FileSystem", 32767, 259
-#: how long a file is waited for that another program has open, and between two attempts [s]
+#: how long a file is awaited that another program has open, and between two attempts [s]
 PATIENCE, PAUSE = 2.0, 0.05
 #: access to a process of Windows that allows to ask whether it runs, and what it answers then (winbase.h, minwinbase.h)
 QUERY_LIMITED, STILL_ACTIVE, ACCESS_DENIED = 0x1000, 259, 5
@@ -54,17 +55,17 @@ def cores() -> int:
 
 def memory() -> int:
     """Bytes that this process can still get: of the machine, of its container, of its own limit."""
-    found = [_physical()]
+    bounds = [_physical()]
     lines = _text("/proc/meminfo").splitlines()
-    found += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
+    bounds += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
     limit, used = _text("/sys/fs/cgroup/memory.max"), _text("/sys/fs/cgroup/memory.current")
     if limit.isdigit() and used.isdigit():
-        found.append(int(limit) - int(used))
+        bounds.append(int(limit) - int(used))
     resource = _module("resource")
     if resource is not None:
         soft, _ = resource.getrlimit(resource.RLIMIT_AS)
-        found += [soft] if soft != resource.RLIM_INFINITY else []
-    return max(0, min(found))
+        bounds += [soft] if soft != resource.RLIM_INFINITY else []
+    return max(0, min(bounds))
 
 
 def _physical() -> int:
@@ -130,7 +131,7 @@ def limit_itself(memory: float, seconds: float) -> None:
         resource.setrlimit(kind, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
 
 
-def share(source: Any, target: Any) -> bool:
+def share_blocks(source: Any, target: Any) -> bool:
     """Whether an open file could be made to share the bytes of another (Linux, on file systems that can)."""
     fcntl = _module("fcntl")
     if fcntl is None or sys.platform != "linux":
@@ -191,7 +192,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def longest_path() -> int:
-    """Characters of a path that files can have: few on a Windows that was not told otherwise."""
+    """Characters of a path that files can have: few on a Windows without long paths enabled."""
     registry = _module("winreg")
     if registry is None:
         return sys.maxsize
@@ -206,7 +207,7 @@ def free_space(folder: Path) -> int:
     return shutil.disk_usage(folder).free
 
 
-def others_can_write(place: Path, *, inside: bool) -> bool:
+def others_can_write(folder: Path, *, inside: bool) -> bool:
     """Whether anybody but this user and the system's can write to a folder, or it is not theirs.
 
     inside: whether what lies in it counts, not only its replacement.  Where folders belong to nobody by number
@@ -214,7 +215,7 @@ def others_can_write(place: Path, *, inside: bool) -> bool:
     """
     if not hasattr(os, "geteuid"):
         return False
-    status = place.stat()
+    status = folder.stat()
     open_to_all = bool(status.st_mode & stat.S_IWOTH) and not (status.st_mode & stat.S_ISVTX and not inside)
     return open_to_all or bool(inside and status.st_mode & stat.S_IWGRP) or status.st_uid not in (0, os.geteuid())
 
@@ -254,8 +255,8 @@ def end_with_parent() -> None:
 def is_parent(process: int) -> bool:
     """Whether a process that has started this one still runs.
 
-    On Windows the parent's number says nothing: it is told of one that is gone, too, and in a virtual environment it is
-    that of a launcher that stands between the two.
+    On Windows the parent's number says nothing: it also names a parent that is gone, and in a virtual environment
+    it is that of a launcher that is between the two.
     """
     return os.getppid() == process if _windows() is None else alive(process)
 

@@ -105,7 +105,7 @@ UNITS: dict[str, tuple[float, str]] = {
 
 #: largest number, and one over the least: squares of products such as m l^2 must stay within floating point
 LARGEST = 1e50
-#: exponents of kg, m, s and rad in what an SI unit measures; products of units (`unit`) are told apart by them
+#: exponents of kg, m, s and rad in what an SI unit measures; products of units (`unit`) are distinguished by them
 _EXPONENTS: dict[str, Exponents] = {
     "number": (0, 0, 0, 0),
     "length": (0, 1, 0, 0),
@@ -158,9 +158,9 @@ def unit(text: str) -> tuple[float, str] | None:
     text = _plain(text)
     if text in UNITS:
         return UNITS[text]
-    found = _product(text)
-    dimension = found and next((name for name, known in _EXPONENTS.items() if known == found[1]), None)
-    return (found[0], dimension) if found and dimension else None
+    product = _product(text)
+    dimension = product and next((name for name, known in _EXPONENTS.items() if known == product[1]), None)
+    return (product[0], dimension) if product and dimension else None
 
 
 def _plain(text: str) -> str:
@@ -174,12 +174,12 @@ def _product(text: str) -> tuple[float, Exponents] | None:
     factor, total = 1.0, [0.0] * 4
     for k, side in enumerate(text.split("/")):
         for part in side.split() or [""]:
-            found = _FACTOR.fullmatch(part)
-            if found is None or found[1] not in UNITS:
+            match = _FACTOR.fullmatch(part)
+            if match is None or match[1] not in UNITS:
                 return None
-            power = float(found[2] or 1.0) * (-1.0 if k else 1.0)
-            factor *= UNITS[found[1]][0] ** power
-            total = [known + power * one for known, one in zip(total, _EXPONENTS[UNITS[found[1]][1]], strict=True)]
+            power = float(match[2] or 1.0) * (-1.0 if k else 1.0)
+            factor *= UNITS[match[1]][0] ** power
+            total = [known + power * one for known, one in zip(total, _EXPONENTS[UNITS[match[1]][1]], strict=True)]
     kg, m, s, rad = total
     return factor, (kg, m, s, rad)
 
@@ -189,11 +189,11 @@ def udunits(text: str) -> str:
     factors = []
     for k, side in enumerate(_plain(text).split("/")):
         for part in side.split():
-            found = _FACTOR.fullmatch(part)
-            power = float(found[2] or 1.0) * (-1.0 if k else 1.0) if found is not None else 0.5
+            match = _FACTOR.fullmatch(part)
+            power = float(match[2] or 1.0) * (-1.0 if k else 1.0) if match is not None else 0.5
             if power != int(power):
                 return ""
-            factors.append(f"{found[1] if found else part}{int(power) if power != 1.0 else ''}")
+            factors.append(f"{match[1] if match else part}{int(power) if power != 1.0 else ''}")
     return " ".join(factors)
 
 
@@ -206,13 +206,13 @@ def coefficient(value: object, dimension: str, order: int) -> float:
     if match is None or match[2] is None:
         return quantity(value, "number")
     kg, m, s, rad = _EXPONENTS[dimension]
-    found = _product(_plain(match[2]))
-    if found is None or found[1] != (kg, m, s - order, rad):
+    product = _product(_plain(match[2]))
+    if product is None or product[1] != (kg, m, s - order, rad):
         example = f"{_example(dimension)}/s^{order}" if order else _example(dimension)
         raise ValueError(
             f"'{value}' is the coefficient of t^{order} of {a(dimension)}: it has a unit such as {example}"
         )
-    return quantity(float(match[1]) * found[0], "number")
+    return quantity(float(match[1]) * product[0], "number")
 
 
 def quantity(value: object, dimension: str) -> float:
@@ -230,11 +230,11 @@ def components(values: Iterable[object], dimension: str) -> list[float]:
     The others may be as small as they are: a rotation leaves 1e-17 of an entry that is zero, two leave 1e-34.
     """
     given = list(values)
-    found = [_read(value, dimension) for value in given]
-    if found:
-        largest = max(range(len(found)), key=lambda k: abs(found[k]))
-        _computable(found[largest], given[largest])
-    return found
+    numbers = [_read(value, dimension) for value in given]
+    if numbers:
+        largest = max(range(len(numbers)), key=lambda k: abs(numbers[k]))
+        _computable(numbers[largest], given[largest])
+    return numbers
 
 
 def _computable(number: float, written: object) -> float:
@@ -258,9 +258,11 @@ def _read(value: object, dimension: str) -> float:
         if _COMMA.match(value):
             raise ValueError(f"'{value}' has a decimal comma; numbers have a decimal point")
         number, written = float(match[1]), match[2]
-        factor, found = (1.0, dimension) if written is None else _known_unit(written, dimension)
-        if found != dimension:
-            raise ValueError(f"'{value}' is {a(found)}, but {a(dimension)} belongs here, in {_known(dimension)}")
+        factor, factor_and_dimension = (1.0, dimension) if written is None else _known_unit(written, dimension)
+        if factor_and_dimension != dimension:
+            raise ValueError(
+                f"'{value}' is {a(factor_and_dimension)}, but {a(dimension)} belongs here, in {_known(dimension)}"
+            )
         result = number * factor
     else:
         result = float(value) if abs(value) <= sys.float_info.max else math.inf
@@ -285,18 +287,18 @@ def any_quantity(value: object) -> float | str:
     written = match[2] if match is not None else None
     if written is None or written == "%":
         return quantity(value, "number")
-    found = unit(written)
-    if found is None:
+    known = unit(written)
+    if known is None:
         raise ValueError(f"unknown unit '{written}'; known: {', '.join(UNITS)}, and products of them")
-    dimension = found[1]
+    dimension = known[1]
     return f"{quantity(value, dimension)!r} {_example(dimension, factor=1.0)}"
 
 
 def _known_unit(written: str, dimension: str) -> tuple[float, str]:
-    found = unit(written)
-    if found is None:
+    known = unit(written)
+    if known is None:
         raise ValueError(f"unknown unit '{written}'; {a(dimension)} is written in {_known(dimension)}")
-    return found
+    return known
 
 
 def a(dimension: str) -> str:
@@ -305,9 +307,9 @@ def a(dimension: str) -> str:
 
 
 def _known(dimension: str) -> str:
-    return ", ".join(unit for unit, (_, found) in UNITS.items() if found == dimension) or "SI"
+    return ", ".join(unit for unit, (_, of_unit) in UNITS.items() if of_unit == dimension) or "SI"
 
 
 def _example(dimension: str, factor: float | None = None) -> str:
     """A unit of this dimension; with `factor`, the one that is so many SI units."""
-    return next((u for u, (f, found) in UNITS.items() if found == dimension and factor in (None, f)), "")
+    return next((u for u, (f, of_unit) in UNITS.items() if of_unit == dimension and factor in (None, f)), "")

@@ -32,7 +32,7 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> LabelledArrays:
     """One run of a scene (schema RUN).
 
-    bundles: reduced flexible bodies by name.  progress(share or None, text) is called now and then.
+    bundles: reduced flexible bodies by name.  progress(fraction or None, text) is called now and then.
     A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for; where it
     names no integrator, by the one that suits it.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot go on, StoppedError with what
@@ -101,16 +101,20 @@ def equilibrium(
     drives: Mapping[str, float] | None = None,
     moving: bool = False,
 ) -> xr.Dataset:
-    """Static equilibrium near the scene's start pose, its drives held (schema EQUILIBRIUM).
+    """Static equilibrium close to the scene's start pose, its drives held (schema EQUILIBRIUM).
 
     time: at which the drives' laws give their positions [s]; the start when None.  drives: positions [m or rad] by
     name instead.  moving: the drives keep the speed of that moment, and the pose is one of steady motion.
     Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium.
     """
     from flexclear.pipeline.dynamics.linear import dataset
-    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as find
+    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as at_rest
+    from flexclear.pipeline.dynamics.linear.steady import steady
 
-    return dataset.equilibrium(*find(scene, bundles, progress, time, drives, moving), moving)
+    if not moving:
+        return dataset.equilibrium(*at_rest(scene, bundles, progress, time, drives), moving)
+    bench, rest, _ = steady(scene, bundles, progress, time, drives)
+    return dataset.equilibrium(bench, rest, moving)
 
 
 def frequencies(
@@ -123,8 +127,11 @@ def frequencies(
 ) -> xr.Dataset:
     """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
     from flexclear.pipeline.dynamics.linear import dataset
-    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as find
+    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as at_rest
+    from flexclear.pipeline.dynamics.linear.steady import steady
     from flexclear.pipeline.dynamics.linear.vibrations import vibrations
 
-    bench, rest = find(scene, bundles, progress, time, drives, moving)
+    if moving:
+        return dataset.linear(*steady(scene, bundles, progress, time, drives), moving)
+    bench, rest = at_rest(scene, bundles, progress, time, drives)
     return dataset.linear(bench, rest, vibrations(bench, rest.at), moving)

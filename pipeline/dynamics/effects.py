@@ -83,7 +83,7 @@ class Named:
 
 
 def most_parts(scene: Scene) -> Parts:
-    """All parts that the machine code of a scene may have, as far as the scene alone tells: its code has no more."""
+    """All parts that the machine code of a scene may have, as far as the scene alone decides: its code has no more."""
     contacts, joints = scene.contacts(), import_module(JOINTS)
     ideal = {joint.type for name, joint in scene.joint.items() if name not in contacts}
     ideal |= {joints.HELD[joint.type] for joint in contacts.values() if joint.type in joints.HELD}

@@ -141,8 +141,8 @@ def _read_data(context: Any, builder: Any, kind: Any, value: Any, name: str) -> 
         return getattr(d, name)
     if name in m.REPORTS:
         return builder.load(_at(context, builder, d.n, m.REPORTS[name]))
-    place = m.NAMED[name].place if name in m.NAMED else {**m.SIZES, **m.STRETCHES}[name]
-    entry = builder.load(_at(context, builder, d.h, place))
+    index = m.NAMED[name].place if name in m.NAMED else {**m.SIZES, **m.STRETCHES}[name]
+    entry = builder.load(_at(context, builder, d.h, index))
     if name in m.SIZES:
         return entry
     if name in m.STRETCHES:

@@ -86,23 +86,23 @@ def _rows(name: str) -> property:
     fields = {field: _field(*where) for field, where in m.row_fields(name).items()}
     row = type(name, (Stretch,), {"__slots__": (), **fields})
     kind = type(name, (Rows,), {"__slots__": (), "size": m.NAMED[name].size, "row": row})
-    array, place = m.ARRAYS[name], m.NAMED[name].place
-    return property(lambda d: kind(getattr(d, array), d.h[place]))
+    array, index = m.ARRAYS[name], m.NAMED[name].place
+    return property(lambda d: kind(getattr(d, array), d.h[index]))
 
 
-def _size(place: int) -> property:
-    return property(lambda d: d.h[place])
+def _size(index: int) -> property:
+    return property(lambda d: d.h[index])
 
 
-def _stretch(place: int) -> property:
-    return property(lambda d: Stretch(d.w, d.h[place]))
+def _stretch(index: int) -> property:
+    return property(lambda d: Stretch(d.w, d.h[index]))
 
 
-def _integer(place: int) -> property:
+def _integer(index: int) -> property:
     def write(d: Data, value: Any) -> None:
-        d.n[place] = value
+        d.n[index] = value
 
-    return property(lambda d: d.n[place], write)
+    return property(lambda d: d.n[index], write)
 
 
 for _made, _places in ((_size, m.SIZES), (_stretch, m.STRETCHES), (_integer, m.REPORTS)):

@@ -1,4 +1,4 @@
-"""Looking up a table in h, as code that stands where it is called.
+"""Looking up a table in h, as code that is where it is called.
 
 An evaluation looks up some seventy different fields. Compiled as functions, each of the length of a line, they took a
 sixth of the compilation.
@@ -13,7 +13,7 @@ from numba.core.typing.templates import make_intrinsic_template
 
 
 class Lookup:
-    """h[place] + size i, or what stands in h by `field` beyond that; h: a pointer to integers, or an array of them."""
+    """h[index] + size i, or what is in h by `field` beyond that; h: a pointer to integers, or an array of them."""
 
     def __init__(self, name: str, place: int, size: int, field: int | None) -> None:
         def typed(typing_context: Any, h: Any, i: Any) -> Any:
@@ -28,8 +28,8 @@ class Lookup:
                 def load(index: Any) -> Any:
                     return builder.load(builder.gep(entries, [index]))
 
-                found = builder.add(load(constant(place)), builder.mul(constant(size), row))
-                return found if field is None else load(builder.add(found, constant(field)))
+                loaded = builder.add(load(constant(place)), builder.mul(constant(size), row))
+                return loaded if field is None else load(builder.add(loaded, constant(field)))
 
             return types.int64(h, types.int64), generate
 

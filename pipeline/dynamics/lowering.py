@@ -82,7 +82,7 @@ class Part(JITCodeLibrary):
 
     @property
     def codegen(self) -> Part:
-        """Who is told where the function's environment is: this, which has nowhere to put it (`set_env`)."""
+        """Receives the function's environment: this, which has nowhere to put it (`set_env`)."""
         return self
 
     def set_env(self, env_name: str, env: Any) -> None:
@@ -107,17 +107,17 @@ class Part(JITCodeLibrary):
         The linker takes only what is referred to already: of a kernel that one caller names in code that never runs,
         and another one below calls, nothing would be there.
         """
-        found: dict[Any, None] = {}
+        called: dict[Any, None] = {}
         open_calls = [(library, False) for library in self._linking_libraries]
         while open_calls:
             library, below_done = open_calls.pop()
             if below_done:
-                found[library] = None
-            elif library not in found:
+                called[library] = None
+            elif library not in called:
                 open_calls.append((library, True))
                 below = library._linking_libraries if isinstance(library, Part) else []
-                open_calls += [(other, False) for other in below if other not in found]
-        return list(reversed(found))
+                open_calls += [(other, False) for other in below if other not in called]
+        return list(reversed(called))
 
 
 class Whole(JITCodeLibrary):
@@ -156,7 +156,7 @@ class Flow(untyped.IRProcessing):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class Rewrites(untyped.GenericRewrites):
-    """Indices, powers and the like that are written out are told apart from those that are computed."""
+    """Indices, powers and the like that are written out are distinguished from those that are computed."""
 
     _name = "rewrites"
 
@@ -166,10 +166,10 @@ class Rewrites(untyped.GenericRewrites):
         for kind in rewrite_registry.rewrites["before-inference"]:
             rewrite, left = kind(state), list(blocks)
             while left:
-                place = left.pop()
-                if rewrite.match(state.func_ir, blocks[place], state.typemap, state.calltypes):
-                    blocks[place] = rewrite.apply()
-                    left.append(place)
+                block = left.pop()
+                if rewrite.match(state.func_ir, blocks[block], state.typemap, state.calltypes):
+                    blocks[block] = rewrite.apply()
+                    left.append(block)
         return True
 
 
@@ -204,13 +204,13 @@ class Constraints(ConstraintNetwork):
 
     def propagate(self, infer: Any) -> list[Exception]:
         """Errors, which may be for want of a type that is found later."""
-        found: list[Exception] = []
+        errors: list[Exception] = []
         for constraint in self.constraints:
             try:
                 constraint(infer)
             except TypingError as error:
-                found.append(error)
-        return found
+                errors.append(error)
+        return errors
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
@@ -311,11 +311,11 @@ class Steps(PassManager):
 
 
 def _pipeline() -> Steps:
-    found = Steps("kernel")
+    steps = Steps("kernel")
     for step in STEPS:
-        found.add_pass(step, step._name)
-    found.finalize()
-    return found
+        steps.add_pass(step, step._name)
+    steps.finalize()
+    return steps
 
 
 PIPELINE = _pipeline()
@@ -347,7 +347,7 @@ class Typing(Target):
     Numba tries all that is ever called `+`, arrays first, at each `+` anew.
     """
 
-    found: ClassVar[dict[tuple[Any, Any], Any]] = {}
+    types: ClassVar[dict[tuple[Any, Any], Any]] = {}
 
     def resolve_function_type(self, function: Any, arguments: Any, names: Any) -> Any:
         """Signature of a call; kernels are compiled for integers, not anew for each integer that is written out."""
@@ -356,9 +356,9 @@ class Typing(Target):
         plain = not names and all(isinstance(kind, PLAIN) for kind in arguments)
         if not plain or not isinstance(function, types.Function):
             return self._context.resolve_function_type(function, arguments, names)
-        if (function, arguments) not in self.found:
-            self.found[function, arguments] = self._context.resolve_function_type(function, arguments, names)
-        return self.found[function, arguments]
+        if (function, arguments) not in self.types:
+            self.types[function, arguments] = self._context.resolve_function_type(function, arguments, names)
+        return self.types[function, arguments]
 
 
 class KernelDispatcher(CPUDispatcher):
@@ -374,12 +374,12 @@ class KernelDispatcher(CPUDispatcher):
     def compile(self, sig: Any) -> Any:
         """Entry point of what has been compiled for these types."""
         arguments, returned = normalize_signature(sig)
-        found = self.overloads.get(tuple(arguments))
-        if found is None:
+        overload = self.overloads.get(tuple(arguments))
+        if overload is None:
             with self._compiling_counter:
-                found = self._compiler.compile(arguments, returned)
-                self.add_overload(found)
-        return found.entry_point
+                overload = self._compiler.compile(arguments, returned)
+                self.add_overload(overload)
+        return overload.entry_point
 
 
 class KernelCompiler(CompilerBase):
@@ -400,8 +400,8 @@ class WholeCompiler(CompilerBase):
 
     def define_pipelines(self) -> list[PassManager]:
         """The only one."""
-        found = PassManager("whole")
+        manager = PassManager("whole")
         for step, what in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
-            found.add_pass(WholeLowering if step is NativeLowering else step, what)
-        found.finalize()
-        return [found]
+            manager.add_pass(WholeLowering if step is NativeLowering else step, what)
+        manager.finalize()
+        return [manager]

@@ -1,19 +1,20 @@
-"""The memory through which scene and compiled kernels speak: every place, row and field is declared here, once.
+"""The memory through which scene and compiled kernels speak: every index, row and field is declared here, once.
 
 A kernel's code depends only on the kinds of parts present. Everything else, how many there
-are, what is joined to what, every number, stands in four flat arrays that every kernel takes:
+are, what is joined to what, every number, is in four flat arrays that every kernel takes:
 
 - ``h`` (integers): a header with sizes and offsets, then the wiring tables;
 - ``f`` (floats): the numbers of the scene;
 - ``w`` (floats): the work space, the integrator's state and stages included;
 - ``n`` (integers): what changes while a run goes on.
 
-Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the place in w where a stretch begins,
-``m.LINKS.parent(h, i)`` a field of row i of a wiring table, ``m.LINK_NUMBERS.row(h, i)`` the place of row i of a
+Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the index in w where a stretch begins,
+``m.LINKS.parent(h, i)`` a field of row i of a wiring table, ``m.LINK_NUMBERS.row(h, i)`` the index of row i of a
 table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.  Python reads the same rows by the
 names of their fields (`named`), and rows of the record by what they hold (`record`).
 
-Flat arrays, because a compiled call costs what its arguments cost, and compilation too.  No two of them share memory,
+Flat arrays, because a compiled call costs what its arguments cost, and compilation too.  No two of them overlap in
+memory,
 and the compiler knows: what a kernel has read from h stays read, whatever it writes into w.  So a kernel that writes is
 never given one of them twice.
 
@@ -23,7 +24,7 @@ speed; free ones come first, in the order of elimination (descendants before anc
 *column* is the twist (angular velocity; velocity of the point at the kernels' origin) per unit of a coordinate; every
 coordinate has one, and every port one more per moving shape of its body.
 
-Modes stand in X, U and the state as eigenmodes, in all else that has coordinates (DU, BIAS, COLUMNS, MASS, JACOBIAN,
+Modes are in X, U and the state as eigenmodes, in all else that has coordinates (DU, BIAS, COLUMNS, MASS, JACOBIAN,
 ...) in their body's interface basis (`bodies.interface`).
 """
 
@@ -48,7 +49,7 @@ from flexclear.pipeline.dynamics.kernels import field_reader, kernel, row_reader
 _place = count()
 #: tables in h, f and w, in their order there
 TABLES: dict[str, list[Any]] = {"h": [], "f": [], "w": []}
-#: places in the header of h by the names that kernels use (`fields`): of sizes, and of stretches of w
+#: indices in the header of h by the names that kernels use (`fields`): of sizes, and of stretches of w
 SIZES: dict[str, int] = {}
 STRETCHES: dict[str, int] = {}
 #: rows of tables and layouts as NumPy has them, by the class of what declares them
@@ -56,16 +57,16 @@ _ROWS: dict[type, np.dtype[Any]] = {}
 
 
 def _places(number: int) -> list[int]:
-    """The next places of the header of h."""
+    """The next indices of the header of h."""
     return [next(_place) for _ in range(number)]
 
 
 def _named(kind: dict[str, int], declared: str) -> list[int]:
-    """The next places of the header of h, which join those of their kind by name."""
+    """The next indices of the header of h, which join those of their kind by name."""
     names = declared.split()
-    found = _places(len(names))
-    kind.update(zip(names, found, strict=True))
-    return found
+    places = _places(len(names))
+    kind.update(zip(names, places, strict=True))
+    return places
 
 
 def _fields(declared: str) -> dict[str, tuple[int, ...]]:
@@ -90,12 +91,12 @@ def layout(declared: str) -> Any:
 
 
 def _table(array: str, declared: str, access: Callable[[int, int, int], Any]) -> Any:
-    (place,), fields = _places(1), _fields(declared)
+    (index,), fields = _places(1), _fields(declared)
     begins = _begins(fields)
     size = begins.pop("size")
     make: Any = namedtuple
     kind = make("Table", ["place", "size", "row", *fields])
-    table = kind(place, size, row_reader(place, size), *(access(place, size, begin) for begin in begins.values()))
+    table = kind(index, size, row_reader(index, size), *(access(index, size, begin) for begin in begins.values()))
     TABLES[array].append(table)
     number = np.int64 if array == "h" else np.float64
     _ROWS[kind] = np.dtype([(name, number, shape) for name, shape in fields.items()])
@@ -103,22 +104,24 @@ def _table(array: str, declared: str, access: Callable[[int, int, int], Any]) ->
 
 
 def wiring(declared: str) -> Any:
-    """A table in h: its `place` in the header, `size` and `row(h, i)` of its rows, and for each field field(h, i)."""
+    """A table in h: its `place` (index) in the header, `size` and `row(h, i)` of its rows, and for each field field(h,
+    i)."""
     return _table("h", declared, field_reader)
 
 
 def numbers(declared: str) -> Any:
-    """A table in f: its `place` in the header, `size` and `row(h, i)` of its rows, and where each field begins."""
-    return _table("f", declared, lambda place, size, begin: begin)
+    """A table in f: its `place` (index) in the header, `size` and `row(h, i)` of its rows, and where each field
+    begins."""
+    return _table("f", declared, lambda path, size, begin: begin)
 
 
 def work(declared: str) -> Any:
     """A table in w, otherwise like `numbers`."""
-    return _table("w", declared, lambda place, size, begin: begin)
+    return _table("w", declared, lambda path, size, begin: begin)
 
 
 def named(rows: Any, entries: np.ndarray) -> np.ndarray:
-    """Entries with named fields, a view; rows of a table or layout stand one after the other along the last axis."""
+    """Entries with named fields, a view; rows of a table or layout follow each other along the last axis."""
     return entries.view(_ROWS[type(rows)])
 
 
@@ -142,13 +145,13 @@ class Room:
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
     MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES, N_RUBBING, N_BEARINGS, RUBBING_SLOT,
-    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES,
+    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES, N_COMPONENTS,
 ) = _named(
     SIZES,
     "n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger n_pairs "
     "n_known_pairs n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
     "n_loads n_internal load_slot n_couplings n_surfaces n_rubbing n_bearings rubbing_slot n_worn wear_slot n_bodies "
-    "n_frames",
+    "n_frames n_components",
 )
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
@@ -156,22 +159,26 @@ class Room:
 EVALUATE, PROJECT, RETRACT, RATES = ADDRESSES = _places(4)
 
 # Wiring in h ---------------------------------------------------------------------------------------------------------
-#: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1
-LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by")
+#: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;
+#: component: independent mechanism that it belongs to, -1 of the ground
+LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by component")
 SITES = wiring("link port")  # port: or -1
-#: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes share entries of
-#: the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0, n_basis: entries
-#: of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in that basis
-FLEXES = wiring("link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0")
+#: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes have common
+#: entries of the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0,
+#: n_basis: entries of the basis, of which those of moving shapes begin at moving0; interface0: first of its numbers in
+#: that basis; book: place in the ledger of what its damping loses
+FLEXES = wiring(
+    "link n_modes q0 c0 data0 moment0 moment_row0 inboard coupled n_held basis0 n_basis moving0 interface0 book"
+)
 BASIS = wiring("mode shape")  # entries of the interface basis, shape after shape (`bodies.interface`)
 MOMENTS = wiring("mode")  # mode i of int rho S_ki S_lj, row after row
-MOMENT_ROWS = wiring("end")  # per body and row (3k + l) n + j of these: place in MOMENTS after its last one
+MOMENT_ROWS = wiring("end")  # per body and row (3k + l) n + j of these: index in MOMENTS after its last one
 PORTS = wiring("flex column shapes")  # column, shapes: first of them, those of moving shapes
 PAIRS = wiring("momentum column entry")  # place in the mass matrix's envelope
 KNOWN_PAIRS = wiring("momentum column drive coordinate")
-#: rows of the mass matrix. first: column; origin: place of column 0, which may lie before that of the first
+#: rows of the mass matrix. first: column; origin: index of column 0, which may lie before that of the first
 ENVELOPE = wiring("first origin")
-#: threes: of rows that are solved for, which stand side by side in JACOBIAN and SPREAD and are worked on together; the
+#: threes: of rows that are solved for, which are adjacent in JACOBIAN and SPREAD and are worked on together; the
 #: last of them may end with zeros.  coupling: that this closure is, or -1
 CLOSURES = wiring(
     "site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept threes coupling"
@@ -184,16 +191,17 @@ COUPLINGS = wiring("first second")  # gauges of two joint coordinates, of which 
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
 CLOSURE_ENVELOPE = wiring("first origin")  # of the rows that are solved for
-#: outer, inner: sites; friction: its law or -1; bristle: place of the bristles' deflection in the state or -1
+#: outer, inner: sites; friction: its law or -1; bristle: index of the bristles' deflection in the state or -1
 CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: their kind; of a stop its gauge
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first
 PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
 #: a: site, -1 where the world holds against it; gauge, measured: of the joint coordinate that it acts along, and of one
-#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame
-LOADS = wiring("a b law0 number0 gauge measured internal0 follows")
+#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame; book: where
+#: in the ledger its work is, and then its loss
+LOADS = wiring("a b law0 number0 gauge measured internal0 follows book")
 LOAD_KINDS = wiring("load0 n_loads")
 #: how a joint coordinate is measured between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
-#: turns: place of the angle with its full turns among the internal states or -1
+#: turns: index of the angle with its full turns among the internal states or -1
 GAUGES = wiring("a b turns turning side axis sine_f sine_g cosine_f cosine_g")
 #: ideal joints with friction. site_a, site_b: of their frames; link: whose inboard joint it is, or -1; reversed:
 #: whether that link is on the side of the first frame; closure: that it is, or -1
@@ -209,6 +217,8 @@ REACTION_LOOPS = wiring("closure sign part")  # closures that act beyond it
 WORN = wiring("contact")  # contacts whose wear is counted
 BODIES, FRAMES = wiring("link"), wiring("link")  # moving bodies and named frames: what is recorded, which no step reads
 GROUPS = wiring("group")  # error group of each state variable
+BOOKS = wiring("work loss load")  # of each independent mechanism: places in the ledger (`DRIVE_WORK`, ...)
+DRIVES = wiring("book")  # place in the ledger of each drive's work
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
 LINK_NUMBERS = numbers("mass com:3 inertia:6")  # inertia about the centre of mass (xx yy zz xy xz yz), link axes
@@ -221,8 +231,8 @@ INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), 
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port and moving shape r: translation shape (3r), rotation shape (3r)
 #: radius: of the inner surface; kinks: sliding speeds at which the friction law bends, or 0; shape: what else its kind
-#: of surfaces has
-CONTACT_NUMBERS = numbers("clearance radius floor stick_speed kinks:2 normal_law:4 friction_law:6 shape:2")
+#: of surfaces has; length: size of the mechanism that it belongs to
+CONTACT_NUMBERS = numbers("clearance radius floor stick_speed kinks:2 normal_law:4 friction_law:6 shape:2 length")
 #: radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per force
 #: along the axis and per moment about it; preload: normal force that is always there; kinks: as of CONTACT_NUMBERS;
 #: turning_kink: size of sliding speeds of a law that bends where sliding reverses, or 0
@@ -233,7 +243,10 @@ HARMONICS = numbers("amplitude frequency phase")  # angular frequency
 LOAD_NUMBERS = numbers("value")  # see `loads`
 LOAD_KINKS = numbers("speeds:2")  # of each load, along its joint coordinate, at which its friction bends, or 0
 GRAVITY = numbers("acceleration:3")
-FLOORS = numbers("magnitude")  # per error group: below it is resolved absolutely
+#: per error group. magnitude: below it is resolved absolutely, natural: the same by the size of all that there is;
+#: share: factor of its tolerance by which no independent mechanism is resolved less well than alone
+FLOORS = numbers("magnitude natural share")
+CLOSURE_NUMBERS = numbers("weight")  # of each closure's lengths, so that the loops of small mechanisms close as well
 #: of bodies and named frames in their link, undeformed. mass, com, inertia: as of LINK_NUMBERS; mass and inertia are 0
 #: where nothing but the body itself is in its link
 BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("mass com:3 inertia:6 axes:3x3"), numbers("origin:3")
@@ -258,16 +271,16 @@ BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = 
 )
 #: wrenches of the closure rows; then, of the couplings, those on their first joints
 ROWS = work("moment:3 force:3")
-#: ROW_SCALE: per kept row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
+#: ROW_SCALE: per selected row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
 #: room for all rows, that of the last evaluation, which may be a trial far away
 JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _named(
     STRETCHES, "jacobian spread schur row_scale pivot multiplier"
 )
-#: per kept row its distance from those before it, at the end of the step, at its start, and the most that it has been,
-#: each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
+#: per selected row its distance from those before it, at the end of the step, at its start, and the most that it has
+#: been, each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
 INDEPENDENCE, COLLOCATION = _named(STRETCHES, "independence collocation")
 COLLOCATION_ROWS = 13
-#: smallest pivot of J M^-1 J^T as share of its row's largest diagonal entry (1: rows at right angles, 0:
+#: smallest pivot of J M^-1 J^T as fraction of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
 LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)
 #: what a contact does now; bent: what the bristles store
@@ -305,7 +318,7 @@ WATCH = work(
 HEADER = next(_place)
 
 # the ledger before the contacts' slots (three deflections of each contact with bristles come after them):
-# work of drives, loss of modal damping
+# work of drives, loss of modal damping, both of the first independent mechanism; BOOKS says where those of others are
 DRIVE_WORK, MODAL_LOSS, CONTACT_SLOTS = range(3)
 #: a contact's slots there: losses of its damping and of friction, impulse of its normal force
 CONTACT_LEDGER = layout("damping friction impulse")
@@ -321,13 +334,13 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # of the equations that a step met;
 # then what `singular_step` keeps: independence of the closure rows at the end of the step, time of its start, time of
 # the next singular pose, how far before it the stepper stops, the most that this may be (0: it does not stop), length
-# of the polynomial that lies ready (0: none), the share of it that the present step is, the least share that a row has
-# left of the most that it had, steps in a row that ended blindly near a pose;
+# of the polynomial that lies ready (0: none), the fraction of it that the present step is, the least fraction that a
+# row has left of the most that it had, steps in a row that ended blindly close to a pose;
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
 # what the last first step with a contact closed could have been, whether the next accepted step is the first one of a
 # segment
 TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
-SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, SHARE, LEFT, BLIND_STEPS = range(13, 22)
+SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, FRACTION, LEFT, BLIND_STEPS = range(13, 22)
 REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(22, 27)
 
 # Integers in n -------------------------------------------------------------------------------------------------------
@@ -372,7 +385,7 @@ STEEPLY = 1e300
 
 
 def _record_columns(contacts: int) -> tuple[int, int, int]:
-    """Where a row of the record has the contacts' modes, their impact rates and the state; its time stands first."""
+    """Where a row of the record has the contacts' modes, their impact rates and the state; its time is first."""
     return 1, 1 + contacts, 1 + 2 * contacts
 
 

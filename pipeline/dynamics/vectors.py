@@ -14,19 +14,19 @@ ZERO, IDENTITY = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 @kernel
 def at(a, i):
-    """Vector stored in a flat array from place i."""
+    """Vector stored in a flat array from index i."""
     return (a[i], a[i + 1], a[i + 2])
 
 
 @kernel
 def put(a, i, v):
-    """Store a vector from place i."""
+    """Store a vector from index i."""
     a[i], a[i + 1], a[i + 2] = v[0], v[1], v[2]
 
 
 @kernel
 def accumulate(a, i, v):
-    """Add a vector to the one stored from place i."""
+    """Add a vector to the one stored from index i."""
     a[i] += v[0]
     a[i + 1] += v[1]
     a[i + 2] += v[2]
@@ -34,19 +34,19 @@ def accumulate(a, i, v):
 
 @kernel
 def at9(a, i):
-    """Matrix stored in a flat array from place i."""
+    """Matrix stored in a flat array from index i."""
     return (a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5], a[i + 6], a[i + 7], a[i + 8])
 
 
 @kernel
 def at6(a, i):
-    """Symmetric matrix (xx, yy, zz, xy, xz, yz) stored from place i."""
+    """Symmetric matrix (xx, yy, zz, xy, xz, yz) stored from index i."""
     return (a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5])
 
 
 @kernel
 def put9(a, i, m):
-    """Store a matrix from place i."""
+    """Store a matrix from index i."""
     put(a, i, (m[0], m[1], m[2]))
     put(a, i + 3, (m[3], m[4], m[5]))
     put(a, i + 6, (m[6], m[7], m[8]))

@@ -19,7 +19,7 @@ def answered(data: xr.Dataset, text: str, picture: bytes | None = None, table: s
     import base64
     import html
 
-    found = Answered(data.data_vars, coords=data.coords, attrs=data.attrs)
+    result = Answered(data.data_vars, coords=data.coords, attrs=data.attrs)
     image = "" if picture is None else f"<img src='data:image/png;base64,{base64.b64encode(picture).decode()}' alt=''>"
-    found._answer = f"<p>{html.escape(text)}</p>{image}{table}"
-    return found
+    result._answer = f"<p>{html.escape(text)}</p>{image}{table}"
+    return result

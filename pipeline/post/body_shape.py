@@ -41,12 +41,12 @@ def faces(bundle: xr.Dataset) -> np.ndarray:
     return np.stack(corners, axis=-1).reshape(-1, 4)
 
 
-def scale_to(bundle: xr.Dataset, q: np.ndarray, share: float) -> float:
+def scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:
     """Factor that makes the largest displacement `share` of the body's length; 1 for no displacement."""
     if is_rod(bundle):
-        return rod_shape.scale_to(bundle, q, share)
+        return rod_shape.scale_to(bundle, q, fraction)
     largest = float(surface(bundle, q)[1].max())
-    return share * float(box(bundle)[1][0]) / largest if largest > 0.0 else 1.0
+    return fraction * float(box(bundle)[1][0]) / largest if largest > 0.0 else 1.0
 
 
 def box(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:

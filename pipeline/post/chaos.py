@@ -14,20 +14,20 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-#: frequencies that the 0-1 test tries; near 0 and pi it resonates with slow drifts and with motions of period two
+#: frequencies that the 0-1 test tries; close to 0 and pi it resonates with slow drifts and with motions of period two
 FREQUENCIES = 100
 AWAY = np.pi / 5.0
 #: batches of the exponent's confidence interval: enough for a t distribution, few enough to be nearly independent
 BATCHES = 20
-#: longest period that is looked for, in periods of the drive
+#: longest period that is searched for, in periods of the drive
 LONGEST = 32
 #: lines of a spectrum that may hold nearly everything, where a motion has few frequencies
 LINES = 16
-#: a state that comes back to this share of the motion's size has come back: what is left is far below any picture
+#: a state that comes back to this fraction of the motion's size has come back: what is left is far below any picture
 RETURNED = 1e-4
-#: returns from which a contraction is told
+#: returns from which a contraction is reported
 FEWEST = 4
-#: an observable stands still when it changes by less than this share of its size: rounding and the steps' errors
+#: an observable is still when it changes by less than this fraction of its size: rounding and the steps' errors
 STANDING = 1e-9
 
 
@@ -54,7 +54,7 @@ def exponent(growth: np.ndarray, period: float) -> Interval:
 
 
 def zero_one(series: np.ndarray, seed: int = 20190310) -> float:
-    """K of the 0-1 test, near 0 for regular and near 1 for chaotic motion; NaN for a series that stands still.
+    """K of the 0-1 test, close to 0 for regular and close to 1 for chaotic motion; NaN for a series that is still.
 
     series: one observable, shape (n,), of some hundreds at least.  Its mean is taken off, so that the mean square
     displacement of the translation variables has no oscillating term; its correlation with time, up to n / 10, is K,
@@ -66,19 +66,19 @@ def zero_one(series: np.ndarray, seed: int = 20190310) -> float:
         return float("nan")
     j, cut = np.arange(1, n + 1), n // 10
     lags = np.arange(1, cut + 1)
-    found = list[float]()
+    correlations = list[float]()
     for c in np.random.default_rng(seed).uniform(AWAY, np.pi - AWAY, FREQUENCIES):
         path = np.cumsum(x * np.exp(1j * c * j))
         displacement = [float(np.mean(np.abs(path[k : k + n - cut] - path[: n - cut]) ** 2)) for k in lags]
-        found.append(float(np.corrcoef(lags, displacement)[0, 1]))
-    return float(np.median(found))
+        correlations.append(float(np.corrcoef(lags, displacement)[0, 1]))
+    return float(np.median(correlations))
 
 
 def period_of(states: np.ndarray, size: float) -> tuple[int, float]:
     """Smallest number of periods after which the last quarter of the states comes back; 0 where none up to LONGEST is.
 
     states: shape (n, d).  size: of the whole motion, of which RETURNED counts as nothing.
-    Returns the number, and the largest distance of a return as a share of the size: of the number's, or of the best.
+    Returns the number, and the largest distance of a return as a fraction of the size: of the number's, or of the best.
     """
     last = states[-max(len(states) // 4, 4) :]
     best = np.inf
@@ -104,7 +104,7 @@ def contraction(states: np.ndarray, period: int = 1) -> float:
 
 
 def spectrum(series: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Share of the variance at each frequency (cycles per period), Hann window; shapes (n // 2 + 1,)."""
+    """Fraction of the variance at each frequency (cycles per period), Hann window; shapes (n // 2 + 1,)."""
     x = (series - series.mean()) * np.hanning(len(series))
     power = np.abs(np.fft.rfft(x)) ** 2
     total = power.sum()
@@ -112,15 +112,16 @@ def spectrum(series: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def few_lines(series: np.ndarray) -> float:
-    """Share of the variance in the LINES largest lines of the spectrum, each with its two neighbours on both sides."""
+    """Fraction of the variance in the LINES largest lines of the spectrum, each with its two neighbours on both
+    sides."""
     _, power = spectrum(series)
-    left, share = power.copy(), 0.0
+    left, fraction = power.copy(), 0.0
     for _ in range(LINES):
         k = int(np.argmax(left))
         around = slice(max(k - 2, 0), k + 3)
-        share += float(left[around].sum())
+        fraction += float(left[around].sum())
         left[around] = 0.0
-    return share
+    return fraction
 
 
 def principal(states: np.ndarray, count: int = 3) -> np.ndarray:
@@ -135,7 +136,7 @@ def principal(states: np.ndarray, count: int = 3) -> np.ndarray:
 
 
 def autocorrelation(series: np.ndarray, lags: int = 20) -> np.ndarray:
-    """Correlation of a series with itself, 0 to `lags` periods later; NaN where it stands still."""
+    """Correlation of a series with itself, 0 to `lags` periods later; NaN where it is still."""
     x = series - series.mean()
     total = float(x @ x)
     if total == 0.0:

@@ -24,7 +24,7 @@ DISCREPANCIES = (
         "each other would be singular.",
         "Of five numbers of a symmetric layout two are fitted to angle and displacement of Table 8, three chosen by a "
         "rule; velocities, accelerations and forces are predictions, and Table 8's velocity contradicts them, see "
-        "[geometry.md](geometry.md). The layout that was assumed before stands beside Table 8, in the scenes "
+        "[geometry.md](geometry.md). The layout that was assumed before is next to Table 8, in the scenes "
         "sps4/variants/first*.",
     ),
     Discrepancy(
@@ -40,8 +40,8 @@ DISCREPANCIES = (
     ),
     Discrepancy(
         "eqs. (28), (29)",
-        "STEP is called with its first place above its second, for which its definition gives a constant.",
-        "The places are put in ascending order: the coefficient falls from the static to the dynamic one "
+        "STEP is called with its first argument above its second, for which its definition gives a constant.",
+        "The arguments are put in ascending order: the coefficient falls from the static to the dynamic one "
         "between the two velocities.",
     ),
     Discrepancy(
@@ -86,7 +86,7 @@ DISCREPANCIES = (
     Discrepancy(
         "Figs. 14-16",
         "The plots are called Poincaré maps; one stroke has no period to strobe, so they are phase plots.",
-        "Phase plots as printed, and beside them the states at the instants when impacts begin.",
+        "Phase plots as printed, and next to them the states at the instants when impacts begin.",
     ),
     Discrepancy(
         "Fig. 13, Table 9",

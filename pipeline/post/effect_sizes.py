@@ -19,7 +19,7 @@ from flexclear.pipeline.post.overview.curves import measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table
 
 Names = frozenset[str]
-#: stands for a variant that nobody asked for
+#: represents a variant that nobody asked for
 UNKNOWN = Point({}, {}, {}, 0, "not run")
 #: ranges below this have ticks between the powers of ten
 FEW = 30.0
@@ -37,8 +37,8 @@ def variants(effects: Sequence[Effect]) -> list[Names]:
     """The variants that are needed, each once: full, bare, and each effect and each pair taken away and put in."""
     every = frozenset(effect.name for effect in effects)
     chosen = [frozenset(pair) for n in (0, 1, 2) for pair in combinations(every, n)]
-    found = [closed(effects, gone) for few in chosen for gone in (few, every - closed_up(effects, few))]
-    return list(dict.fromkeys(sorted(found, key=lambda names: (len(names), sorted(names)))))
+    sets = [closed(effects, gone) for few in chosen for gone in (few, every - closed_up(effects, few))]
+    return list(dict.fromkeys(sorted(sets, key=lambda names: (len(names), sorted(names)))))
 
 
 def closed(effects: Sequence[Effect], gone: Names) -> Names:
@@ -60,7 +60,7 @@ def assemble(
 ) -> xr.Dataset:
     """Influences over (effect, other, quantity) in the quantities' SI units, each with an `_uncertainty`.
 
-    On the diagonal of (effect, other) stands what one effect does alone.  points: by the effects that a variant lacks.
+    On the diagonal of (effect, other) is what one effect does alone.  points: by the effects that a variant lacks.
     units: of the chosen quantities.  nan where a variant was refused; infinite where the quantity goes with the effect.
     """
     every, n = frozenset(effect.name for effect in effects), len(effects)
@@ -75,13 +75,13 @@ def assemble(
             bare, lost = points.get(ground, UNKNOWN), points[closed(effects, pair)]
             gained = points[every - closed_up(effects, pair)]
             alone = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
-            apart = i != j and one.within != other.name and other.within != one.name
+            independent = i != j and one.within != other.name and other.within != one.name
             for k, quantity in enumerate(chosen):
-                found = {"dropped": _between(lost, full, quantity, members)}
-                found["added"] = _between(gained, bare, quantity, members)
-                if apart:
-                    found["interaction"] = _interaction(gained, alone, bare, quantity, members)
-                for name, value in found.items():
+                variables = {"dropped": _between(lost, full, quantity, members)}
+                variables["added"] = _between(gained, bare, quantity, members)
+                if independent:
+                    variables["interaction"] = _interaction(gained, alone, bare, quantity, members)
+                for name, value in variables.items():
                     data[name][i, j, k], data[f"{name}_uncertainty"][i, j, k] = value.difference, value.uncertainty
     dims = ("effect", "other", "quantity")
     result = xr.Dataset(
@@ -127,37 +127,37 @@ def _interaction(both: Point, alone: Sequence[Point], bare: Point, quantity: Qua
     return influence(Point(values, {}, deviation, 0), nothing, quantity, members)
 
 
-def table(found: xr.Dataset) -> Table:
+def table(dataset: xr.Dataset) -> Table:
     """Each effect alone: what its loss and its gain do to each quantity; and the strongest interactions."""
     rows = []
-    for k, quantity in enumerate(found["quantity"].values):
-        unit = str(found["unit"].values[k])
-        for i, effect in enumerate(found["effect"].values):
-            cells = [_cell(found, name, i, i, k, unit) for name in ("dropped", "added")]
-            rows.append((str(quantity), str(effect), *cells, *_partner(found, i, k, unit)))
+    for k, quantity in enumerate(dataset["quantity"].values):
+        unit = str(dataset["unit"].values[k])
+        for i, effect in enumerate(dataset["effect"].values):
+            cells = [_cell(dataset, name, i, i, k, unit) for name in ("dropped", "added")]
+            rows.append((str(quantity), str(effect), *cells, *_partner(dataset, i, k, unit)))
     notes = [
         "Dropped: largest change of the quantity over the run when the effect is taken from the full scene. Added: "
         "when it is put into the bare one (friction: into the one with its clearance). Interaction: what it does "
         "together with the effect named, beyond the sum of both.",
         "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
-    notes += [f"Refused: {line}" for line in filter(None, found.attrs["refused"].split("\n"))]
+    notes += [f"Refused: {line}" for line in filter(None, dataset.attrs["refused"].split("\n"))]
     columns = ("quantity", "effect", "dropped", "added", "interaction", "with")
     return Table("What each effect does", columns, tuple(rows), tuple(notes))
 
 
-def _partner(found: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
+def _partner(dataset: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
     """The strongest interaction of an effect, and with which."""
-    sizes = found["interaction"].values[i, :, k]
+    sizes = dataset["interaction"].values[i, :, k]
     finite = np.where(np.isfinite(sizes), sizes, -1.0)
     if not len(finite) or finite.max() < 0.0:
         return "–", "–"
     j = int(np.argmax(finite))
-    return _cell(found, "interaction", i, j, k, unit), str(found["effect"].values[j])
+    return _cell(dataset, "interaction", i, j, k, unit), str(dataset["effect"].values[j])
 
 
-def _cell(found: xr.Dataset, name: str, i: int, j: int, k: int, unit: str) -> str:
-    return written(float(found[name].values[i, j, k]), float(found[f"{name}_uncertainty"].values[i, j, k]), unit)
+def _cell(dataset: xr.Dataset, name: str, i: int, j: int, k: int, unit: str) -> str:
+    return written(float(dataset[name].values[i, j, k]), float(dataset[f"{name}_uncertainty"].values[i, j, k]), unit)
 
 
 def written(value: float, uncertainty: float, unit: str) -> str:
@@ -172,8 +172,8 @@ def written(value: float, uncertainty: float, unit: str) -> str:
     return f"{rounded(factor * value, 3)} {shown}"
 
 
-def chart(name: str, found: xr.Dataset, title: str, wanted: Mapping[str, float] | None = None) -> dict[str, bytes]:
-    """Bars of what each effect does alone, a panel for each quantity; a line where an accuracy is wanted.
+def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, float] | None = None) -> dict[str, bytes]:
+    """Bars of what each effect does alone, a panel for each quantity; a line where an accuracy is requested.
 
     Uses `dropped` and, where there is one, `added`, of single effects.
     """
@@ -181,11 +181,11 @@ def chart(name: str, found: xr.Dataset, title: str, wanted: Mapping[str, float] 
 
     from flexclear.pipeline.post.plotting import style
 
-    names = [str(effect) for effect in found["effect"].values]
-    chosen = [str(quantity) for quantity in found["quantity"].values]
+    names = [str(effect) for effect in dataset["effect"].values]
+    chosen = [str(quantity) for quantity in dataset["quantity"].values]
     columns = min(2, len(chosen))
     rows = -(-len(chosen) // columns)
-    kinds = [kind for kind in ("dropped", "added") if kind in found]
+    kinds = [kind for kind in ("dropped", "added") if kind in dataset]
     with style.style():
         height = 1.1 + rows * (0.9 + 0.3 * len(names))
         figure, axes = style.grid(rows, columns, (10.0, height), sharey=True)
@@ -194,7 +194,11 @@ def chart(name: str, found: xr.Dataset, title: str, wanted: Mapping[str, float] 
                 panel.set_visible(False)
                 continue
             for n, kind in enumerate(kinds):
-                values = np.diagonal(found[kind].values[:, :, k]) if found[kind].ndim == 3 else found[kind].values[:, k]
+                values = (
+                    np.diagonal(dataset[kind].values[:, :, k])
+                    if dataset[kind].ndim == 3
+                    else dataset[kind].values[:, k]
+                )
                 place = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
                 panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
@@ -206,15 +210,15 @@ def chart(name: str, found: xr.Dataset, title: str, wanted: Mapping[str, float] 
             least = min((bar.get_width() for bar in panel.patches if bar.get_width() > 0.0), default=0.0)
             if least > 0.0:  # bars that begin near their ends would make small differences look large
                 panel.set_xlim(left=0.1 * least)
-            if wanted and np.isfinite(wanted.get(chosen[k], np.nan)):
-                panel.axvline(wanted[chosen[k]], color="#D55E00", lw=1.3, label="wanted accuracy")
+            if requested and np.isfinite(requested.get(chosen[k], np.nan)):
+                panel.axvline(requested[chosen[k]], color="#D55E00", lw=1.3, label="requested accuracy")
             low, high = panel.get_xlim()
             if high < FEW * low:
                 style.plain(panel.xaxis)
             else:
                 panel.xaxis.set_minor_formatter(NullFormatter())
             panel.set_yticks(np.arange(len(names)), names, fontsize=7.6)
-            panel.set_title(f"{chosen[k]} [{found['unit'].values[k]}]")
+            panel.set_title(f"{chosen[k]} [{dataset['unit'].values[k]}]")
         axes.flat[0].set_ylim(len(names) - 0.5, -0.5)  # the first on top, and room for the last without a bar
         style.heading(figure, title)
         style.shared_legend(figure, axes.flat[0], 3)

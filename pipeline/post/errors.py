@@ -50,8 +50,8 @@ def velocity_at_events(run: xr.Dataset, smooth: xr.Dataset, body: str, until: fl
     inside = time <= min(until, smooth.time.values[-1]) + SAME_TIME * time[-1]
     mine, other = (one.sel(body=body, axis="z") for one in (run, smooth))
     known = CubicHermiteSpline(other.time.values, other.velocity.values, other.acceleration.values)
-    apart = np.abs(mine.velocity.values - known(time))[inside]
-    return float(apart.max()), float(time[inside][apart.argmax()])
+    differences = np.abs(mine.velocity.values - known(time))[inside]
+    return float(differences.max()), float(time[inside][differences.argmax()])
 
 
 def ensemble_deviations(ensemble: xr.Dataset, reference: xr.Dataset, body: str) -> list[Deviation]:

@@ -44,7 +44,7 @@ def impacts(run: xr.Dataset | LabelledArrays) -> dict[str, tuple[tuple[str, ...]
     }
 
 
-#: what the run's ledger books of contacts, by the name that an impact's share of it has
+#: what the run's ledger books of contacts, by the name that an impact's fraction of it has
 BOOKS = {
     "impact_impulse": "contact_impulse",
     "impact_damping_loss": "contact_damping_loss",
@@ -56,15 +56,15 @@ def _books(
     run: xr.Dataset | LabelledArrays, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray
 ) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """Impulse and losses of each impact, NaN where it has not ended; there are rows at all events."""
-    time, found = run["time"].values, dict[str, tuple[tuple[str, ...], np.ndarray]]()
+    time, booked = run["time"].values, dict[str, tuple[tuple[str, ...], np.ndarray]]()
     for name, book in BOOKS.items():
         if book in run:
-            values, shares = run[book].values, np.full(len(contact), np.nan)
+            values, fractions = run[book].values, np.full(len(contact), np.nan)
             names = list(run["contact"].values)
             for i, c in enumerate(names.index(name) for name in contact):
-                shares[i] = np.interp(ended[i], time, values[:, c]) - np.interp(begun[i], time, values[:, c])
-            found[name] = (("impact",), shares)
-    return found
+                fractions[i] = np.interp(ended[i], time, values[:, c]) - np.interp(begun[i], time, values[:, c])
+            booked[name] = (("impact",), fractions)
+    return booked
 
 
 def of_kind(run: xr.Dataset | LabelledArrays, name: str) -> np.ndarray:

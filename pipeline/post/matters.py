@@ -98,19 +98,19 @@ def assemble(
         "unit": ("quantity", list(units)),
     }
     refused = {name: p.without.refused or p.full.refused for name, p in pairs.items()}
-    told = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why)
-    return xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": told, "undone": undone})
+    text = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why)
+    return xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": text, "undone": undone})
 
 
-def ideal_sentences(found: xr.Dataset) -> list[str]:
+def ideal_sentences(result: xr.Dataset) -> list[str]:
     """A sentence for each quantity, as HTML: what clearance and flexibility change in it."""
-    if IDEAL not in found["effect"].values:
+    if IDEAL not in result["effect"].values:
         return []
-    one, said = found.sel(effect=IDEAL), []
-    for k, name in enumerate(str(q) for q in found["quantity"].values):
+    one, said = result.sel(effect=IDEAL), []
+    for k, name in enumerate(str(q) for q in result["quantity"].values):
         change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
         if np.isfinite(change.difference):
-            text = _change(change, float(found["size"][k]), str(found["unit"].values[k]), int(one["members"]))
+            text = _change(change, float(result["size"][k]), str(result["unit"].values[k]), int(one["members"]))
             said.append(f"<b>{html.escape(name)}</b>: {text}.")
     return said
 
@@ -141,16 +141,16 @@ def needed(change: Influence, scale: float, members: int) -> int:
     return int(np.ceil(members * (fewer * change.uncertainty / enough) ** 2)) if enough > 0.0 else 2 * members
 
 
-def sentence(found: xr.Dataset, wanted: Mapping[str, float]) -> str:
+def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     """Which effects matter, in one paragraph.
 
-    wanted: the accuracy that the scene asks for, by quantity in SI; without it three levels answer.
+    requested: the accuracy that the scene asks for, by quantity in SI; without it three levels answer.
     """
-    single = found.sel(effect=[e for e in found["effect"].values if e != IDEAL])
+    single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
     if not single.sizes["effect"]:
         return "The scene has no effect that could be taken away."
-    levels = [("The accuracy that the scene asks for", _limits(found, wanted))] if wanted else [
-        (f"An accuracy of {100.0 * level:g} %", level * found["size"].values) for level in LEVELS
+    levels = [("The accuracy that the scene asks for", _limits(result, requested))] if requested else [
+        (f"An accuracy of {100.0 * level:g} %", level * result["size"].values) for level in LEVELS
     ]  # fmt: skip
     said, before, calm = list[str](), list[str](), list[str]()
     for name, limits in levels:
@@ -166,13 +166,13 @@ def sentence(found: xr.Dataset, wanted: Mapping[str, float]) -> str:
     more = "no more" if before else "none"
     said += [f"{name} calls for {more}." for name in calm[:1]]
     said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
-    if found.attrs["undone"]:
-        said.append(f"Not looked into within the budget: {found.attrs['undone']}.")
+    if result.attrs["undone"]:
+        said.append(f"Not looked into within the budget: {result.attrs['undone']}.")
     return " ".join(said)
 
 
-def _limits(found: xr.Dataset, wanted: Mapping[str, float]) -> np.ndarray:
-    return np.array([wanted.get(str(q), np.inf) for q in found["quantity"].values])
+def _limits(result: xr.Dataset, requested: Mapping[str, float]) -> np.ndarray:
+    return np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
 
 
 def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
@@ -190,25 +190,25 @@ def _enumerated(names: Sequence[str]) -> str:
     return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + f" and {names[-1]}"
 
 
-def table(found: xr.Dataset) -> Table:
+def table(result: xr.Dataset) -> Table:
     """Effects as rows, quantities as columns: what is different without the effect."""
     rows = []
-    for i, words in enumerate(str(w) for w in found["words"].values):
+    for i, words in enumerate(str(w) for w in result["words"].values):
         cells = [
             written(
-                float(found["dropped"][i, k]),
-                float(found["dropped_uncertainty"][i, k]),
-                str(found["unit"].values[k]),
+                float(result["dropped"][i, k]),
+                float(result["dropped_uncertainty"][i, k]),
+                str(result["unit"].values[k]),
             )
-            for k in range(found.sizes["quantity"])
+            for k in range(result.sizes["quantity"])
         ]
-        members = int(found["members"][i])
+        members = int(result["members"][i])
         rows.append((words, *cells, str(members) if members else "one run"))
     notes = ["Largest change of each quantity over the run without the effect; behind ±: what of it may be chance."]
-    notes += [f"Refused: {line}" for line in filter(None, found.attrs["refused"].split("\n"))]
+    notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
     return Table(
         "What each effect does",
-        ("without", *(str(q) for q in found["quantity"].values), "members"),
+        ("without", *(str(q) for q in result["quantity"].values), "members"),
         tuple(rows),
         tuple(notes),
     )

@@ -18,7 +18,7 @@ class Model:
 
     scene: str
     label: str
-    color: str  #: Okabe-Ito palette: told apart by colour-blind readers too
+    color: str  #: Okabe-Ito palette: distinguished by colour-blind readers too
     ours: bool = False
 
 

@@ -1,4 +1,4 @@
-"""The page about the paper: what holds of it first, then all that stands behind; one file with all inside."""
+"""The page about the paper: what holds of it first, then all that is behind; one file with all inside."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ def html_page(content: Content, drawn: Sequence[tuple[str, str]], assumptions: S
     )
     results = [table for name, table in content.tables.items() if name not in (*GIVEN, VERDICTS)]
     given = [content.tables[name] for name in GIVEN if name in content.tables]
-    told = content.documents
+    documents = content.documents
     parts = [
         Part("verdicts", "The verdict on every statement", _verdicts(content.tables.get(VERDICTS))),
         Part("film", "The mechanism moving", _film(content)),
         Part("figures", "Figures", figures),
         Part("tables", "Tables", "".join(as_html(table) for table in results)),
-        Part("accuracy", "Accuracy against time", told.get("accuracy", "")),
-        Part("stability", "Stability: hard cases, and what became of each", told.get("stability", "")),
-        Part("chaos", "Periodic or chaotic", told.get("chaos", "")),
-        Part("conditions", "Reference conditions of the modes", told.get("conditions", "")),
+        Part("accuracy", "Accuracy against time", documents.get("accuracy", "")),
+        Part("stability", "Stability: hard cases, and what became of each", documents.get("stability", "")),
+        Part("chaos", "Periodic or chaotic", documents.get("chaos", "")),
+        Part("conditions", "Reference conditions of the modes", documents.get("conditions", "")),
         Part("parameters", "Parameters, as the paper prints them and as they are here", "".join(map(as_html, given))),
         Part("variants", "Variants", prose(("scene", "what it is"), content.variants)),
         Part(
@@ -82,11 +82,11 @@ def _answer(content: Content) -> str:
     lines = [f"<li>Of {len(said)} statements of the paper, judged by rules: {counts}.</li>"]
     for row in table.rows:
         if row[verdict] in BAD:
-            place, text, word, numbers = row
+            section, text, word, numbers = row
             lines.append(
-                f"<li><i>{html.escape(text)}</i> ({html.escape(place)}): {_word(word)}; {html.escape(numbers)}.</li>"
+                f"<li><i>{html.escape(text)}</i> ({html.escape(section)}): {_word(word)}; {html.escape(numbers)}.</li>"
             )
-    where = "<a href='#verdicts'>All verdicts</a>, <a href='#tables'>tables beside the paper's</a>"
+    where = "<a href='#verdicts'>All verdicts</a>, <a href='#tables'>tables next to the paper's</a>"
     return f"<ul>{''.join(lines)}</ul><p>{where}.</p>"
 
 
@@ -115,8 +115,8 @@ def _film(content: Content) -> str:
 
 
 def _versions(content: Content) -> str:
-    keys = list(dict.fromkeys(key for told in content.facts.values() for key in told))
-    rows = [(f"`{scene}`", *(told.get(key, "") for key in keys)) for scene, told in content.facts.items()]
+    keys = list(dict.fromkeys(key for facts in content.facts.values() for key in facts))
+    rows = [(f"`{scene}`", *(facts.get(key, "") for key in keys)) for scene, facts in content.facts.items()]
     return prose(("scene", *keys), rows)
 
 

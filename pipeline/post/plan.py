@@ -14,12 +14,12 @@ from flexclear.pipeline.post.plotting.table import Table
 
 
 def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
-    """Influences over (effect, quantity), decisions and evidence over effects, what is wanted over quantities; SI.
+    """Influences over (effect, quantity), decisions and evidence over effects, what is requested over quantities; SI.
 
     units: of the quantities, by name.  nan where nothing was estimated, infinite where nothing bounds it or the events
     differ.
     """
-    names = list(plan.wanted)
+    names = list(plan.requested)
     shape = (len(plan.decisions), len(names))
     estimate, doubt = (np.full(shape, np.nan) for _ in range(2))
     for i, decision in enumerate(plan.decisions):
@@ -33,16 +33,16 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         "integrator": plan.integrator,
         "rtol": plan.rtol,
         **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
-        "apart": list(plan.apart),
+        "uncoupled": list(plan.uncoupled),
     }
-    found = xr.Dataset(
+    plan_dataset = xr.Dataset(
         {
             "influence": (("effect", "quantity"), estimate),
             "uncertainty": (("effect", "quantity"), doubt),
             "kept": (("effect",), np.array([int(d.kept) for d in plan.decisions], dtype=np.int8)),
             "evidence": (("effect",), np.array([d.evidence for d in plan.decisions], dtype=object)),
             "reason": (("effect",), np.array([d.reason for d in plan.decisions], dtype=object)),
-            "wanted": (("quantity",), np.array([plan.wanted[name] for name in names])),
+            "wanted": (("quantity",), np.array([plan.requested[name] for name in names])),
             "integration": (("quantity",), np.array([plan.integration.get(name, np.nan) for name in names])),
             "elements": (("body",), np.array([m.given for m in meshes], dtype=np.int64)),
             "elements_called_for": (("body",), np.array([m.called_for for m in meshes], dtype=np.int64)),
@@ -78,53 +78,55 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         "wanted": "accuracy that the scene asks for",
         "integration": "estimated error of the planned run's integration, and of the modes that it leaves out",
         "elements": "finite elements of the body",
-        "elements_called_for": "finite elements that the wanted accuracy calls for",
-        "mesh_frequency_error": "largest error of a kept frequency due to the mesh, as a share",
-        "mesh_compliance_error": "largest error of the frames' compliance due to the mesh, as a share",
+        "elements_called_for": "finite elements that the requested accuracy calls for",
+        "mesh_frequency_error": "largest error of a retained frequency due to the mesh, as a fraction",
+        "mesh_compliance_error": "largest error of the frames' compliance due to the mesh, as a fraction",
         "mesh_error": "estimated error of the quantity due to the body's mesh, at most, in the quantity's unit",
     }
     for name, text in meanings.items():
-        found[name].attrs = {"long_name": text}
-    return found
+        plan_dataset[name].attrs = {"long_name": text}
+    return plan_dataset
 
 
-def drawn(found: xr.Dataset) -> xr.Dataset:
+def drawn(planned: xr.Dataset) -> xr.Dataset:
     """What the chart of influences takes of a plan."""
     return xr.Dataset(
-        {"dropped": found["influence"] + found["uncertainty"].fillna(0.0)},
-        coords={"effect": found["effect"], "quantity": found["quantity"], "unit": found["unit"]},
+        {"dropped": planned["influence"] + planned["uncertainty"].fillna(0.0)},
+        coords={"effect": planned["effect"], "quantity": planned["quantity"], "unit": planned["unit"]},
     )
 
 
-def table(found: xr.Dataset) -> Table:
+def table(planned: xr.Dataset) -> Table:
     """Decision, evidence and reason of each effect, and its estimated influence on each quantity."""
-    names = [str(name) for name in found["quantity"].values]
-    units = [str(unit) for unit in found["unit"].values]
+    names = [str(name) for name in planned["quantity"].values]
+    units = [str(unit) for unit in planned["unit"].values]
     rows = []
-    for i, effect in enumerate(found["words"].values):
-        part = found.isel(effect=i)
+    for i, effect in enumerate(planned["words"].values):
+        part = planned.isel(effect=i)
         cells = [
             written(float(part["influence"][k]), float(np.nan_to_num(part["uncertainty"][k])), unit)
             for k, unit in enumerate(units)
         ]
         decision = "keep" if int(part["kept"]) else "drop"
         rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
-    wanted = [written(float(value), 0.0, unit) for value, unit in zip(found["wanted"].values, units, strict=True)]
-    rows.append(("wanted", "", *wanted, "", ""))
-    told = json.loads(found.attrs["planned"])
-    notes = [words(found)]
-    notes += [f"{name} keeps {count} of its modes, which do the same as all." for name, count in told["modes"].items()]
-    notes += [_of_mesh(found.sel(body=body), units) for body in found["body"].values]
-    if told["apart"]:
-        notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(told['apart'])}.")
-    if found.attrs["dearer"]:
-        notes.append(f"{found.attrs['dearer']}.")
+    requested = [written(float(value), 0.0, unit) for value, unit in zip(planned["wanted"].values, units, strict=True)]
+    rows.append(("wanted", "", *requested, "", ""))
+    decided = json.loads(planned.attrs["planned"])
+    notes = [words(planned)]
+    notes += [
+        f"{name} keeps {count} of its modes, which do the same as all." for name, count in decided["modes"].items()
+    ]
+    notes += [_of_mesh(planned.sel(body=body), units) for body in planned["body"].values]
+    if decided["uncoupled"]:
+        notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(decided['uncoupled'])}.")
+    if planned.attrs["dearer"]:
+        notes.append(f"{planned.attrs['dearer']}.")
     notes.append(
-        f"The planned run is integrated by {told['integrator']} at a relative tolerance of {told['rtol']:.0e}. "
-        f"The plan rests on {found.attrs['runs']} short runs, {found.attrs['evaluations']:,} evaluations."
+        f"The planned run is integrated by {decided['integrator']} at a relative tolerance of {decided['rtol']:.0e}. "
+        f"The plan rests on {planned.attrs['runs']} short runs, {planned.attrs['evaluations']:,} evaluations."
     )
     return Table(
-        "What the wanted accuracy calls for",
+        "What the requested accuracy calls for",
         ("effect", "decision", *names, "evidence", "why"),
         tuple(rows),
         tuple(notes),
@@ -145,23 +147,23 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
         f"{compliance:.2g} % in compliance"
     )
     if not errors:
-        return f"{head}; what that does to what is asked for cannot be told."
-    told = f"{head}, and so change {listed(errors)}"
+        return f"{head}; what that does to what is asked for cannot be determined."
+    text = f"{head}, and so change {listed(errors)}"
     if called > given:
-        return f"{told}: the accuracy wanted calls for {called}."
-    return f"{told}: enough; {called} would do. Elements cost no time in a run, so the recipe stays as it is."
+        return f"{text}: the requested accuracy calls for {called}."
+    return f"{text}: enough; {called} would do. Elements cost no time in a run, so the recipe stays as it is."
 
 
-def words(found: xr.Dataset) -> str:
+def words(planned: xr.Dataset) -> str:
     """The plan in a sentence or two, for a designer."""
-    needed, unseen, gone = _sorted(found)
-    asked = " and ".join(str(name) for name in found["quantity"].values)
+    needed, unseen, gone = _sorted(planned)
+    asked = " and ".join(str(name) for name in planned["quantity"].values)
     if not needed and not unseen:
-        return f"For {asked} as wanted nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
+        return f"For {asked} as requested nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
     left = f"{listed(gone)} may be left out" if gone else "nothing may be left out" if not unseen else ""
-    parts = [f"{listed(needed)} must be kept" if needed else "", left]
-    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} kept without a look" if unseen else ""]
-    return f"For {asked} as wanted {'; '.join(filter(None, parts))}."
+    parts = [f"{listed(needed)} must stay" if needed else "", left]
+    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} unchanged without a run" if unseen else ""]
+    return f"For {asked} as requested {'; '.join(filter(None, parts))}."
 
 
 def listed(names: list[str]) -> str:
@@ -169,64 +171,65 @@ def listed(names: list[str]) -> str:
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" and {names[-1]}"
 
 
-def verified(found: xr.Dataset) -> Table:
-    """The true distance of the planned run from the full one, beside what is wanted."""
+def verified(planned: xr.Dataset) -> Table:
+    """The true distance of the planned run from the full one, next to what is requested."""
     rows = []
-    for k, name in enumerate(found["quantity"].values):
-        unit = str(found["unit"].values[k])
-        error, chance = float(found["error"][k]), float(found["chance"][k])
-        wanted = float(found["wanted"][k])
+    for k, name in enumerate(planned["quantity"].values):
+        unit = str(planned["unit"].values[k])
+        error, chance = float(planned["error"][k]), float(planned["chance"][k])
+        requested = float(planned["wanted"][k])
         rows.append(
-            (str(name), written(wanted, 0.0, unit), written(error, chance, unit), _verdict(found.isel(quantity=k)))
+            (str(name), written(requested, 0.0, unit), written(error, chance, unit), _verdict(planned.isel(quantity=k)))
         )
     notes = [
-        f"Evaluations of the equations of motion: {int(found.attrs['full_evaluations']):,} in full, "
-        f"{int(found.attrs['planned_evaluations']):,} as planned, of all members together.",
-        *_no_gain(int(found.attrs["full_evaluations"]), int(found.attrs["planned_evaluations"])),
+        f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
+        f"{int(planned.attrs['planned_evaluations']):,} as planned, of all members together.",
+        *_no_gain(int(planned.attrs["full_evaluations"]), int(planned.attrs["planned_evaluations"])),
         "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
     return Table(
-        "The plan beside the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)
+        "The plan next to the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)
     )
 
 
 MET, MISSED, UNDECIDED = "met", "missed", "not decided"
 
 
-def verdict(error: float, chance: float, wanted: float) -> str:
-    """Met where error and chance together are below what is wanted, missed where both are above, else not decided."""
-    if error + chance <= wanted:
+def verdict(error: float, chance: float, requested: float) -> str:
+    """Met where error and chance together are below what is requested, missed where both are above, else not
+    decided."""
+    if error + chance <= requested:
         return MET
-    return MISSED if error - chance > wanted else UNDECIDED
+    return MISSED if error - chance > requested else UNDECIDED
 
 
 def _verdict(one: xr.Dataset) -> str:
     """The verdict on one quantity, with what it would take where it is not decided."""
-    error, chance, wanted = (float(one[name]) for name in ("error", "chance", "wanted"))
-    said = verdict(error, chance, wanted)
+    error, chance, requested = (float(one[name]) for name in ("error", "chance", "wanted"))
+    said = verdict(error, chance, requested)
     if said == MISSED:
-        return f"missed, {error / wanted:.2g} times"
-    if said == UNDECIDED and error < wanted:
+        return f"missed, {error / requested:.2g} times"
+    if said == UNDECIDED and error < requested:
         members = int(one.attrs["members"])
-        return f"not decided: {int(np.ceil(members * (chance / (wanted - error)) ** 2))} members would"
+        return f"not decided: {int(np.ceil(members * (chance / (requested - error)) ** 2))} members would"
     return said
 
 
 def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
     """What each accuracy calls for, by the accuracy in words; why there is no plan, where there is none."""
     rows = list[tuple[str, ...]]()
-    for level, found in plans.items():
-        if isinstance(found, str):
-            rows.append((level, "–", "–", "–", "–", found.splitlines()[0]))
+    for level, result in plans.items():
+        if isinstance(result, str):
+            rows.append((level, "–", "–", "–", "–", result.splitlines()[0]))
             continue
-        told = json.loads(found.attrs["planned"])
-        needed, unseen, gone = _sorted(found)
-        modes = ", ".join(f"{count} of {body}" for body, count in told["modes"].items()) or "all"
-        method = f"{told['integrator']}, rtol {told['rtol']:.0e}"
+        text = json.loads(result.attrs["planned"])
+        needed, unseen, gone = _sorted(result)
+        modes = ", ".join(f"{count} of {body}" for body, count in text["modes"].items()) or "all"
+        method = f"{text['integrator']}, rtol {text['rtol']:.0e}"
         rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
     return Table(
         "What accuracy calls for",
-        ("of each size", "needed", "kept without a look", "may be left out", "modes", "integrated by"),
+        ("of each size", "needed", "unchanged without a run", "may be left out", "modes", "integrated by"),
         tuple(rows),
         (
             "Each accuracy is that of all watched quantities; name one in [accuracy] to get its planned scene. "
@@ -235,13 +238,13 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
     )
 
 
-def _sorted(found: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
-    """Effects in words: those that are needed, those that are kept without evidence, and those that may be left out."""
-    rows = list(zip(found["words"].values, found["kept"].values, found["reason"].values, strict=True))
+def _sorted(result: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
+    """Effects in words: those that are needed, those that stay without evidence, and those that may be left out."""
+    rows = list(zip(result["words"].values, result["kept"].values, result["reason"].values, strict=True))
     return (
-        [str(w) for w, kept, reason in rows if kept and reason != NOT_WORTH],
-        [str(w) for w, kept, reason in rows if kept and reason == NOT_WORTH],
-        [str(w) for w, kept, _ in rows if not kept],
+        [str(w) for w, recorded, reason in rows if recorded and reason != NOT_WORTH],
+        [str(w) for w, recorded, reason in rows if recorded and reason == NOT_WORTH],
+        [str(w) for w, recorded, _ in rows if not recorded],
     )
 
 

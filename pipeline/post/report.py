@@ -58,7 +58,7 @@ def collect(
         film=(films[0].name, films[0].read_bytes()) if films else None,
         still=still.read_bytes() if still.is_file() else None,
         views="".join(figures_of(path.read_text(encoding="utf-8")) for path in pages),
-        facts={scene: {key: str(told[key]) for key in FACTS if key in told} for scene, told in attributes.items()},
+        facts={scene: {key: str(facts[key]) for key in FACTS if key in facts} for scene, facts in attributes.items()},
         documents={} if source is None else _documents(source / "docs"),
         variants=() if source is None else _variants(source / "scenes" / "sps4" / "variants"),
     )
@@ -70,31 +70,31 @@ def _documents(docs: Path) -> dict[str, str]:
 
 def _variants(folder: Path) -> list[tuple[str, str]]:
     """Name and title of each scene in a folder."""
-    found = []
+    variants = []
     for path in sorted(folder.glob("*.toml")):
         title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
-        found.append((f"`{path.parent.parent.name}/{path.parent.name}/{path.stem}`", str(title)))
-    return found
+        variants.append((f"`{path.parent.parent.name}/{path.parent.name}/{path.stem}`", str(title)))
+    return variants
 
 
 def run_attributes(paths: Mapping[str, Path]) -> dict[str, dict[str, object]]:
     """Attributes of the run datasets at these paths, by scene."""
-    found = {}
+    by_scene = {}
     for scene, path in paths.items():
         with xr.open_dataset(path) as run:
-            found[scene] = dict(run.attrs)
-    return found
+            by_scene[scene] = dict(run.attrs)
+    return by_scene
 
 
 def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[str, tuple[str, tuple[str, ...]]]:
-    """Each assumption once, with the scenes that make it; places in alphabetical order."""
+    """Each assumption once, with the scenes that make it; paths in alphabetical order."""
     scenes: dict[tuple[str, str], list[str]] = {}
-    for scene, told in attributes.items():
-        for place, text in json.loads(str(told.get("assumptions", "{}"))).items():
-            scenes.setdefault((place, text), []).append(scene)
+    for scene, facts in attributes.items():
+        for where, text in json.loads(str(facts.get("assumptions", "{}"))).items():
+            scenes.setdefault((where, text), []).append(scene)
     result: dict[str, tuple[str, tuple[str, ...]]] = {}
-    for (place, text), names in sorted(scenes.items()):
-        key = place if place not in result else f"{place} ({', '.join(names)})"
+    for (where, text), names in sorted(scenes.items()):
+        key = where if where not in result else f"{where} ({', '.join(names)})"
         result[key] = (text, tuple(names))
     return result
 
@@ -111,7 +111,7 @@ def paper_markdown(content: Content) -> str:
     parts = [
         "# The paper, reproduced\n",
         f"{CITATION}. This page is written by `flexclear report`; every number on it was computed by the "
-        "commands beside it.\n",
+        "commands next to it.\n",
         "`make all` makes everything below. `flexclear run` brings the named scenes up to date, `flexclear "
         "report` draws every figure and table "
         "into `results/figures` and `results/tables`.\n",
@@ -124,7 +124,7 @@ def paper_markdown(content: Content) -> str:
         _pipe(("value", "assumption", "scenes"), assumption_rows(content)),
         "## Discrepancies\n",
         "What the paper leaves open or prints in conflict with itself. Differences in numbers stand below each "
-        "table. Which of its statements on mode sets hold, and at which place of the prismatic joint: "
+        "table. Which of its statements on mode sets hold, and for which position of the prismatic joint: "
         "[reference-conditions.md](reference-conditions.md).\n",
         _pipe(("place", "matter", "here"), [(d.place, d.matter, d.here) for d in DISCREPANCIES]),
     ]
@@ -138,19 +138,19 @@ def assumption_rows(content: Content) -> list[tuple[str, str, str]]:
     """
     total = len(content.facts)
     grouped: dict[tuple[str, str], list[str]] = {}
-    for place, (text, scenes) in sorted(content.assumptions.items(), key=lambda item: weight(item[0])):
+    for path, (text, scenes) in sorted(content.assumptions.items(), key=lambda item: weight(item[0])):
         where = "all" if len(scenes) == total else ", ".join(scene.partition("/")[2] or scene for scene in scenes)
-        grouped.setdefault((text.removeprefix("assumed:").strip(), where), []).append(place.partition(" (")[0])
-    return [(", ".join(f"`{place}`" for place in places), text, where) for (text, where), places in grouped.items()]
+        grouped.setdefault((text.removeprefix("assumed:").strip(), where), []).append(path.partition(" (")[0])
+    return [(", ".join(f"`{path}`" for path in places), text, where) for (text, where), places in grouped.items()]
 
 
 #: parts on whose values most hangs in these scenes: the joint with clearance, the flexible rod, the layout
 WEIGHTY = ("joint.A1", "body.rod1", "body.ground", "body.platform", "drive", "joint", "body")
 
 
-def weight(place: str) -> int:
+def weight(where: str) -> int:
     """The rank of a value among the assumptions; small ones come first."""
-    known = [k for k, start in enumerate(WEIGHTY) if place == start or place.startswith(f"{start}.")]
+    known = [k for k, start in enumerate(WEIGHTY) if where == start or where.startswith(f"{start}.")]
     return known[0] if known else len(WEIGHTY)
 
 

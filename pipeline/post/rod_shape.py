@@ -51,7 +51,7 @@ def surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.n
     return rings, np.concatenate([size[:1], size, size[-1:]])
 
 
-def scale_to(bundle: xr.Dataset, q: np.ndarray, share: float) -> float:
+def scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:
     """Factor that makes the largest displacement `share` of the rod's length; 1 for no displacement.
 
     Where the centre line does not move (torsion), the largest section rotation is made 1 rad.
@@ -61,7 +61,7 @@ def scale_to(bundle: xr.Dataset, q: np.ndarray, share: float) -> float:
     largest = float(np.linalg.norm(displacement, axis=1).max())
     rotation = float(np.linalg.norm(turn, axis=1).max())
     if largest > 1e-3 * rotation * length:
-        return share * length / largest
+        return fraction * length / largest
     return 1.0 / rotation if rotation > 0.0 else 1.0
 
 

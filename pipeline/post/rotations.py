@@ -13,7 +13,7 @@ from flexclear.pipeline.core.algebra import (
     rotation_between,
 )
 
-#: share of a rotation that may be about other axes where it is called one about a fixed axis
+#: fraction of a rotation that may be about other axes where it is called one about a fixed axis
 OFF_AXIS = 1e-3
 
 

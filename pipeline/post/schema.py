@@ -9,7 +9,7 @@ from flexclear.pipeline.core.artifacts.schema import RUN, Schema, Variable
 _V = Variable
 
 _KEPT, _PER_AXIS = ("ensemble_time", "ensemble_body"), ("ensemble_time", "ensemble_body", "axis")
-#: what is told of an ensemble by mean, standard deviation and quantiles: dimensions, units, units of what turns
+#: the message about an ensemble by mean, standard deviation and quantiles: dimensions, units, units of what turns
 _OF_MEMBERS: dict[str, tuple] = {
     "rotation_y": (_KEPT, "rad"),
     "displacement": (_PER_AXIS, "m"),
@@ -84,10 +84,10 @@ POST: Schema = {
     },
     "wear_deepest_outer": _V(("worn",), "m", "largest of these depths on the socket or journal", optional=True),
     "wear_deepest_inner": _V(("worn",), "m", "largest of these depths on the ball or pin", optional=True),
-    "contact_time_share": _V(("contact",), "1", "share of the run spent in contact", optional=True),
+    "contact_time_share": _V(("contact",), "1", "fraction of the run spent in contact", optional=True),
     "horizon": replace(RUN["horizon"], optional=False),  # where the run says none, its end
     "ensemble_horizon": _V((), "s", "where the members of the ensemble part", optional=True),
     "spread": _V(("ensemble_time",), "m s-1", "largest distance of a member's velocity from the mean", optional=True),
 }
-for _name, _told in _OF_MEMBERS.items():
-    POST |= _of_members(_name, *_told)
+for _name, _declared in _OF_MEMBERS.items():
+    POST |= _of_members(_name, *_declared)

@@ -96,17 +96,17 @@ def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Variable
     if "contact_penetration" in run:
         series["penetration"] = (("contact",), run["contact_penetration"].values)
         series["force"] = (("contact",), run["contact_normal_force"].values)
-    found: Variables = {}
+    variables: Variables = {}
     for name, (dims, values) in series.items():
-        found[f"peak_{name}"] = (dims, values.max(axis=0, initial=0.0))
-        found[f"peak_{name}_time"] = (dims, run["time"].values[first_largest(values, axis=0)])
+        variables[f"peak_{name}"] = (dims, values.max(axis=0, initial=0.0))
+        variables[f"peak_{name}_time"] = (dims, run["time"].values[first_largest(values, axis=0)])
     if "event_peak_force" in run:
-        found["peak_force"] = (("contact",), _peak_force(run))
-    return found
+        variables["peak_force"] = (("contact",), _peak_force(run))
+    return variables
 
 
 def contacts(run: xr.Dataset | LabelledArrays) -> Variables:
-    """Eccentricity, clearance and share of time in contact, per contact."""
+    """Eccentricity, clearance and fraction of time in contact, per contact."""
     if "contact_offset" not in run:
         return {}
     distance = np.linalg.norm(run["contact_offset"].values, axis=-1)
@@ -120,14 +120,14 @@ def contacts(run: xr.Dataset | LabelledArrays) -> Variables:
 
 
 def _time_share(run: xr.Dataset | LabelledArrays) -> np.ndarray:
-    """Share of the run that each contact is closed, from its located begins and ends."""
-    time, share, names = run["time"].values, np.zeros(run.sizes["contact"]), list(run["contact"].values)
+    """Fraction of the run that each contact is closed, from its located begins and ends."""
+    time, fraction, names = run["time"].values, np.zeros(run.sizes["contact"]), list(run["contact"].values)
     closings = of_kind(run, "closing")
     begun, lasted = run["event_time"].values[closings], run["event_duration"].values[closings]
     lasted = np.where(np.isfinite(lasted), lasted, time[-1] - begun)
     for name, seconds in zip(run["event_contact"].values[closings], lasted, strict=True):
-        share[names.index(name)] += seconds
-    return share / (time[-1] - time[0])
+        fraction[names.index(name)] += seconds
+    return fraction / (time[-1] - time[0])
 
 
 def _peak_force(run: xr.Dataset | LabelledArrays) -> np.ndarray:

@@ -48,8 +48,8 @@ class Check:
 
 def checks(run: xr.Dataset, study: xr.Dataset | None) -> list[Check]:
     """All that a run and its cost study say of its stability.  study: None where there is none."""
-    found = [_energy(run), *_loops(run), *([] if study is None else _agreement(study)), _rejected(run), _stiff(run)]
-    return [*found, *_condition(run), *_predictable(run)]
+    result = [_energy(run), *_loops(run), *([] if study is None else _agreement(study)), _rejected(run), _stiff(run)]
+    return [*result, *_condition(run), *_predictable(run)]
 
 
 def largest_energy(run: xr.Dataset) -> float:
@@ -60,9 +60,9 @@ def largest_energy(run: xr.Dataset) -> float:
 
 def _energy(run: xr.Dataset) -> Check:
     largest, missed = largest_energy(run), float(np.abs(run["energy_error"].values).max())
-    share = missed / largest if largest > 0.0 else 0.0
+    fraction = missed / largest if largest > 0.0 else 0.0
     remedy = "a tighter tolerance: [solver] rtol" if "step" not in run.attrs else "shorter steps: [solver] step"
-    return Check("energy balance", f"{share:.1e} of the largest energy", f"{ENERGY:g}", share < ENERGY, remedy)
+    return Check("energy balance", f"{fraction:.1e} of the largest energy", f"{ENERGY:g}", fraction < ENERGY, remedy)
 
 
 def _loops(run: xr.Dataset) -> list[Check]:
@@ -71,14 +71,14 @@ def _loops(run: xr.Dataset) -> list[Check]:
         return []
     places = run["position"].values.reshape(-1, 3)
     extent = float(np.linalg.norm(np.ptp(places, axis=0))) or 1.0
-    share = float(np.abs(run["constraint_error"].values).max()) / extent
-    value = f"{share:.1e} of the extent" if share > ROUNDING else "rounding"
-    return [Check("drift of closed loops", value, f"{LOOPS:g}", share < LOOPS, "a tighter tolerance")]
+    fraction = float(np.abs(run["constraint_error"].values).max()) / extent
+    value = f"{fraction:.1e} of the extent" if fraction > ROUNDING else "rounding"
+    return [Check("drift of closed loops", value, f"{LOOPS:g}", fraction < LOOPS, "a tighter tolerance")]
 
 
 def _agreement(study: xr.Dataset) -> list[Check]:
     """With runs at half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
-    found = []
+    result = []
     for group, method, setting in (
         ("tolerance", "adaptive_integrator", "rtol"),
         ("step", "fixed_integrator", "step"),
@@ -96,24 +96,24 @@ def _agreement(study: xr.Dataset) -> list[Check]:
             for s in shown:
                 value = float(values.sel({setting: s}))
                 name = f"agreement with {m}, {setting} {s:g}{' s' if group == 'step' else ''}"
-                found.append(
+                result.append(
                     Check(name, f"{value:.1e} of a size", f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance")
                 )
-    return found
+    return result
 
 
 def _rejected(run: xr.Dataset) -> Check:
     steps, again = float(run.attrs.get("steps", 0)), float(run.attrs.get("rejected_steps", 0))
-    share = again / max(steps + again, 1.0)
+    fraction = again / max(steps + again, 1.0)
     remedy = "another integrator, or a tighter tolerance"
-    return Check("rejected steps", f"{100.0 * share:.2g} %", f"{100.0 * REJECTED:g} %", share < REJECTED, remedy)
+    return Check("rejected steps", f"{100.0 * fraction:.2g} %", f"{100.0 * REJECTED:g} %", fraction < REJECTED, remedy)
 
 
 def _stiff(run: xr.Dataset) -> Check:
-    share = float(run.attrs.get("stiff_share", 0.0))
+    fraction = float(run.attrs.get("stiff_share", 0.0))
     remedy = "leave [solver] integrator out, or name an implicit one"
     return Check(
-        "steps that stability shortens", f"{100.0 * share:.2g} %", f"{100.0 * STIFF:g} %", share < STIFF, remedy
+        "steps that stability shortens", f"{100.0 * fraction:.2g} %", f"{100.0 * STIFF:g} %", fraction < STIFF, remedy
     )
 
 
@@ -143,14 +143,14 @@ def _predictable(run: xr.Dataset) -> list[Check]:
     ]
 
 
-def answer(run: xr.Dataset, found: list[Check]) -> str:
+def answer(run: xr.Dataset, result: list[Check]) -> str:
     """What the checks say together, in words."""
-    bad = [check for check in found if not check.good and check.name != "predictability"]
+    bad = [check for check in result if not check.good and check.name != "predictability"]
     disagreeing = [check for check in bad if check.name.startswith("agreement")]
     bad = [check for check in bad if check not in disagreeing[1:]]  # one says it, the table has the others
     text = (
-        f"Yes: all {len(found)} checks hold."
-        if all(check.good for check in found)
+        f"Yes: all {len(result)} checks hold."
+        if all(check.good for check in result)
         else "The integration is stable: every check of it holds."
         if not bad
         else "Not in everything: " + "; ".join(f"{c.name} ({c.value}, limit {c.limit}): {c.remedy}" for c in bad) + "."
@@ -162,17 +162,17 @@ def answer(run: xr.Dataset, found: list[Check]) -> str:
 
 def figure(run: xr.Dataset) -> dict[str, bytes]:
     """``stability.png`` and ``.svg``: errors of energy and loops over time, with their limits, and the separation."""
-    panels = [("energy error", "share of the largest energy", run["time"].values, _relative_energy(run), ENERGY)]
+    panels = [("energy error", "fraction of the largest energy", run["time"].values, _relative_energy(run), ENERGY)]
     if "condition" in run and "constraint_error" in run:
         extent = float(np.linalg.norm(np.ptp(run["position"].values.reshape(-1, 3), axis=0))) or 1.0
         values = np.abs(run["constraint_error"].values) / extent
         if values.max(initial=0.0) > ROUNDING:
-            panels.append(("drift of closed loops", "share of the extent", run["time"].values, values, LOOPS))
+            panels.append(("drift of closed loops", "fraction of the extent", run["time"].values, values, LOOPS))
     if "separation" in run:
         from flexclear.pipeline.core.quantities import SEPARATED
 
         times, values = run["separation_time"].values, run["separation"].values
-        panels.append(("separation of a perturbed run", "share of each motion", times, values, SEPARATED))
+        panels.append(("separation of a perturbed run", "fraction of each motion", times, values, SEPARATED))
     with style.style():
         figure, axes = style.grid(1, len(panels), (3.6 * len(panels), 2.9))
         for axis, (title, label, time, values, limit) in zip(axes.ravel(), panels, strict=True):

@@ -22,7 +22,7 @@ DECADE = 8.0
 #: factors that make the numbers of an axis handy
 HANDY = {"m": (1e3, "mm"), "N": (1.0, "N"), "s": (1e3, "ms")}
 NAME = "sweep"
-#: share of the largest component of a vector below which another one is zero but for rounding
+#: fraction of the largest component of a vector below which another one is zero but for rounding
 ZERO = 1e-9
 
 
@@ -46,13 +46,13 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
             ax.set_visible(False)
         refused = int((sweep["status"] == 1).sum())
         missing = int((sweep["status"] == 2).sum())
-        told = [f"{sweep['status'].size} points of {sweep.attrs['scene']}"]
-        told += [f"{refused} refused"] if refused else []
-        told += [f"{missing} not run"] if missing else []
-        told += _still(sweep, panels)
+        sentences = [f"{sweep['status'].size} points of {sweep.attrs['scene']}"]
+        sentences += [f"{refused} refused"] if refused else []
+        sentences += [f"{missing} not run"] if missing else []
+        sentences += _still(sweep, panels)
         if draw is _curve:
-            told += [text for end, text in BANDS.items() if any(f"{name}{end}" in sweep for name in panels)][:1]
-        heading(figure, sweep.attrs.get("title", sweep.attrs["sweep"]), ", ".join(told))
+            sentences += [text for end, text in BANDS.items() if any(f"{name}{end}" in sweep for name in panels)][:1]
+        heading(figure, sweep.attrs.get("title", sweep.attrs["sweep"]), ", ".join(sentences))
         return files(NAME, figure)
 
 
@@ -66,40 +66,40 @@ def _panels(sweep: xr.Dataset, *, sections: bool) -> dict[str, xr.Dataset]:
 
     One number for each point or section; vectors component by component.  Series are left to the user's own figures.
     """
-    dims, found = sweep["status"].dims, dict[str, xr.Dataset]()
+    dims, panels = sweep["status"].dims, dict[str, xr.Dataset]()
     for name in map(str, sweep.data_vars):
         inner = tuple(dim for dim in sweep[name].dims if dim not in dims)
-        told = "units" in sweep[name].attrs and not name.endswith((".error", ".deviation"))
-        if not told or ("section" in inner and not sections):
+        has_units = "units" in sweep[name].attrs and not name.endswith((".error", ".deviation"))
+        if not has_units or ("section" in inner and not sections):
             continue
         if inner in ((), ("section",)):
-            found[name] = sweep
+            panels[name] = sweep
         elif inner in (("axis",), ("section", "axis")):
             for axis in _moving(sweep[name]):
-                found[f"{name} {axis}"] = sweep.assign({f"{name} {axis}": sweep[name].sel(axis=axis, drop=True)})
-    return found
+                panels[f"{name} {axis}"] = sweep.assign({f"{name} {axis}": sweep[name].sel(axis=axis, drop=True)})
+    return panels
 
 
 def _moving(vector: xr.DataArray) -> list[str]:
     """Components that are not zero at all points, but for rounding; all of them where nothing moves."""
     sizes = abs(vector).max([dim for dim in vector.dims if dim != "axis"])
-    told = [str(axis) for axis in vector["axis"].values[(sizes > ZERO * sizes.max()).values]]
-    return told or list(map(str, vector["axis"].values))
+    axes = [str(axis) for axis in vector["axis"].values[(sizes > ZERO * sizes.max()).values]]
+    return axes or list(map(str, vector["axis"].values))
 
 
 def _still(sweep: xr.Dataset, panels: Collection[str]) -> list[str]:
     """What is said of components without a panel."""
-    found = []
+    constant = []
     for name in map(str, sweep.data_vars):
         there = {panel.removeprefix(f"{name} ") for panel in panels if panel.startswith(f"{name} ")}
         if there:
             away = [str(axis) for axis in sweep["axis"].values if axis not in there]
-            found += (
+            constant += (
                 [f"{' and '.join(away)} of {name} are 0" if len(away) > 1 else f"{away[0]} of {name} is 0"]
                 if away
                 else []
             )
-    return found
+    return constant
 
 
 def _drawn(sweep: xr.Dataset, parameters: list[str]) -> Draw | None:
@@ -147,8 +147,8 @@ def _curve(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
 
 
 def _refusals_and_scale(ax: Axes, sweep: xr.Dataset, x: np.ndarray) -> None:
-    for place in x[sweep["status"].values == 1]:
-        ax.axvline(place, color=REFUSED, lw=0.8, ls=":")
+    for value in x[sweep["status"].values == 1]:
+        ax.axvline(value, color=REFUSED, lw=0.8, ls=":")
     if x.min() > 0.0 and x.max() > DECADE * x.min():
         ax.set_xscale("log")
         plain(ax.xaxis)

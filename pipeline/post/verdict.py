@@ -9,7 +9,8 @@ One rule for all:
 - *undecided* otherwise.
 
 A freedom on which nothing depends, such as the spin of a leg with balls at both ends, lets neighbours part in
-proportion to time: in n periods its exponent is seen as ln(n) / n per period, and no smaller one can be told from it.
+proportion to time: in n periods its exponent is seen as ln(n) / n per period, and no smaller one can be determined from
+it.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from flexclear.pipeline.post import chaos
 Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
 #: K of the 0-1 test below which a motion is regular, and above which chaotic; in between a finite series cannot tell
 REGULAR, CHAOTIC = 0.2, 0.8
-#: share of the variance that few lines hold in the spectrum of a motion with few frequencies
+#: fraction of the variance that few lines hold in the spectrum of a motion with few frequencies
 DISCRETE = 0.95
 #: states below which the 0-1 test and the spectrum tell nothing
 ENOUGH = 200
@@ -40,11 +41,11 @@ VERDICT: Schema = {
     "least_exponent": _V((), "s-1", "exponent that so many periods cannot tell from zero"),
     "zero_one": _V((), "1", "K of the 0-1 test, of the component that decides least for regular motion", optional=True),
     "returns_after": _V((), "1", "periods after which the states come back; 0 where they do not"),
-    "return_distance": _V((), "1", "largest distance of a return, as a share of the motion's size"),
+    "return_distance": _V((), "1", "largest distance of a return, as a fraction of the motion's size"),
     "contraction": _V((), "1", "factor per period by which successive returns come closer", optional=True),
-    "few_lines": _V((), "1", "share of the variance in the sixteen largest lines of the spectrum", optional=True),
+    "few_lines": _V((), "1", "fraction of the variance in the sixteen largest lines of the spectrum", optional=True),
     "principal": _V(("section", "component"), "1", "states along their directions of largest variance"),
-    "power": _V(("frequency", "component"), "1", "share of the variance at each frequency"),
+    "power": _V(("frequency", "component"), "1", "fraction of the variance at each frequency"),
     "impact_correlation": _V(
         ("lag", "contact"), "1", "correlation of the first impact's phase with that of later periods", optional=True
     ),
@@ -91,19 +92,19 @@ def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) ->
 def _rule(
     rate: chaos.Interval, least: float, after: int, distance: float, K: float, discrete: float
 ) -> tuple[Kind, tuple[str, ...]]:
-    told = f"largest exponent {rate.mean:.3g} 1/s, 95 % between {rate.low:.3g} and {rate.high:.3g}"
+    text = f"largest exponent {rate.mean:.3g} 1/s, 95 % between {rate.low:.3g} and {rate.high:.3g}"
     grows, still = rate.low > least, rate.low <= least
     if after and still:
         times = "one period" if after == 1 else f"{after} periods"
-        return "periodic", (f"the states come back after {times}, to {distance:.2g} of the motion", told)
+        return "periodic", (f"the states come back after {times}, to {distance:.2g} of the motion", text)
     tested = f"0-1 test K = {K:.2f}"
     if grows and K > CHAOTIC:
-        return "chaotic", (f"{told}, above the {least:.2g} that freedoms without consequence give", tested)
+        return "chaotic", (f"{text}, above the {least:.2g} that freedoms without consequence give", tested)
     lined = f"{100 * discrete:.0f} % of the variance in {chaos.LINES} lines of the spectrum"
     if still and K < REGULAR and discrete > DISCRETE and not after:
-        return "quasi-periodic", (told, tested, lined)
+        return "quasi-periodic", (text, tested, lined)
     back = f"states come back to {distance:.2g} of the motion at best"
-    return "undecided", (told, tested, lined, back)
+    return "undecided", (text, tested, lined, back)
 
 
 def derive(sections: xr.Dataset) -> xr.Dataset:
@@ -131,15 +132,15 @@ def derive(sections: xr.Dataset) -> xr.Dataset:
     data["power"] = (("frequency", "component"), np.stack([power for _, power in lines], axis=1))
     coordinates = {"section": sections.section.values, "frequency": lines[0][0]}
     if "impact_phase" in sections:
-        found = [first_impacts(sections, str(name)) for name in sections.contact.values]
+        impacts = [first_impacts(sections, str(name)) for name in sections.contact.values]
         data["impact_correlation"] = (
             ("lag", "contact"),
-            np.nan_to_num(np.stack([chaos.autocorrelation(phase) for phase in found], axis=1)),
+            np.nan_to_num(np.stack([chaos.autocorrelation(phase) for phase in impacts], axis=1)),
         )
         coordinates |= {"contact": sections.contact.values}
-    told = {"verdict": verdict.kind, "reasons": "; ".join(verdict.reasons)}
+    attributes = {"verdict": verdict.kind, "reasons": "; ".join(verdict.reasons)}
     title = f"Verdict on the {str(sections.attrs.get('title', 'sections')).lower()}"
-    return conform(xr.Dataset(data, coords=coordinates), VERDICT, title=title, **told)
+    return conform(xr.Dataset(data, coords=coordinates), VERDICT, title=title, **attributes)
 
 
 def features(sections: xr.Dataset) -> tuple[np.ndarray, float]:

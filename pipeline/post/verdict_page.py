@@ -18,7 +18,7 @@ Made from the datasets `results/runs/<scene>/sections.nc` and `verdict.nc` by
         --page {page}
 
 Nothing on this page is typed in. Each scene's laws are repeated, period after period; {transient} periods are left to
-settle, and {periods} are looked at, once each at the same phase. For {followed} of them a neighbour is followed that
+settle, and {periods} are examined, once each at the same phase. For {followed} of them a neighbour is followed that
 starts {distance:.0e} away, in units of the mechanism's size, and is brought back to that distance again and again: the
 mean rate at which it parts is the largest Lyapunov exponent, with the confidence interval of its batch means.
 

@@ -46,9 +46,9 @@ def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Variables:
         for side in SURFACES:
             direction = run[f"wear_direction_{side}"].values[:, k]
             area = _area(joints[name], side) / (own * rows)
-            shares = spread(direction, np.stack([path[:, k], impulse[:, k]], axis=1), own, rows)
-            maps[f"wear_depth_{side}"][k, :rows, :own] = per_path * shares[..., 0] / area
-            maps[f"wear_impulse_{side}"][k, :rows, :own] = shares[..., 1]
+            fractions = spread(direction, np.stack([path[:, k], impulse[:, k]], axis=1), own, rows)
+            maps[f"wear_depth_{side}"][k, :rows, :own] = per_path * fractions[..., 0] / area
+            maps[f"wear_impulse_{side}"][k, :rows, :own] = fractions[..., 1]
     totals: Variables = {
         "wear_volume": (("worn",), volume),
         "wear_distance": (("worn",), sliding[-1] - sliding[0]),
@@ -74,13 +74,13 @@ def spread(direction: np.ndarray, totals: np.ndarray, sectors: int, bands: int) 
 
     Sector s holds angles about z from x on, s to s + 1 times 2 pi/sectors; band b z-components from -1 on.
     """
-    found = np.zeros((bands, sectors, totals.shape[1]))
-    growth, share = np.diff(totals, axis=0), (np.arange(PIECES) + 0.5) / PIECES
+    distributed = np.zeros((bands, sectors, totals.shape[1]))
+    growth, fraction = np.diff(totals, axis=0), (np.arange(PIECES) + 0.5) / PIECES
     grown = np.flatnonzero(np.any(growth != 0.0, axis=1))
     start, end = direction[grown], direction[grown + 1]
     # before a contact begins, or after it has ended, the centres may have been anywhere
     start = np.where(np.any(start != 0.0, axis=1, keepdims=True), start, end)
-    between = start[:, None] + share[None, :, None] * (end - start)[:, None]
+    between = start[:, None] + fraction[None, :, None] * (end - start)[:, None]
     angle = np.arctan2(between[..., 1], between[..., 0]) % (2.0 * np.pi)
     sector = np.minimum((angle / (2.0 * np.pi) * sectors).astype(int), sectors - 1)
     size = np.linalg.norm(between, axis=-1)
@@ -88,5 +88,5 @@ def spread(direction: np.ndarray, totals: np.ndarray, sectors: int, bands: int) 
     band = np.minimum(((height + 1.0) / 2.0 * bands).astype(int), bands - 1)
     for what in range(totals.shape[1]):
         values = np.repeat(growth[grown, what] / PIECES, PIECES)
-        np.add.at(found[..., what], (band.ravel(), sector.ravel()), values)
-    return found
+        np.add.at(distributed[..., what], (band.ravel(), sector.ravel()), values)
+    return distributed

@@ -91,14 +91,14 @@ SCENES = {"spatial four-bar": spatial_four_bar, "double pendulum": double_pendul
 
 
 def engine_with(scene: Scene) -> Engine:
-    return prepare(tabulate(build(scene, {})), lambda share, text: None)
+    return prepare(tabulate(build(scene, {})), lambda fraction, text: None)
 
 
 def trajectory(table: dict[str, Any], solver: dict[str, Any]) -> Trajectory:
     """The run with this solver table."""
     engine = engine_with(Scene.model_validate({**table, "solver": solver}))
     start = consistent_start(engine)
-    return integrate(engine, start, lambda share, text: None)
+    return integrate(engine, start, lambda fraction, text: None)
 
 
 @cache

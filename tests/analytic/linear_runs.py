@@ -16,4 +16,4 @@ def frequencies(name: str, overrides: Overrides = (), time: float | None = None,
     from flexclear.pipeline import dynamics
 
     scene = load_scene(TREE / "scenes" / f"{name}.toml", override=dict(overrides))
-    return dynamics.frequencies(scene, bundles(scene), lambda share, text: None, time, None, moving)
+    return dynamics.frequencies(scene, bundles(scene), lambda fraction, text: None, time, None, moving)

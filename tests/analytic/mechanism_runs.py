@@ -12,7 +12,7 @@ from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.stages import run as stages
-from flexclear.stages.workplace import Workplace, workplace
+from flexclear.stages.workplace import Workplace, open_workplace
 
 TREE = Path(__file__).resolve().parents[2]
 Overrides = tuple[tuple[str, object], ...]
@@ -20,7 +20,7 @@ Overrides = tuple[tuple[str, object], ...]
 
 @cache
 def _place() -> Workplace:
-    return workplace()
+    return open_workplace()
 
 
 def bundles(scene: Scene) -> dict[str, xr.Dataset]:

@@ -17,7 +17,7 @@ FULL = TREE / "scenes" / "sps4" / "far_csj_cb.toml"
 IDEAL = TREE / "scenes" / "sps4" / "ideal.toml"
 
 
-def quiet(share, text):
+def quiet(fraction, text):
     """Nobody watches."""
 
 
@@ -26,9 +26,9 @@ def reference():
     return dynamics.simulate(load_scene(CSJ, {"solver.rtol": 1e-14}), {}, quiet)
 
 
-@pytest.mark.parametrize("wanted", [10.0**-k for k in range(2, 10)])
-def test_the_delivered_error_is_the_wanted_one(reference, wanted):
-    scene = load_scene(CSJ, {"accuracy": {"platform": {"velocity": {"relative": wanted}}}})
+@pytest.mark.parametrize("requested", [10.0**-k for k in range(2, 10)])
+def test_the_delivered_error_is_the_wanted_one(reference, requested):
+    scene = load_scene(CSJ, {"accuracy": {"platform": {"velocity": {"relative": requested}}}})
     run = dynamics.simulate(scene, {}, quiet)
     velocity = parse("platform.velocity", scene.owners())
     delivered = quantities.error(run, reference, velocity) / quantities.scale(reference, velocity)
@@ -37,7 +37,7 @@ def test_the_delivered_error_is_the_wanted_one(reference, wanted):
     # reference's own rounding, 4e-10 m/s, is as large as what is compared. From a third of what is wanted on a run is
     # not too dear, but errors jump from tolerance to tolerance, as impacts do, and then the better side, up to ten
     # times too good, is what there is
-    assert wanted / 30.0 < delivered < 3.0 * wanted
+    assert requested / 30.0 < delivered < 3.0 * requested
 
 
 def test_several_quantities_are_met_together(reference):
@@ -53,7 +53,7 @@ def test_several_quantities_are_met_together(reference):
 def test_what_cannot_be_had_is_said_with_the_best_there_is(reference):
     scene = load_scene(CSJ, {"accuracy": {"platform.velocity": {"relative": 1e-15}}})
     run = dynamics.simulate(scene, {}, quiet)
-    assert "times what is wanted" in run.attrs["accuracy_verdict"]
+    assert "times what is requested" in run.attrs["accuracy_verdict"]
     velocity = parse("platform.velocity", scene.owners())
     assert quantities.error(run, reference, velocity) < 1e-8 * quantities.scale(reference, velocity)
 
@@ -63,7 +63,7 @@ def test_of_a_chaotic_run_it_is_said_how_long_it_can_be_had():
     """With an undamped flexible rod beside the clearance, motions part so fast that no tolerance holds to the end."""
     scene = load_scene(FULL, {"accuracy": {"platform.velocity": {"relative": 1e-8}}})
     verdict = dynamics.simulate(scene, bundles(scene), quiet).attrs["accuracy_verdict"]
-    assert "times what is wanted" in verdict
+    assert "times what is requested" in verdict
     assert "tighter tolerances do not help (it holds until t = " in verdict
     assert "chaotic or rounding decides" in verdict
 

@@ -44,13 +44,13 @@ def test_craig_bampton_has_the_exact_compliance_with_any_number_of_normal_modes(
 def test_a_cantilever_basis_reaches_the_exact_compliance_from_below() -> None:
     """One interface, normal modes only: each adds compliance, all of them together give all of it."""
     exact = cantilever_compliance(PAPER_ROD).diagonal()
-    shares = [
+    fractions = [
         compliance(reduced("craig-bampton", count, ("bottom",)), "top").diagonal() / exact
         for count in (4, 5, 7, 8, None)
     ]
-    assert np.all(np.diff(shares, axis=0) >= -SOLVED)
-    assert shares[0][0] == pytest.approx(0.0, abs=1e-12)  # four bending modes: not a micrometre along the axis
-    np.testing.assert_allclose(shares[-1], 1.0, rtol=SOLVED)
+    assert np.all(np.diff(fractions, axis=0) >= -SOLVED)
+    assert fractions[0][0] == pytest.approx(0.0, abs=1e-12)  # four bending modes: not a micrometre along the axis
+    np.testing.assert_allclose(fractions[-1], 1.0, rtol=SOLVED)
 
 
 def test_fixed_fixed_modes_leave_both_ends_rigid() -> None:

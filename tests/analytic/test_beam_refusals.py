@@ -84,7 +84,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
         RECIPE | {"pose": {"rotation_vector": [0, 0, 1], "quaternion": [1, 0, 0, 0]}},
         r"\[pose\].*orientation is given once",
     ),
-    "section beside segments": (segmented((0.0, 0.24)) | {"section": CIRCLE}, r"\[section\]: unknown key"),
+    "section next to segments": (segmented((0.0, 0.24)) | {"section": CIRCLE}, r"\[section\]: unknown key"),
 }
 
 
@@ -92,7 +92,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
 def test_wrong_recipes_are_refused_in_words(name: str) -> None:
     recipe, message = WRONG[name]
     with pytest.raises(InputError, match=message) as caught:
-        mesh.build(recipe, place="rod.toml")
+        mesh.build(recipe, where="rod.toml")
     assert caught.value.exit_code == 2
     # one mistake, one message; the hint is a line of its own
     assert len([line for line in str(caught.value).splitlines() if line.startswith("rod.toml")]) == 1

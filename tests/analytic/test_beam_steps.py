@@ -130,7 +130,7 @@ def test_rigid_inertia_is_that_of_the_parts() -> None:
     """Steiner by hand: pieces as prisms about their centres, the ball about its own."""
     rod = mesh.build(recipe((2, 3, 2), "rayleigh", masses={"ball": BALL}))
     body = slices(rod, beam.assemble(rod))
-    second = np.einsum("p,pk,pl->kl", body.mass, body.place, body.place) + body.spread.sum(axis=0)
+    second = np.einsum("p,pk,pl->kl", body.mass, body.position, body.position) + body.spread.sum(axis=0)
     inertia = np.trace(second) * np.eye(3) - second
     expected, mass, first = np.zeros((3, 3)), 0.0, np.zeros(3)
     for (start, end, _, _), piece in zip(PLAN, pieces("rayleigh"), strict=True):
@@ -143,7 +143,7 @@ def test_rigid_inertia_is_that_of_the_parts() -> None:
     centre = np.array([0.252, 0.004, -0.003])
     expected += np.diag(BALL["inertia"]) + 0.35 * (centre @ centre * np.eye(3) - np.outer(centre, centre))
     np.testing.assert_allclose(body.mass.sum(), mass + 0.35, rtol=1e-14)
-    np.testing.assert_allclose(body.place.T @ body.mass, first + 0.35 * centre, rtol=1e-13)
+    np.testing.assert_allclose(body.position.T @ body.mass, first + 0.35 * centre, rtol=1e-13)
     np.testing.assert_allclose(inertia, expected, rtol=1e-13, atol=1e-16)
 
 

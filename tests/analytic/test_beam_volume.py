@@ -56,8 +56,8 @@ def cloud(theory: str, modes: xr.Dataset) -> Cloud:
     masses, places, shapes = [], [], []
     for cell in range(ELEMENTS):
         for s, w in zip(0.5 * (1.0 + node), 0.5 * weight, strict=True):
-            share = (cell + s) / ELEMENTS
-            width, height = (a + share * (b - a) for a, b in zip(START, END, strict=True))
+            fraction = (cell + s) / ELEMENTS
+            width, height = (a + fraction * (b - a) for a, b in zip(START, END, strict=True))
             move, turn = section_motion(theory, modes, R, cell, float(s), h)
             for y in (-0.5, 0.5):
                 for z in (-0.5, 0.5):

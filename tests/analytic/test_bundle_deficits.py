@@ -62,14 +62,14 @@ def test_shares_are_those_of_a_direct_static_solution(
     _, size, right = np.linalg.svd(bottom @ basis)
     inside = basis @ right[int(np.sum(size > 1e-9 * size[0])) :].T
     reduced = (inside.T @ load) @ np.linalg.pinv(inside.T @ K @ inside, rcond=1e-13, hermitian=True) @ (inside.T @ load)
-    share = float(data["compliance_share"].sel(frame="top", frame_held="bottom", direction="z"))
-    assert share == pytest.approx(reduced / full, abs=1e-6)
+    fraction = float(data["compliance_share"].sel(frame="top", frame_held="bottom", direction="z"))
+    assert fraction == pytest.approx(reduced / full, abs=1e-6)
 
 
 @pytest.mark.parametrize("condition, count", BASES)
 def test_a_bundle_tells_its_shares_from_its_own_numbers(rod: xr.Dataset, condition: str, count: int) -> None:
     data = bundle.build(rod, solve(rod, condition, count))
-    found = core.shares(core.of_bundle(data), data["compliance_full"].values)
+    found = core.fractions(core.of_bundle(data), data["compliance_full"].values)
     np.testing.assert_allclose(found, data["compliance_share"].values, rtol=0.0, atol=1e-9)
     assert np.all(data["compliance_share"].values <= 1.0 + 1e-9)
 
@@ -83,7 +83,7 @@ def test_the_error_of_a_harmonic_load_stays_below_its_bound(
     first = data.attrs["first_free_frequency"]
     vectors = data["vector"].values
     hertz = first * np.array([0.1, 0.5, 0.9])
-    flexibility = support(model, lambda share: None)
+    flexibility = support(model, lambda fraction: None)
     bounds = deficits.bounds(flexibility, vectors, hertz, first)
     basis = np.hstack([model.rigid, vectors])
     for k, frame in enumerate(model.interfaces):
@@ -106,9 +106,9 @@ def test_the_error_of_a_harmonic_load_stays_below_its_bound(
 def test_the_bound_at_rest_is_the_missing_compliance(rod: xr.Dataset) -> None:
     data = solve(rod, "free-free", 13)
     own = {"frame": xr.DataArray([0, 3], dims="f"), "frame_held": xr.DataArray([0, 3], dims="f")}
-    full, share = (data[name].isel(own).values for name in ("compliance_full", "compliance_share"))
+    full, fraction = (data[name].isel(own).values for name in ("compliance_full", "compliance_share"))
     bound = data["error_bound"].isel(frame=[0, 3], bound_frequency=0).values
-    np.testing.assert_allclose(bound, full * (1.0 - share), rtol=1e-6)
+    np.testing.assert_allclose(bound, full * (1.0 - fraction), rtol=1e-6)
 
 
 def test_resolved_frequencies(rod: xr.Dataset) -> None:

@@ -269,10 +269,10 @@ def test_free_four_bars_keep_their_branch(name: str) -> None:
 
 @pytest.mark.slow
 def test_mechanisms_without_a_pose_ahead_lay_no_polynomial() -> None:
-    """A crank-rocker that comes near a change point and turns sharply there is integrated as it stands."""
+    """A crank-rocker that comes near a change point and turns sharply there is integrated as it is."""
     lengths = (0.2, 0.4, 0.3, 0.499)
     table = cp.driven(cp.four_bar(1.5, 1.0, lengths, time={"end": 2.0}), "A", cp.steady(1.5, 4.0))
-    run = integrate(Scene.model_validate(table), {}, lambda share, text: None)
+    run = integrate(Scene.model_validate(table), {}, lambda fraction, text: None)
     assert not run.trajectory.passes
     coupler = np.array([cp.elbow(x, 1.0, lengths) for x in 1.5 + 4.0 * run.trajectory.time])
     dataset = simulate(table)
@@ -343,7 +343,7 @@ def test_a_drive_that_leads_a_loose_loop_out_of_reach_is_told_when_it_does() -> 
     start, travel, end = LOOSE_START, 1.5, LOOSE_END
     texts: list[str] = []
     with pytest.raises(SolverError, match=r"joint C: .*drive out leads out of reach.*\[drive\.out\]") as told:
-        integrate(loose_four_bar(travel), {}, lambda share, text: texts.append(str(text)))
+        integrate(loose_four_bar(travel), {}, lambda fraction, text: texts.append(str(text)))
     # the second look, after 40 000 evaluations, is the first beyond the limit; it was told after three millions
     assert int(re.findall(r"(\d+) evaluations", " ".join(texts))[-1]) < 400_000
     ((time, depth),) = np.array(re.findall(r"at t = (\S+) s they have to be (\S+) m deep", str(told.value)), float)

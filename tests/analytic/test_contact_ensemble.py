@@ -27,7 +27,7 @@ from flexclear.pipeline.post import derive
 from tests.analytic.mechanism_runs import TREE, run
 from tests.reference import contact_solutions as exact
 
-END, APART, MEMBERS = 0.3, 1e-6, 4
+END, SEPARATION, MEMBERS = 0.3, 1e-6, 4
 ALONG_X = {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}
 
 
@@ -45,8 +45,8 @@ def test_members_start_the_asked_distance_apart_and_fall_alike() -> None:
     position = members().position.sel(body="ball").values
     offset = position[:, 0]
     # a displacement from a solution of linear equations, of rounding size here
-    assert np.linalg.norm(offset, axis=1) == pytest.approx(np.full(MEMBERS, APART), rel=1e-6)
-    assert np.linalg.norm(offset[0] - offset[1]) > 0.1 * APART
+    assert np.linalg.norm(offset, axis=1) == pytest.approx(np.full(MEMBERS, SEPARATION), rel=1e-6)
+    assert np.linalg.norm(offset[0] - offset[1]) > 0.1 * SEPARATION
     time = members().time.values
     k = int(np.searchsorted(time, 0.1))
     assert position[:, k, 2] - offset[:, 2] == pytest.approx(np.full(MEMBERS, -0.5 * 9.81 * time[k] ** 2), abs=1e-10)
@@ -56,8 +56,8 @@ def test_members_tell_impacts_and_their_share_of_the_time() -> None:
     (known,) = (b for b in exact.bounces(1.0, 1e8, 0.7, 9.81, 0.1, END))
     assert members().impact_count.values.tolist() == [[1]] * MEMBERS
     # a micrometre more or less to fall changes the speed by 5e-6 of it, the duration by a fifth of that
-    share = (known.end - known.start) / END
-    assert members().contact_time_share.values == pytest.approx(np.full((MEMBERS, 1), share), rel=1e-5)
+    fraction = (known.end - known.start) / END
+    assert members().contact_time_share.values == pytest.approx(np.full((MEMBERS, 1), fraction), rel=1e-5)
     assert np.ptp(members().peak_force.values) > 0.0
 
 
@@ -75,13 +75,13 @@ def test_members_are_the_same_to_the_last_bit_however_many_are_evaluated_at_once
     monkeypatch.setattr(cores, "cores", lambda: 1)
     monkeypatch.setattr(specialised, "LANES", (lanes,))
     known, made = six(), list[int]()
-    proper = batched_evaluation.Crew
+    proper = batched_evaluation.LaneGroup
 
-    def noted(kept: bytes, code: batched_evaluation.Code, width: int) -> batched_evaluation.Crew:
+    def noted(kept: bytes, code: batched_evaluation.Code, width: int) -> batched_evaluation.LaneGroup:
         made.append(width)
         return proper(kept, code, width)
 
-    monkeypatch.setattr(batched_evaluation, "Crew", noted)
+    monkeypatch.setattr(batched_evaluation, "LaneGroup", noted)
     assert dynamics.ensemble(scene(members=6), {}, silent).identical(known)
     assert made == ([lanes] if stacks.supported() and not INTERPRETED else [])
 

@@ -31,12 +31,12 @@ def test_a_grazing_contact_is_found_however_short_it_is(beyond: float) -> None:
     dataset = thrown_up(beyond)
     (begun,), (ended,) = of_kind(dataset, "closing"), of_kind(dataset, "opening")
     # the gap is located to 1e-13 of the clearance, the speed is the root of twice that share of `beyond`
-    known, share = math.sqrt(2.0 * GRAVITY * beyond), 1e-13 * CLEARANCE / beyond
-    assert dataset.event_approach_speed.values[begun] == pytest.approx(known, rel=share + 1e-6)
+    known, fraction = math.sqrt(2.0 * GRAVITY * beyond), 1e-13 * CLEARANCE / beyond
+    assert dataset.event_approach_speed.values[begun] == pytest.approx(known, rel=fraction + 1e-6)
     turns = math.sqrt(2.0 * CLEARANCE / GRAVITY)
     assert float(dataset.event_time[begun]) < turns < float(dataset.event_time[ended])
-    assert float(dataset.event_time[ended] - dataset.event_time[begun]) <= 2.0 * known / GRAVITY * (1.0 + share)
-    assert float(dataset.event_peak_penetration[begun]) <= beyond * (1.0 + share)
+    assert float(dataset.event_time[ended] - dataset.event_time[begun]) <= 2.0 * known / GRAVITY * (1.0 + fraction)
+    assert float(dataset.event_peak_penetration[begun]) <= beyond * (1.0 + fraction)
 
 
 @pytest.mark.parametrize("short", [1e-12, 1e-9])
@@ -60,7 +60,7 @@ def test_contacts_at_one_time_are_all_found_and_do_not_see_each_other() -> None:
         "time": {"end": 0.5},
         "output": {"interval": 0.01},
     }
-    dataset, alone = simulate(Scene.model_validate(table), {}, lambda share, text: None), run(BOUNCE)
+    dataset, alone = simulate(Scene.model_validate(table), {}, lambda fraction, text: None), run(BOUNCE)
     begun, known = of_kind(dataset, "closing"), of_kind(alone, "closing")[:2]
     assert sorted(dataset.event_contact.values[begun[:3]]) == sorted(dataset.contact.values)
     assert dataset.event_time.values[begun] == pytest.approx(np.repeat(alone.event_time.values[known], 3), abs=1e-8)

@@ -176,7 +176,7 @@ def test_a_ledger_that_does_not_close_is_no_result() -> None:
 
 
 @pytest.mark.parametrize(
-    "solver, share",
+    "solver, fraction",
     [
         ({}, 1e-4),
         ({"rtol": 5e-9}, 5e-4),
@@ -185,8 +185,8 @@ def test_a_ledger_that_does_not_close_is_no_result() -> None:
         ({"step": 1e-5}, 0.1),
     ],
 )
-def test_the_ledger_must_close_as_well_as_the_steps_are_asked_to_be(solver: dict[str, object], share: float) -> None:
-    assert usual(TypeAdapter(Solver).validate_python(solver)) == pytest.approx(share, rel=1e-12)
+def test_the_ledger_must_close_as_well_as_the_steps_are_asked_to_be(solver: dict[str, object], fraction: float) -> None:
+    assert usual(TypeAdapter(Solver).validate_python(solver)) == pytest.approx(fraction, rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -53,8 +53,8 @@ def horizons(seeds: Iterable[int]) -> np.ndarray:
     for seed in seeds:
         table = falling(seed)
         alone = dynamics.simulate(Scene.model_validate(table), {}, silent)
-        wanted = {"members": MEMBERS, "perturbation": PERTURBATION * CLEARANCE}
-        members = dynamics.ensemble(Scene.model_validate(table | {"ensemble": wanted}), {}, silent)
+        requested = {"members": MEMBERS, "perturbation": PERTURBATION * CLEARANCE}
+        members = dynamics.ensemble(Scene.model_validate(table | {"ensemble": requested}), {}, silent)
         made.append((float(alone.horizon), horizon(members.time.values, members.velocity.values)))
     return np.array(made)
 

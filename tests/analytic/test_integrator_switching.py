@@ -23,7 +23,7 @@ def run(told: list[str] | None = None, end: str = END, **solver: object) -> xr.D
     changes = {"time.end": end} | {f"solver.{key}": value for key, value in solver.items()}
     scene = load_scene(TREE / "scenes" / ROLLING, override=changes)
     said = [] if told is None else told
-    return dynamics.simulate(scene, {}, lambda share, text: said.append(text) if share is None else None)
+    return dynamics.simulate(scene, {}, lambda fraction, text: said.append(text) if fraction is None else None)
 
 
 @pytest.fixture
@@ -67,13 +67,13 @@ def test_the_limit_of_evaluations_makes_it_hand_over_earlier(monkeypatch: pytest
 @pytest.mark.usefixtures("impatient")
 def test_nothing_is_handed_over_where_the_motion_is_not_stiff() -> None:
     scene = load_scene(TREE / "scenes" / "checks" / "socket_preload.toml", override={"time.end": END})
-    assert "switched" not in dynamics.simulate(scene, {}, lambda share, text: None).attrs
+    assert "switched" not in dynamics.simulate(scene, {}, lambda fraction, text: None).attrs
 
 
 @pytest.mark.usefixtures("impatient")
 def test_members_of_an_ensemble_hand_over_too() -> None:
     scene = load_scene(TREE / "scenes" / ROLLING, override={"time.end": END, "ensemble": CLOSE})
-    found = dynamics.ensemble(scene, {}, lambda share, text: None)
+    found = dynamics.ensemble(scene, {}, lambda fraction, text: None)
     assert found.attrs["switched"].startswith("2 of 2 members")
     assert np.isfinite(found.position.values).all()
     # at 19 Hz a distance does not grow in 3 ms, but the ball chatters on the contact's two kilohertz

@@ -121,9 +121,9 @@ def coefficient(speed: np.ndarray | float) -> np.ndarray:
     return 0.5 * COULOMB["static"] * y * (3.0 - y * y)
 
 
-def creeping(share: float) -> float:
+def creeping(fraction: float) -> float:
     """Speed [m/s] at which COULOMB gives this coefficient."""
-    return float(brentq(lambda v: coefficient(v) - share, 0.0, COULOMB["v_static"]))
+    return float(brentq(lambda v: coefficient(v) - fraction, 0.0, COULOMB["v_static"]))
 
 
 def speed(name: str) -> np.ndarray:
@@ -155,11 +155,11 @@ def test_bristles_hold_a_block_on_a_slope() -> None:
 
 def test_a_guide_locks_where_twice_the_coefficient_times_the_arm_of_the_push_exceeds_its_length() -> None:
     """The push makes a couple across its ends, the weight presses them alike: N is the sum of two magnitudes."""
-    t, share = made().time.values, 2.0 * 0.2 * np.hypot(ARMS["free"] / LENGTH, 0.5 * MASS * G / PUSH)
-    assert np.diff(speed("free"))[2:] == pytest.approx(PUSH / MASS * (1.0 - share) * np.diff(t)[2:], rel=1e-8)
+    t, fraction = made().time.values, 2.0 * 0.2 * np.hypot(ARMS["free"] / LENGTH, 0.5 * MASS * G / PUSH)
+    assert np.diff(speed("free"))[2:] == pytest.approx(PUSH / MASS * (1.0 - fraction) * np.diff(t)[2:], rel=1e-8)
     # the locked one only creeps, at the speed where its friction carries the push, whatever that is
-    share = 0.5 / np.hypot(ARMS["locked"] / LENGTH, 0.5 * MASS * G / PUSH)
-    assert speed("locked")[-1] == pytest.approx(creeping(share), rel=1e-6)  # as of the one that creeps
+    fraction = 0.5 / np.hypot(ARMS["locked"] / LENGTH, 0.5 * MASS * G / PUSH)
+    assert speed("locked")[-1] == pytest.approx(creeping(fraction), rel=1e-6)  # as of the one that creeps
 
 
 def test_wheel_ball_and_motor_feel_the_moment_of_their_weight() -> None:

@@ -110,7 +110,7 @@ def test_damping_of_a_clamped_rod_is_that_of_its_modes(damping: object) -> None:
     free = frequencies("checks/clamped_rod", (still,)).frequency.values
     path = TREE / "scenes" / "checks" / "clamped_rod.toml"
     scene = load_scene(path, {"body.rod.damping": damping, still[0]: still[1]})
-    found = dynamics.frequencies(scene, bundles(scene), lambda share, text: None)
+    found = dynamics.frequencies(scene, bundles(scene), lambda fraction, text: None)
     omega = 2.0 * np.pi * free
     if isinstance(damping, float):
         ratio = np.full(13, damping)
@@ -128,7 +128,7 @@ def test_ratios_that_are_not_one_per_mode_are_refused() -> None:
     path = TREE / "scenes" / "checks" / "clamped_rod.toml"
     scene = load_scene(path, {"body.rod.damping": {"ratios": [0.01, 0.01]}})
     with pytest.raises(InputError, match=r"2 damping ratios are given for 13 modes"):
-        dynamics.frequencies(scene, bundles(scene), lambda share, text: None)
+        dynamics.frequencies(scene, bundles(scene), lambda fraction, text: None)
 
 
 def test_a_falling_body_has_no_equilibrium() -> None:

@@ -18,7 +18,7 @@ SMOOTH = 1e-9  # differences of linear and trigonometric forces
 
 def frequencies(table: dict[str, Any], time: float = 0.0) -> xr.Dataset:
     scene = Scene.model_validate({"title": "test", "time": {"end": 1.0}, **table})
-    return dynamics.frequencies(scene, bundles(scene), lambda share, text: None, time)
+    return dynamics.frequencies(scene, bundles(scene), lambda fraction, text: None, time)
 
 
 def chain(damping: float) -> dict[str, Any]:
@@ -127,7 +127,7 @@ def test_a_load_that_follows_the_end_of_a_column_makes_it_flutter_and_never_buck
     Sixteen elements and ten bending shapes per plane meet within 1e-3 of it.
     """
     critical = 20.0509
-    below, above = (becks_column(share * critical) for share in (0.998, 1.002))
+    below, above = (becks_column(fraction * critical) for fraction in (0.998, 1.002))
     lowest = below.frequency.values[:4]
     # both planes alike; the two frequencies of a plane have nearly met
     assert lowest[0] > 0.0

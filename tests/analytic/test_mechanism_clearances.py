@@ -32,8 +32,8 @@ def angle_error(dataset: xr.Dataset) -> float:
 def test_error_against_ideal_falls_with_the_clearance_and_cost_stays_bounded() -> None:
     errors = np.array([angle_error(held(c)) for c in CLEARANCES])
     # what is left at zero clearance is the contact's own compliance: some micrometres at the largest force
-    share = errors / np.array(CLEARANCES)
-    assert share[:3] == pytest.approx(share[0], rel=0.1)
+    fraction = errors / np.array(CLEARANCES)
+    assert fraction[:3] == pytest.approx(fraction[0], rel=0.1)
     assert (np.diff(errors) < 0.0).all()
     cost = [held(c).attrs["evaluations"] for c in CLEARANCES]
     # asked for: three times, between the widest and any other

@@ -48,10 +48,10 @@ def forces(scene: str) -> list[Reactions]:
     return [reactions(m, *CASES[scene]) for m in motions(scene)]
 
 
-def close(found: xr.DataArray, expected: list[np.ndarray], share: float) -> bool:
+def close(found: xr.DataArray, expected: list[np.ndarray], fraction: float) -> bool:
     """Whether vectors agree to a share of the largest one of the run."""
     expected_array = np.array(expected)
-    return bool(np.abs(found.values - expected_array).max() <= share * np.abs(expected_array).max())
+    return bool(np.abs(found.values - expected_array).max() <= fraction * np.abs(expected_array).max())
 
 
 @every_case

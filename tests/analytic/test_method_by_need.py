@@ -29,7 +29,9 @@ WANTED = {"platform.velocity": "0.1 %"}
 
 def simulated(scene: Scene, told: list[str] | None = None) -> xr.Dataset:
     said = [] if told is None else told
-    return dynamics.simulate(scene, bundles(scene), lambda share, text: said.append(text) if share is None else None)
+    return dynamics.simulate(
+        scene, bundles(scene), lambda fraction, text: said.append(text) if fraction is None else None
+    )
 
 
 @cache
@@ -201,7 +203,7 @@ def test_the_more_accurate_run_is_delivered_where_it_was_the_cheaper() -> None:
     dear = searched("exponential", 80_000, 12_000)
     attempt = Attempt(1e-4, dear.runs[1e-4], {"platform.velocity": 1e-3}, 0.2)
     assert dear.cheapest(attempt).run.attrs["evaluations"] == 12_000
-    assert dear.cheapest(replace(attempt, share=2.0)).run is attempt.run
+    assert dear.cheapest(replace(attempt, fraction=2.0)).run is attempt.run
 
 
 @pytest.mark.parametrize("apart, delivered", [(1e-4, 12_000), (1e-2, 80_000)])

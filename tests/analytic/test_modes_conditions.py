@@ -16,7 +16,7 @@ from flexclear.pipeline.structure.fe import mesh
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import compliance, eigen
-from flexclear.pipeline.structure.modes.select import Wanted
+from flexclear.pipeline.structure.modes.select import ModeRequest
 from flexclear.pipeline.structure.modes.solution import solve
 from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
@@ -44,7 +44,7 @@ def rod() -> xr.Dataset:
 
 @pytest.fixture(scope="module")
 def body(rod: xr.Dataset) -> Flexibility:
-    return support(of_mesh(rod).assemble(rod), lambda share: None)
+    return support(of_mesh(rod).assemble(rod), lambda fraction: None)
 
 
 @pytest.mark.parametrize("condition", COMPLETE)
@@ -55,9 +55,9 @@ def test_complete_sets_span_the_same_space(rod: xr.Dataset, body: Flexibility, c
     assert vectors.shape == (78, 72)
     together = np.hstack([model.rigid, vectors])
     assert np.linalg.matrix_rank(together / np.linalg.norm(together, axis=0)) == 78
-    share = compliance.of_basis(body, model.interfaces, vectors) / compliance.full(body, model.interfaces)
+    fraction = compliance.of_basis(body, model.interfaces, vectors) / compliance.full(body, model.interfaces)
     # the eigenvalues of the basis span 1e9; what is left of rounding in a static answer is about its root
-    np.testing.assert_allclose(share, 1.0, rtol=0.0, atol=1e-7)
+    np.testing.assert_allclose(fraction, 1.0, rtol=0.0, atol=1e-7)
     values, _ = eigen.rediagonalise(model.stiffness, model.mass, body.relieved(vectors))
     full = eigen.dense(model.stiffness, model.mass, 78)[0][6:]
     # eps times the ratio of the largest to the lowest eigenvalue is 1e-7 as a bound
@@ -95,9 +95,9 @@ def test_attachment_modes_have_the_free_rods_answer_to_an_end_load(rod: xr.Datas
     assert axial == pytest.approx(L / (3.0 * E * A) * (1.0 - 0.25 / 144), rel=1e-9)
     for condition in ("craig-chang", "residual-flexibility"):
         found = solve(rod, condition, 19)["vector"].values
-        share = compliance.of_basis(body, body.model.interfaces, found) / whole
+        fraction = compliance.of_basis(body, body.model.interfaces, found) / whole
         # both frames are loaded: all their compliance is there, held or free
-        np.testing.assert_allclose(share[np.ix_([0, 3], [0, 3])], 1.0, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(fraction[np.ix_([0, 3], [0, 3])], 1.0, rtol=0.0, atol=1e-9)
 
 
 def test_both_attachment_bases_are_one_space(rod: xr.Dataset) -> None:
@@ -129,35 +129,36 @@ def test_dense_and_sparse_solvers_agree_on_held_functionals(
 
 
 @pytest.mark.parametrize(
-    "wanted, count", [(Wanted(up_to=8000.0), 5), (Wanted(up_to=8500.0), 7), (Wanted(up_to=11000.0), 8)]
+    "requested, count",
+    [(ModeRequest(up_to=8000.0), 5), (ModeRequest(up_to=8500.0), 7), (ModeRequest(up_to=11000.0), 8)],
 )
-def test_modes_up_to_a_frequency(rod: xr.Dataset, wanted: Wanted, count: int) -> None:
+def test_modes_up_to_a_frequency(rod: xr.Dataset, requested: ModeRequest, count: int) -> None:
     """The free rod has two bending pairs, torsion, a third pair at 8221 Hz, axial at 10.7 kHz."""
-    found = solve(rod, "free-free", wanted=wanted)
+    found = solve(rod, "free-free", requested=requested)
     assert found.sizes["mode"] == count
-    assert found["frequency"].values[-1] <= wanted.up_to  # type: ignore[operator]
+    assert found["frequency"].values[-1] <= requested.up_to  # type: ignore[operator]
 
 
 def test_modes_up_to_a_share_of_the_compliance(rod: xr.Dataset, body: Flexibility) -> None:
     ends = (body.model.interfaces[0], body.model.interfaces[3])
-    found = solve(rod, "free-free", wanted=Wanted(compliance=0.9))
+    found = solve(rod, "free-free", requested=ModeRequest(compliance=0.9))
     n = found.sizes["mode"]
     assert compliance.least(body, ends, found["vector"].values)[0] >= 0.9
     # the next smaller whole basis would not do
     assert compliance.least(body, ends, found["vector"].values[:, : n - 2])[0] < 0.9
-    assert solve(rod, "craig-bampton", wanted=Wanted(compliance=1.0 - 1e-9)).sizes["mode"] == 6
+    assert solve(rod, "craig-bampton", requested=ModeRequest(compliance=1.0 - 1e-9)).sizes["mode"] == 6
 
 
 def test_modes_up_to_a_share_of_the_mass(rod: xr.Dataset) -> None:
     """Of a clamped rod the first axial mode carries 8 / pi^2 = 0.81 of the mass, so 0.8 needs it and 0.85 more."""
-    first, more = (solve(rod, "cantilever", wanted=Wanted(mass=share)) for share in (0.8, 0.85))
+    first, more = (solve(rod, "cantilever", requested=ModeRequest(mass=fraction)) for fraction in (0.8, 0.85))
     axial = [int(np.sum(found["kind"].values == "axial")) for found in (first, more)]
     assert axial == [1, 2]
 
 
 def test_a_mechanism_is_told_from_a_body(body: Flexibility) -> None:
     """A hinge: the stiffness of a chain whose middle node is cut in two that share their place only."""
-    middle = body.model.place[:, 0] < 0.11
+    middle = body.model.position[:, 0] < 0.11
     cut = sp.diags_array(middle.astype(float)) @ body.model.stiffness @ sp.diags_array(middle.astype(float))
     rest = sp.diags_array((~middle).astype(float)) @ body.model.stiffness @ sp.diags_array((~middle).astype(float))
     with pytest.raises(InputError, match="beyond its six rigid motions"):
@@ -173,23 +174,27 @@ def _free(part: sp.csr_array, body: Flexibility, own: np.ndarray) -> sp.csr_arra
     return sp.csr_array(P.T @ part.toarray() @ P)
 
 
-def _quiet(share: float) -> None:
+def _quiet(fraction: float) -> None:
     """No progress."""
 
 
 @pytest.mark.parametrize(
     "condition, options, message",
     [
-        ("fixed-fixed", {"wanted": Wanted(compliance=0.5)}, r"0 of the compliance .* 'bottom'.*\n.*craig-bampton"),
-        ("free-free", {"wanted": Wanted(mass=0.5)}, r"of the mass moves with the basis\n.*count or up_to"),
-        ("free-free", {"wanted": Wanted(up_to=100.0)}, r"no mode .* 100 Hz; the first is at 1564"),
+        (
+            "fixed-fixed",
+            {"requested": ModeRequest(compliance=0.5)},
+            r"0 of the compliance .* 'bottom'.*\n.*craig-bampton",
+        ),
+        ("free-free", {"requested": ModeRequest(mass=0.5)}, r"of the mass moves with the basis\n.*count or up_to"),
+        ("free-free", {"requested": ModeRequest(up_to=100.0)}, r"no mode .* 100 Hz; the first is at 1564"),
         ("constrained", {"held": ("top.x", "top.y", "top.z")}, r"leave 3 rigid-body motions of the body free"),
         ("constrained", {"held": ("top.x",) * 6}, r"not independent"),
         ("constrained", {"held": ()}, "no motion is held"),
         ("constrained", {"held": ("topp.x",)}, r"no frame called 'topp'\n.*'top'"),
         ("constrained", {"held": ("top.w",)}, "names no direction"),
         ("pinned-pinned", {"interfaces": ("top",)}, "two interfaces"),
-        ("pinned-pinned", {"interfaces": ("top", "top")}, "at one place"),
+        ("pinned-pinned", {"interfaces": ("top", "top")}, "coincide"),
         ("cantilever", {"interfaces": ()}, "clamped at an interface"),
         ("craig-chang", {"interfaces": ()}, "need an interface"),
         ("craig-chang", {"count": 11}, r"12 .*modes"),
@@ -201,4 +206,4 @@ def test_what_cannot_be_meant_is_refused(
     rod: xr.Dataset, condition: str, options: dict[str, object], message: str
 ) -> None:
     with pytest.raises(InputError, match=message):
-        solve(rod, condition, **({"count": 8} if "wanted" not in options else {}) | options)  # type: ignore[arg-type]
+        solve(rod, condition, **({"count": 8} if "requested" not in options else {}) | options)  # type: ignore[arg-type]

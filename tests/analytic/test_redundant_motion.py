@@ -212,6 +212,6 @@ def test_drives_of_a_tiny_loop_reach_their_pose_as_those_of_a_large_one() -> Non
         table = hung_up(made, np.random.default_rng(3), Setting(size))
         table["load"]["gravity"]["acceleration"] = [0.0, -G, 0.0]
         table["drive"] = {"crank": {"joint": "pin0", "law": {"type": "constant", "value": 0.0}}}
-        held = dynamics.frequencies(Scene.model_validate(table), {}, lambda share, text: None, None, {"crank": 0.2})
+        held = dynamics.frequencies(Scene.model_validate(table), {}, lambda fraction, text: None, None, {"crank": 0.2})
         found.append(held.frequency.values * np.sqrt(size))
     assert found[1] == pytest.approx(found[0], rel=1e-7)

@@ -50,7 +50,7 @@ def blades(hinge: tuple[float, float, float], count: int = 1, size: float = 1.0,
 
 def steady(table: Table) -> np.ndarray:
     """Angular frequencies of small motions about steady turning [rad/s]."""
-    found = dynamics.frequencies(Scene.model_validate(table), {}, lambda share, text: None, moving=True)
+    found = dynamics.frequencies(Scene.model_validate(table), {}, lambda fraction, text: None, moving=True)
     return 2.0 * np.pi * found.frequency.values
 
 

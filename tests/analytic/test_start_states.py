@@ -24,7 +24,7 @@ CHECKS = TREE / "scenes" / "checks"
 
 
 def simulate(scene: Scene) -> xr.Dataset:
-    return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
+    return dynamics.simulate(scene, bundles(scene), lambda fraction, text: None)
 
 
 # A four-bar, by the rate of a coordinate -----------------------------------------------------------------------------
@@ -35,14 +35,14 @@ def test_the_rate_of_one_coordinate_sets_the_loop_in_motion(name: str, k: int) -
     crank, rate = 0.9, 3.0
     step = 1e-4
     # of the closed form, by central differences; its error is some 1e-8
-    shares = (np.array(angles(crank + step)) - np.array(angles(crank - step))) / (2.0 * step)
+    fractions = (np.array(angles(crank + step)) - np.array(angles(crank - step))) / (2.0 * step)
     start = {"j0": {"position": crank}, "j3": {"near": 1.5}}
-    start[name] = start[name] | {"velocity": f"{rate * shares[k]} rad/s"}
+    start[name] = start[name] | {"velocity": f"{rate * fractions[k]} rad/s"}
     table = loose(crank, joint=start)
     del table["drive"]
     run = simulate(Scene.model_validate(table))
     found = run.angular_velocity.sel(body=["crank", "coupler", "rocker"]).values[0, :, 2]
-    assert found == pytest.approx(rate * shares, rel=1e-6)
+    assert found == pytest.approx(rate * fractions, rel=1e-6)
     assert float(run.joint_position.sel(coordinate="j0")[0]) == pytest.approx(crank, abs=1e-10)
     assert "start_mended" not in run.attrs
 
@@ -182,9 +182,9 @@ def test_pins_are_pressed_into_their_places_without_bending_a_rod_or_being_held_
     stop = {"joint": "guide", "upper": "0.4 m", "normal": {"law": "flores", "restitution": 0.5, "stiffness": 1e8}}
     unplaced = {f"body.{name}.pose": None for name in ("crank", "rod", "slider")}
     law = {"type": "polynomial", "coefficients": ["20 deg", "100 rpm"]}
-    wanted = {**unplaced, "start": {"at": "ideal"}, "drive.motor.law": law, "stop": {"end": stop}}
-    scene = edited(load_scene(template), wanted)
-    begun, choice = ideal.begin(scene, bundles(scene), lambda share, text: None)
+    requested = {**unplaced, "start": {"at": "ideal"}, "drive.motor.law": law, "stop": {"end": stop}}
+    scene = edited(load_scene(template), requested)
+    begun, choice = ideal.begin(scene, bundles(scene), lambda fraction, text: None)
     assert "assembled in 2 ways" in choice
     assert begun.start is not None
     # the twin's own are zero; pressing bends the rod by rounding of its length

@@ -199,10 +199,10 @@ def test_a_planar_four_bar_in_space_moves_as_the_one_without_redundant_rows() ->
 def test_the_motion_does_not_depend_on_which_rows_are_solved_for(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows chosen anew whenever others stand out a little more, instead of when the present ones are worn out."""
     scene = Scene.model_validate(table("bricard", **{"time.end": 2.0, "solver": {"rtol": 1e-12}}))
-    once = integrate(scene, {}, lambda share, text: None)
+    once = integrate(scene, {}, lambda fraction, text: None)
     monkeypatch.setattr(singular, "WORN", 0.99)
     monkeypatch.setattr(singular, "BETTER", 1.0)
-    often = integrate(scene, {}, lambda share, text: None)
+    often = integrate(scene, {}, lambda fraction, text: None)
     changes = [[time for time, _ in run.trajectory.selections] for run in (once, often)]
     assert changes[0] != changes[1]
     same_motion(dataset_of(often), dataset_of(once), 1e-9)
@@ -211,14 +211,14 @@ def test_the_motion_does_not_depend_on_which_rows_are_solved_for(monkeypatch: py
 def test_rows_are_chosen_anew_before_the_present_ones_depend_on_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
     """Near 1.25 s the five rows that are best at the start do, though the mechanism is as movable as ever."""
     scene = Scene.model_validate(table("bricard", **{"time.end": 2.0, "solver": {"rtol": 1e-12}}))
-    run = integrate(scene, {}, lambda share, text: None)
+    run = integrate(scene, {}, lambda fraction, text: None)
     (_, first), (time, second) = run.trajectory.selections
     assert 1.0 < time < 1.247
     assert not np.array_equal(first, second)
     assert not run.trajectory.collocations
     # without that they do depend on each other, and a polynomial has to lead over the time at which they do
     monkeypatch.setattr(singular, "improve", lambda *_: False)
-    (over,) = integrate(scene, {}, lambda share, text: None).trajectory.collocations
+    (over,) = integrate(scene, {}, lambda fraction, text: None).trajectory.collocations
     assert over.start < 1.247 < over.end
 
 

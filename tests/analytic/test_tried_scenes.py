@@ -22,7 +22,7 @@ def tried(name: str, **override: object) -> Scene:
 
 
 def simulate(scene: Scene) -> xr.Dataset:
-    return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
+    return dynamics.simulate(scene, bundles(scene), lambda fraction, text: None)
 
 
 @pytest.mark.parametrize("name", ["oblique_door", "upright_door"])
@@ -76,7 +76,7 @@ def test_a_door_on_two_loose_pins_swings_as_a_pendulum_within_the_clearance() ->
 @pytest.mark.slow
 def test_a_blade_on_a_hub_with_a_radius_has_steady_frequencies() -> None:
     scene = tried("hub_blade")
-    found = dynamics.frequencies(scene, bundles(scene), lambda share, text: None, moving=True)
+    found = dynamics.frequencies(scene, bundles(scene), lambda fraction, text: None, moving=True)
     unit = np.sqrt(200e9 * 0.002**2 / (4.0 * 7850.0))  # sqrt(E I / (rho A)) / L^2 of 1 m
     speeds = 2.0 * np.pi * found.frequency.values / unit
     for lagging in (False, True):

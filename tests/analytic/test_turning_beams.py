@@ -88,7 +88,7 @@ def spun(case: str, rtol: float = 1e-10) -> xr.Dataset:
     """The run of a case."""
     name, overrides = SCENES[case]
     scene = load_scene(TREE / "scenes" / f"{name}.toml", {**overrides, "solver.rtol": rtol})
-    return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
+    return dynamics.simulate(scene, bundles(scene), lambda fraction, text: None)
 
 
 @pytest.mark.parametrize("case", SCENES)

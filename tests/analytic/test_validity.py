@@ -34,7 +34,7 @@ def turning(speed: float, gravity: float, **more: Any) -> xr.Dataset:
         "time.end": 1.0,
     }
     scene = load_scene(TREE / "scenes" / "checks" / "spinup_beam.toml", override | more)
-    return dynamics.simulate(scene, bundles(scene), lambda share, text: None)
+    return dynamics.simulate(scene, bundles(scene), lambda fraction, text: None)
 
 
 def told(run: xr.Dataset) -> list[str]:
@@ -133,7 +133,7 @@ def dropped(depth: float) -> xr.Dataset:
         "output": {"interval": 1e-3},
         "solver": {"rtol": 1e-8},
     }
-    return dynamics.simulate(Scene.model_validate(table), {}, lambda share, text: None)
+    return dynamics.simulate(Scene.model_validate(table), {}, lambda fraction, text: None)
 
 
 @pytest.mark.slow

@@ -196,13 +196,13 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     """An edit of a part that a scene does not use leaves its machine code alone."""
     found, present = CASES[case]
     modules = reached(sources(found, SCHEME))
-    wanted = {module_of(JOINTS, n) for n in found.joints}
-    wanted.add("flexclear.pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
+    requested = {module_of(JOINTS, n) for n in found.joints}
+    requested.add("flexclear.pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
     if "contact" in present:
-        wanted.add("flexclear.pipeline.dynamics.joints.clearance_spherical")
+        requested.add("flexclear.pipeline.dynamics.joints.clearance_spherical")
     if "joint friction" in present:
-        wanted.add("flexclear.pipeline.dynamics.joints.bearings")
-    assert below(modules, ("flexclear.pipeline.dynamics.joints",)) == wanted
+        requested.add("flexclear.pipeline.dynamics.joints.bearings")
+    assert below(modules, ("flexclear.pipeline.dynamics.joints",)) == requested
     if not {"contact", "stops", "joint friction"} & present:
         assert below(modules, CONTACT) == set()
     if "flexible bodies" not in present:

@@ -99,16 +99,16 @@ def test_every_dependency_is_pinned(root: Path):
         if "==" in line
     }
     extras = project["optional-dependencies"]
-    wanted = [*project["dependencies"], *extras["dev"], *extras["render"]]
-    assert {re.split(r"[<>=]", name)[0].lower() for name in wanted} <= pinned
+    requested = [*project["dependencies"], *extras["dev"], *extras["render"]]
+    assert {re.split(r"[<>=]", name)[0].lower() for name in requested} <= pinned
 
 
 def test_every_library_that_is_imported_is_declared(root: Path):
     """An indirect dependency may vanish with the next version of what brought it."""
     project = tomllib.loads((root / "pyproject.toml").read_text())["project"]
     extras = project["optional-dependencies"]
-    wanted = [*project["dependencies"], *extras["render"], *extras["cluster"]]
-    declared = {re.split(r"[<>=]", name)[0].lower().replace("-", "_") for name in wanted}
+    requested = [*project["dependencies"], *extras["render"], *extras["cluster"]]
+    declared = {re.split(r"[<>=]", name)[0].lower().replace("-", "_") for name in requested}
     declared |= {"skfem", "vtkmodules", "markdown_it", "flexclear"} | set(sys.stdlib_module_names)
     found = set()
     for path in sources(root):

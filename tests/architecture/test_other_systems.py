@@ -100,9 +100,9 @@ def test_all_text_is_read_and_written_as_utf_8(root: Path) -> None:
     found = []
     for path in (p for name in ("pipeline", "stages", "benchmarks") for p in sorted((root / name).rglob("*.py"))):
         for node in ast.walk(ast.parse(path.read_bytes())):
-            wanted = _asked(node)
-            if wanted:
-                found += [f"{path.relative_to(root)}:{node.lineno} {name}" for name in wanted]
+            requested = _asked(node)
+            if requested:
+                found += [f"{path.relative_to(root)}:{node.lineno} {name}" for name in requested]
     # a distribution's own reader knows its encoding
     assert [place for place in found if "fingerprint.py" not in place] == []
 
@@ -159,8 +159,8 @@ def test_a_flexible_body_is_made_without_links(without_links: Path) -> None:
 def test_a_checkout_without_links_has_the_keys_of_one_with_links(root: Path, without_links: Path) -> None:
     """Nothing is run again because of where a source lies."""
     text = (
-        "from flexclear.stages.run import graphs, workplace\n"
-        "place = workplace()\n"
+        "from flexclear.stages.run import graphs, open_workplace\n"
+        "place = open_workplace()\n"
         "(graph,) = graphs(['checks/pendulum'])\n"
         "from flexclear.pipeline.core.workflow.execute import key_of\n"
         "print(key_of(graph.simulate, {}, place.store, place.sources))\n"
@@ -285,7 +285,7 @@ def test_scenes_that_differ_in_capitals_only_are_not_run_together(tmp_path: Path
         path.parent.mkdir()
         shutil.copy(root / "scenes" / "checks" / "pendulum.toml", path)
         scenes.append(fc.load_scene(path))
-    with pytest.raises(InputError, match="take each other's place"):
+    with pytest.raises(InputError, match="replace each other"):
         owner.refuse_namesakes(scenes)
 
 

@@ -215,7 +215,7 @@ def test_the_claim_of_chaos_is_judged_by_the_sections_that_were_made(tmp_path, m
     assert last["verdict"] == verdict
     assert f"CSJ {motions[0]}" in last["numbers"]
     recorded.unlink()
-    assert rows(table_verdicts, "table_verdicts")[-1]["verdict"] == "cannot be told from one stroke"
+    assert rows(table_verdicts, "table_verdicts")[-1]["verdict"] == "cannot be determined from one stroke"
 
 
 def judged(data: dict[str, xr.Dataset]) -> dict[str, dict[str, str]]:

@@ -16,7 +16,7 @@ GRAVITY = {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}}
 
 
 def simulate(table: Table) -> xr.Dataset:
-    return dynamics.simulate(Scene.model_validate(table), {}, lambda share, text: None)
+    return dynamics.simulate(Scene.model_validate(table), {}, lambda fraction, text: None)
 
 
 def body(position: Any, mass: float = 1.0, frames: Table | None = None, **more: Any) -> Table:

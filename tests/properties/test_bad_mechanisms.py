@@ -36,14 +36,14 @@ def four_bar() -> Table:
 
 def refusal(table: Table) -> InputError:
     with pytest.raises(InputError) as caught:
-        engine_of(Scene.model_validate(table), {}, lambda share, text: None)
+        engine_of(Scene.model_validate(table), {}, lambda fraction, text: None)
     assert caught.value.exit_code == 2
     return caught.value
 
 
 def test_a_sound_mechanism_gets_as_far_as_the_kernels() -> None:
     with pytest.raises(AssertionError, match="as far as the kernels"):
-        engine_of(Scene.model_validate(four_bar()), {}, lambda share, text: None)
+        engine_of(Scene.model_validate(four_bar()), {}, lambda fraction, text: None)
 
 
 def test_a_frame_that_is_not_there() -> None:
@@ -78,7 +78,7 @@ def test_a_body_that_says_it_is_free_is_accepted() -> None:
     table["body"]["bird"] = deepcopy(table["body"]["beam1"]) | {"inertia": (0.01, 0.08, 0.08)}
     table["joint"]["flight"] = {"type": "free", "between": ("ground.pin0", "bird.left")}
     with pytest.raises(AssertionError, match="as far as the kernels"):
-        engine_of(Scene.model_validate(table), {}, lambda share, text: None)
+        engine_of(Scene.model_validate(table), {}, lambda fraction, text: None)
 
 
 def step(change: float) -> Table:
@@ -179,7 +179,7 @@ def test_a_start_in_a_singular_pose_is_refused_with_time_joint_and_condition() -
         table["body"][rod] |= {"pose": {"position": (x, 0.0, 0.0), **lying}}
     table["body"]["beam1"]["pose"] = {"position": (1.0, 0.0, 0.0)}
     with pytest.raises(SolverError) as caught:
-        engine_of(Scene.model_validate(table), {}, lambda share, text: None)
+        engine_of(Scene.model_validate(table), {}, lambda fraction, text: None)
     assert caught.value.exit_code == 3
     for part in ("t = 0 s", "singular", "condition number", "joints"):
         assert part in str(caught.value), part
@@ -200,7 +200,7 @@ def test_a_load_on_what_does_not_move(frame: str, kind: str, value: str) -> None
     assert error.remedy
     table["load"]["push"]["frame"] = "rod0.top"
     with pytest.raises(AssertionError, match="as far as the kernels"):
-        engine_of(Scene.model_validate(table), {}, lambda share, text: None)
+        engine_of(Scene.model_validate(table), {}, lambda fraction, text: None)
 
 
 def test_a_spring_may_end_on_the_ground() -> None:
@@ -208,7 +208,7 @@ def test_a_spring_may_end_on_the_ground() -> None:
     ends = {"between": ("ground.pin0", "beam1.left"), "stiffness": 10.0, "free_length": 0.1}
     table["load"] = {"tie": {"type": "spring-damper", **ends}}
     with pytest.raises(AssertionError, match="as far as the kernels"):
-        engine_of(Scene.model_validate(table), {}, lambda share, text: None)
+        engine_of(Scene.model_validate(table), {}, lambda fraction, text: None)
 
 
 def thin_rod(kind: str, turn: tuple[float, float, float]) -> Table:
@@ -230,4 +230,4 @@ def test_a_motion_that_no_mass_resists(turn: tuple[float, float, float]) -> None
         assert error.place == "[body.rod.inertia]"
         assert "nothing resists a motion of rod" in error.problem
     with pytest.raises(AssertionError, match="as far as the kernels"):  # about z it has some
-        engine_of(Scene.model_validate(thin_rod("revolute", turn)), {}, lambda share, text: None)
+        engine_of(Scene.model_validate(thin_rod("revolute", turn)), {}, lambda fraction, text: None)

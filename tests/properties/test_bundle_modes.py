@@ -187,7 +187,7 @@ def test_a_missed_mode_is_noticed(held: bool) -> None:
 
 
 def support_of(model: Model) -> Callable[[], Flexibility]:
-    return lambda: support(model, lambda share: None)
+    return lambda: support(model, lambda fraction: None)
 
 
 def gap(values: np.ndarray) -> tuple[int, float]:

@@ -53,7 +53,7 @@ def test_section_constants() -> None:
 def test_a_frame_between_nodes_is_refused_with_the_nearest_nodes(recipe: dict[str, Any]) -> None:
     recipe["frames"]["at_60mm"]["x"] = "67 mm"
     with pytest.raises(InputError, match=r"rod\.toml \[frames\.at_60mm\.x\]: 67 mm lies on no node.*60 mm and 80 mm"):
-        mesh.build(recipe, place="rod.toml")
+        mesh.build(recipe, where="rod.toml")
 
 
 @pytest.mark.parametrize(

@@ -179,8 +179,8 @@ def test_what_cannot_be_had_is_explained():
 
 def test_a_scene_that_is_refused_as_it_stands_has_no_causes():
     _, points, runs = study()
-    points.append(Point("as it stands", "sampling", {"interval": 0.1}))
-    runs["as it stands"] = xr.Dataset(attrs={"refused": "no"})
+    points.append(Point("as it is", "sampling", {"interval": 0.1}))
+    runs["as it is"] = xr.Dataset(attrs={"refused": "no"})
     found = split.causes_of(POSITION, points, runs, located=1e-12)
     assert np.isnan(found["time integration"])
     assert causes.dominant(found) == "–"
@@ -211,10 +211,10 @@ def test_the_pareto_front_holds_what_nothing_beats():
 def test_causes_come_from_pairs_that_differ_in_one_thing():
     _, points, runs = study()
     points += [
-        Point("as it stands", "sampling", {"interval": 0.1}),
+        Point("as it is", "sampling", {"interval": 0.1}),
         Point("denser output", "sampling", {"interval": 0.01}),
     ]
-    runs |= {"as it stands": run(1e-5), "denser output": run(1e-5)}
+    runs |= {"as it is": run(1e-5), "denser output": run(1e-5)}
     own = {"theory": "rayleigh", "mode_set": "craig-bampton", "modes": 1e3, "elements": 12, "own": True}
     variants = {
         "own": own,
@@ -235,11 +235,11 @@ def test_causes_come_from_pairs_that_differ_in_one_thing():
 
 
 def test_a_cause_that_changes_the_number_of_impacts_dominates():
-    shares = {"pin.impact_times": {"mesh": 1e-3, "beam theory": np.inf, "modal truncation": np.nan}}
-    assert causes.dominant(shares["pin.impact_times"]) == "beam theory"
-    found = {row[0]: row[1] for row in causes.table(shares, "t").rows}
+    fractions = {"pin.impact_times": {"mesh": 1e-3, "beam theory": np.inf, "modal truncation": np.nan}}
+    assert causes.dominant(fractions["pin.impact_times"]) == "beam theory"
+    found = {row[0]: row[1] for row in causes.table(fractions, "t").rows}
     assert (found["mesh"], found["beam theory"]) == ("1.0e-03", "other impacts")
-    assert set(causes.make("c", shares, "t")) == {"c.png", "c.svg"}
+    assert set(causes.make("c", fractions, "t")) == {"c.png", "c.svg"}
 
 
 def test_contacts_beyond_the_horizon_do_not_count():
@@ -282,8 +282,8 @@ def test_the_page_says_which_quantities_can_be_had_when_not_all_can():
 
 def test_the_page_says_how_far_it_holds_and_what_to_refine():
     found, *_ = study(horizon=0.5)
-    shares = {"slider.position": {"mesh": 1e-3, "time integration": 1e-6}, "pin.impact_times": {}}
-    split_up = causes.beside(found, shares)
+    fractions = {"slider.position": {"mesh": 1e-3, "time integration": 1e-6}, "pin.impact_times": {}}
+    split_up = causes.with_causes(found, fractions)
     text = written(split_up, ("**Beyond the horizon: x**",))
     assert "holds up to t = 0.5 s of 1 s; beyond that nothing but the means of an ensemble, below" in text
     assert "more elements (mesh limits slider.position)" in text

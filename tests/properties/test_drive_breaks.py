@@ -21,7 +21,7 @@ def test_breaks_that_only_rounding_sets_apart_are_one():
     assert len(set(starts[1:]) | set(ends[:-1])) > 9  # the case is there
     law = {"type": "step", "start": starts, "end": ends, "change": [0.01, -0.01] * 5}
     scene = load_scene(IDEAL, {"drive.P1.law": law, "drive.P2.law": law, "time.end": 0.9})
-    breaks = engine_of(scene, {}, lambda share, text: None).breaks
+    breaks = engine_of(scene, {}, lambda fraction, text: None).breaks
     np.testing.assert_allclose(breaks, 0.09 * np.arange(11), atol=1e-15)
 
 

@@ -58,7 +58,7 @@ def scene(clearance: float, phase: float, solver: dict[str, Any]) -> Scene:
 )
 def test_the_first_touch_is_found_at_any_tolerance(clearance: float, phase: float, solver: dict[str, Any]) -> None:
     """Steps of order 8 at loose tolerances are longer than the swing takes to and from the wall."""
-    run = dynamics.simulate(scene(clearance, phase, solver), {}, lambda share, text: None)
+    run = dynamics.simulate(scene(clearance, phase, solver), {}, lambda fraction, text: None)
     touch = (np.arcsin(clearance / SWING) - phase) / RATE
     assert len(run.event_time) > 0
     # the error of a step is rtol of the swing, and the ball meets the wall at sqrt(1 - c^2) of its largest speed
@@ -79,7 +79,7 @@ def test_the_first_touch_is_found_in_a_step_of_many_clearances(clearance: float,
     parts["body"]["ground"]["frames"]["socket"] = {"position": [3.0, 0.0, 0.0]}
     parts["body"]["ball"] |= {"pose": {"position": [3.0, 0.0, -below]}, "velocity": [0.0, 0.0, up]}
     parts["time"] = {"end": 1000.0 * touch}  # the first step may be that long
-    run = dynamics.simulate(Scene.model_validate(parts), {}, lambda share, text: None)
+    run = dynamics.simulate(Scene.model_validate(parts), {}, lambda fraction, text: None)
     # every method integrates a parabola exactly, and the ball stays exactly 3 m away: left are the root, to 1e-12
     # of the clearance, and the rounding of differences where the ball has an eighth of its speed left
     assert float(run.event_time[0]) == pytest.approx(touch, rel=1e-8)

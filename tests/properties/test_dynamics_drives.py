@@ -77,7 +77,7 @@ def value(law: Any, t: float, order: int = 0, side: str = "right") -> float:
 def compiled(law: Any, t: float, piece: int) -> np.ndarray:
     """Value, rate and second rate from the kernel, with this piece in force."""
     tables = laws.fill([pieces(law)])
-    shares, h, n = (
+    fractions, h, n = (
         np.array(tables[m.PIECE_HARMONICS]).ravel(),
         np.zeros(m.HEADER, dtype=np.int64),
         np.zeros(m.INTEGERS + 1, dtype=np.int64),
@@ -86,7 +86,7 @@ def compiled(law: Any, t: float, piece: int) -> np.ndarray:
     h[m.N_LAWS], h[m.LAW.place], h[m.PIECES.place], h[m.HARMONICS.place] = 1, 0, 0, tables[m.PIECES].size
     h[m.PIECE_HARMONICS.place], n[m.ACTIVE], n[m.INTEGERS] = m.HEADER, m.INTEGERS, piece
     w = np.zeros(3)
-    LAWS_OF_TIME(np.concatenate([h, shares]), f, w, n, t)
+    LAWS_OF_TIME(np.concatenate([h, fractions]), f, w, n, t)
     return w
 
 

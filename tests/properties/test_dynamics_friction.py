@@ -106,10 +106,10 @@ def adams_step(x: float, x0: float, h0: float, x1: float, h1: float) -> float:
 
 
 @every_smooth
-@given(share=st.floats(0.0, 3.0))
-def test_friction_coefficient_is_the_papers_steps(law: ModifiedCoulomb, share: float) -> None:
+@given(fraction=st.floats(0.0, 3.0))
+def test_friction_coefficient_is_the_papers_steps(law: ModifiedCoulomb, fraction: float) -> None:
     """Eqs. (27)-(29), one step through zero and one down to mu_d; without the sign that is misprinted."""
-    for speed in (share * law.v_static, share * law.v_dynamic):
+    for speed in (fraction * law.v_static, fraction * law.v_dynamic):
         if speed < law.v_static:
             known = adams_step(speed, -law.v_static, -law.static, law.v_static, law.static)
         else:

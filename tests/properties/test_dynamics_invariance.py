@@ -33,7 +33,7 @@ def table_of(name: str, **overrides: object) -> Table:
 
 
 def simulate(table: Table) -> xr.Dataset:
-    return dynamics.simulate(Scene.model_validate(table), {}, lambda share, text: None)
+    return dynamics.simulate(Scene.model_validate(table), {}, lambda fraction, text: None)
 
 
 # Turning and shifting -----------------------------------------------------------------------------------------------
@@ -100,14 +100,14 @@ every_run = pytest.mark.parametrize("name", RUNS)
 
 @every_run
 def test_a_scene_turned_and_shifted_moves_just_as_it_did(name: str) -> None:
-    end, share, near = RUNS[name]
+    end, fraction, near = RUNS[name]
     here, there = here_and_there(name, end)
     assert len(here.time) == len(there.time)
     size = largest(here.position - here.position.isel(time=0))
     assert largest(there.position.values - (here.position.values @ TURN.T + SHIFT)) <= near * size
     for field in ("velocity", "angular_velocity", "acceleration", "joint_force"):
         known = here[field].values @ TURN.T
-        assert largest(there[field].values - known) <= share * max(largest(known), 1e-3), field
+        assert largest(there[field].values - known) <= fraction * max(largest(known), 1e-3), field
     turned = TURN @ quaternion_to_matrix(here["quaternion"].values)
     assert largest(quaternion_to_matrix(there["quaternion"].values) - turned) <= near
 
@@ -125,10 +125,10 @@ def test_its_impacts_stay_the_same(name: str) -> None:
 @every_run
 def test_energies_do_not_depend_on_the_axes(name: str) -> None:
     here, there = here_and_there(name, RUNS[name][0])
-    share = RUNS[name][1]
+    fraction = RUNS[name][1]
     size = largest(here.kinetic)
     for field in ("kinetic", "elastic", "dissipated", "drive_work"):
-        assert largest(here[field].values - there[field].values) <= share * size, field
+        assert largest(here[field].values - there[field].values) <= fraction * size, field
 
 
 # Order and direction ------------------------------------------------------------------------------------------------
@@ -176,9 +176,9 @@ def test_the_motion_does_not_depend_on_how_the_mechanism_is_written(name: str, r
     found = comparable(simulate(rewrite(table)))
     assert len(found.time) == len(known.time)
     found = found.sel(body=known.body.values)
-    share = RUNS[name][1]
+    fraction = RUNS[name][1]
     for field in ("position", "velocity", "angular_velocity", "acceleration"):
-        assert largest(found[field].values - known[field].values) <= share * largest(known[field]), field
+        assert largest(found[field].values - known[field].values) <= fraction * largest(known[field]), field
 
 
 @pytest.mark.parametrize("rewrite", [reordered, reversed_joints], ids=lambda f: f.__name__)

@@ -70,8 +70,8 @@ def later(name: str, x: np.ndarray, u: np.ndarray, du: np.ndarray, time: float) 
     h = time / 8.0
     for k in range(8):
 
-        def rate(y: np.ndarray, share: float, k: int = k) -> np.ndarray:
-            return move(name, y, u + du * h * (k + share), du).rate
+        def rate(y: np.ndarray, fraction: float, k: int = k) -> np.ndarray:
+            return move(name, y, u + du * h * (k + fraction), du).rate
 
         a = rate(x, 0.0)
         b = rate(x + 0.5 * h * a, 0.5)

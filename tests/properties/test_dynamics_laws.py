@@ -76,7 +76,7 @@ class Law:
 
 
 def laws(stiffness: float = 1.3631e11, exponent: float = 1.5) -> list[Law]:
-    return [Law(name, c_r, stiffness, exponent) for name, (_, wanted) in NORMAL.items() for c_r in wanted]
+    return [Law(name, c_r, stiffness, exponent) for name, (_, requested) in NORMAL.items() for c_r in requested]
 
 
 def called(value: object) -> str | None:

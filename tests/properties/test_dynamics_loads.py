@@ -97,8 +97,8 @@ def in_the_world(table: dict[str, Any], R: np.ndarray) -> dict[str, Any]:
 
 def _times(components: list[Any], row: np.ndarray) -> dict[str, Any]:
     constant = sum(float(r) * c for r, c in zip(row, components, strict=True) if not isinstance(c, dict))
-    share = sum(float(r) for r, c in zip(row, components, strict=True) if isinstance(c, dict))
-    return {**WAVE, "amplitude": [2.0 * share], "offset": share + constant}
+    fraction = sum(float(r) for r, c in zip(row, components, strict=True) if isinstance(c, dict))
+    return {**WAVE, "amplitude": [2.0 * fraction], "offset": fraction + constant}
 
 
 @cache

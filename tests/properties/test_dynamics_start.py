@@ -63,7 +63,7 @@ def test_a_flexible_body_thrown_starts_with_the_velocity_of_its_centre_of_mass(
         "body.rod.modes": {"reference": reference, "count": 13}, "body.rod.pose": {"rotation_vector": (0.3, -0.4, 0.5)},
     }  # fmt: skip
     scene = load_scene(TREE / "scenes" / "checks" / "swinging_rod.toml", {**changes, **THROWN})
-    rod = dynamics.simulate(scene, bundles(scene), lambda share, text: None).sel(body="rod")
+    rod = dynamics.simulate(scene, bundles(scene), lambda fraction, text: None).sel(body="rod")
     v, omega = (np.array(value) for value in THROWN.values())
     # the speeds follow from a linear system of full rank
     assert rod.velocity.values[0] == pytest.approx(v, rel=0, abs=1e-12)
@@ -85,7 +85,7 @@ def test_velocity_and_spin_of_a_hinged_flexible_rod_agree_about_its_hinge() -> N
     changes = {"time.end": 1e-3, "output.interval": 1e-3, "body.rod.angular_velocity": tuple(omega)}
     place = TREE / "scenes" / "checks" / "swinging_rod.toml"
     scene = load_scene(place, {**changes, "body.rod.velocity": tuple(centre)})
-    rod = dynamics.simulate(scene, bundles(scene), lambda share, text: None).sel(body="rod")
+    rod = dynamics.simulate(scene, bundles(scene), lambda fraction, text: None).sel(body="rod")
     assert rod.velocity.values[0] == pytest.approx(centre, rel=0, abs=1e-12)
     about_end = LINE * LENGTH * (LENGTH**2 / 3.0 + SECTION**2 / 4.0)
     assert float(rod.kinetic[0]) == pytest.approx(0.5 * about_end * omega @ omega, rel=1e-9)

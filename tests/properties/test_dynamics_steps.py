@@ -58,7 +58,7 @@ def test_a_right_hand_side_that_is_no_number_is_refused(solver: dict[str, Any]) 
     start = consistent_start(engine)
     engine.model.arrays.table(m.GRAVITY)["acceleration"] = np.nan
     with pytest.raises(SolverError, match="not a number"):
-        stepping.integrate(engine, start, lambda share, text: None)
+        stepping.integrate(engine, start, lambda fraction, text: None)
 
 
 def driven_pendulum() -> dict[str, Any]:
@@ -125,7 +125,7 @@ def test_only_full_reflection_keeps_the_energy(rho: float) -> None:
         )
     )
     start = consistent_start(engine)
-    made = stepping.integrate(engine, start, lambda share, text: None)
+    made = stepping.integrate(engine, start, lambda fraction, text: None)
     energy = observed(engine, made).energy
     total = energy["kinetic"] + energy["potential"]
     lost = (total[0] - total[-5:].mean()) / np.ptp(energy["potential"])

@@ -38,7 +38,7 @@ def stroke(
         grid = mesh.build({**recipe, "elements": elements})
         shapes = solve(grid, body.modes.reference, body.modes.count, interfaces=body.modes.interfaces)
         bundles[name] = bundle.build(grid, shapes, variables(grid, shapes))
-    return dynamics.simulate(loaded, bundles, lambda share, text: None)
+    return dynamics.simulate(loaded, bundles, lambda fraction, text: None)
 
 
 def platform(found: xr.Dataset) -> np.ndarray:
@@ -82,11 +82,11 @@ def test_complete_sets_of_two_reference_conditions_move_the_mechanism_alike(shap
 def test_what_linear_shapes_leave_between_two_frames_is_of_second_order(other: str) -> None:
     """A rod four times as stiff bends a quarter as much: two frames then differ by a quarter as large a share of it."""
     rigid = platform(stroke("sps4/ideal"))
-    shares = []
+    fractions = []
     for stiffer in (1.0, 4.0):
         first, second = (
             platform(stroke("sps4/far_cb", COMPLETE[n], stiffer, elements=4)) for n in ("held below", other)
         )
-        shares.append(np.abs(second - first).max() / np.abs(first - rigid).max())
+        fractions.append(np.abs(second - first).max() / np.abs(first - rigid).max())
     # the rod rings in other frequencies, and rows are taken at other phases of it: 0.263 and 0.276 were found
-    assert shares[1] / shares[0] == pytest.approx(0.25, rel=0.15)
+    assert fractions[1] / fractions[0] == pytest.approx(0.25, rel=0.15)

@@ -55,7 +55,7 @@ def scene(swapped: bool, driven: bool) -> Scene:
 @cache
 def run(swapped: bool, driven: bool) -> xr.Dataset:
     made = scene(swapped, driven)
-    return dynamics.simulate(made, bundles(made), lambda share, text: None)
+    return dynamics.simulate(made, bundles(made), lambda fraction, text: None)
 
 
 @pytest.mark.slow

@@ -156,7 +156,7 @@ def mast(tmp_path: Path, mass: float, modes: dict[str, object] | None = None, el
     scene = load_scene(tmp_path / "scene.toml", changes if modes is None else {**changes, "body.beam.modes": modes})
     kept = scene.flexible()["beam"].modes
     reduced = reduce(kept.reference, kept.count, kept.interfaces, material=light, elements=elements)
-    return dynamics.frequencies(scene, {"beam": reduced.bundle}, lambda share, text: None)
+    return dynamics.frequencies(scene, {"beam": reduced.bundle}, lambda fraction, text: None)
 
 
 STIFFNESS = 200e9 * np.pi * 1.6e-11 / 4.0  #: E I [N m^2]
@@ -169,19 +169,19 @@ def side_stiffness(load: float) -> float:
     return load / (np.tan(k) / k - 1.0) if load > 0.0 else -load / (1.0 - np.tanh(k) / k)
 
 
-@pytest.mark.parametrize("share", [-5.0, -0.5, 0.3, 0.9])
-def test_a_load_on_its_top_softens_a_mast_and_a_pull_stiffens_it(tmp_path: Path, share: float) -> None:
+@pytest.mark.parametrize("fraction", [-5.0, -0.5, 0.3, 0.9])
+def test_a_load_on_its_top_softens_a_mast_and_a_pull_stiffens_it(tmp_path: Path, fraction: float) -> None:
     """Beam-column theory, exact for a massless column: the load acts through the frame at its end alone."""
-    mass = share * CRITICAL / 9.81
+    mass = fraction * CRITICAL / 9.81
     found = mast(tmp_path, mass)
     omega = 2.0 * np.pi * found.frequency.values[:2]
     # the column's own 1.3e-5 kg move with a quarter of their mass and press with a third of their weight
-    near = 13e-6 / abs(mass) / (1.0 - max(share, 0.0)) + 1e-5
-    assert omega == pytest.approx([np.sqrt(side_stiffness(share * CRITICAL) / abs(mass))] * 2, rel=near)
+    near = 13e-6 / abs(mass) / (1.0 - max(fraction, 0.0)) + 1e-5
+    assert omega == pytest.approx([np.sqrt(side_stiffness(fraction * CRITICAL) / abs(mass))] * 2, rel=near)
 
 
 def test_a_mast_buckles_under_eulers_load(tmp_path: Path) -> None:
-    below, above = (mast(tmp_path, share * CRITICAL / 9.81) for share in (0.9999, 1.0001))
+    below, above = (mast(tmp_path, fraction * CRITICAL / 9.81) for fraction in (0.9999, 1.0001))
     assert below.decay_rate.min() == 0.0
     assert above.decay_rate.min() < 0.0
 

@@ -75,7 +75,7 @@ HOSTILE: dict[str, tuple[str, ...]] = {
     'extends = "."': ("cannot be read",),
     'extends = "sound.toml"\nreplace = [1]': ("[replace]", "expected a table"),
     'extends = "sound.toml"\n[set.body]\ncrank = 5': ("[set.body]", "[set.body.NAME]"),
-    'extends = "sound.toml"\nremove = 5': ("[remove]", "list of places"),
+    'extends = "sound.toml"\nremove = 5': ("[remove]", "list of paths"),
     'extends = "sound.toml"\nbody = 5': ("[body]", "expected a table"),
     'extends = "sound.toml"\n[set.body.crank]\nmas = 1': ("[body.crank.mas]", "did you mean 'mass'?"),
 }

@@ -239,7 +239,7 @@ def test_the_mode_sets_of_several_bodies_stand_beside_each_other():
     page = make("modes", "html", Shown(bundles=sets))["modes.html"].decode()
     assert page.count("<div class='viewer'") == 2
     assert all(f"{name}: 7 modes" in page for name in sets)
-    assert "<div class='beside'>" in page
+    assert "<div class='side-by-side'>" in page
 
 
 def test_a_joint_is_shown_in_space_with_its_gap_and_force(shown: Shown):

@@ -11,9 +11,9 @@ from flexclear.pipeline.post.render.view import plane, view
 
 def moving(turn: np.ndarray, along: np.ndarray) -> xr.Dataset:
     """Two bodies that turn about `turn` and move along `along`, over time."""
-    share = np.linspace(0.1, 1.0, 7)[:, None, None] * np.array([1.0, -0.5])[None, :, None]
+    fraction = np.linspace(0.1, 1.0, 7)[:, None, None] * np.array([1.0, -0.5])[None, :, None]
     dims = ("time", "body", "axis")
-    return xr.Dataset({"angular_velocity": (dims, share * turn), "velocity": (dims, share * along)})
+    return xr.Dataset({"angular_velocity": (dims, fraction * turn), "velocity": (dims, fraction * along)})
 
 
 @pytest.mark.parametrize("axis", [[0, 0, 1], [0, 1, 0], [1, 2, -2]])

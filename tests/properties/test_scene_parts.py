@@ -131,7 +131,7 @@ def test_it_is_refused_with_place_value_rule_and_remedy(
     path = tmp_path / "wrong.toml"
     path.write_text(SCENE + addition)
     with pytest.raises(InputError) as error:
-        dynamics.simulate(load_scene(path), {}, lambda share, text: None)
+        dynamics.simulate(load_scene(path), {}, lambda fraction, text: None)
     for word in WRONG[addition]:
         assert word in str(error.value)
 

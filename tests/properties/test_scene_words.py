@@ -215,13 +215,13 @@ def test_frames_of_recipes_take_an_axis_too() -> None:
 def lacking(reference: str, interfaces: str) -> str:
     """What is told of a body of which half the compliance between A and B is missing."""
     names, directions = ["A", "B"], ["x", "y", "z", "rx", "ry", "rz"]
-    share = xr.DataArray(
+    fraction = xr.DataArray(
         np.full((2, 2, 6), 0.5),
         dims=("frame", "frame_held", "direction"),
         coords={"frame": names, "frame_held": names, "direction": directions},
     )
     attributes = {"reference": reference, "interfaces": interfaces, "count": 12}
-    (told,) = deficits.warnings(xr.Dataset({"compliance_share": share}, attrs=attributes), names, "rod")
+    (told,) = deficits.warnings(xr.Dataset({"compliance_share": fraction}, attrs=attributes), names, "rod")
     return told
 
 

@@ -131,7 +131,7 @@ def test_compiled_code_runs_as_the_kernels_do(integrator: str) -> None:
 def test_other_closure_rows_are_solved_for_by_the_kernels() -> None:
     one = engine()
     specialise(one)
-    straight, kept = int(one.h[m.RATES]), one.kept.copy()
+    straight, kept = int(one.h[m.RATES]), one.selected.copy()
     fewer = kept.copy()
     fewer[-1] = False
     one.keep(fewer)

@@ -37,8 +37,8 @@ def largest_depth(mass: float, speed: float, stiffness: float, a: float, exponen
 
     :math:`\delta^{n+1} = (n+1)\,(m v^2/K)\,[1/a - \ln(1+a)/a^2]`, and half of it for a = 0.
     """
-    share = 0.5 if a == 0.0 else 1.0 / a - math.log1p(a) / a**2
-    return float(((exponent + 1.0) * mass * speed**2 / stiffness * share) ** (1.0 / (exponent + 1.0)))
+    fraction = 0.5 if a == 0.0 else 1.0 / a - math.log1p(a) / a**2
+    return float(((exponent + 1.0) * mass * speed**2 / stiffness * fraction) ** (1.0 / (exponent + 1.0)))
 
 
 def hertz_time(mass: float, speed: float, stiffness: float, exponent: float = 1.5) -> float:

@@ -20,7 +20,7 @@ from flexclear.pipeline.structure.modes import rigid
 from flexclear.stages import compare, s3_rigid
 from flexclear.stages.graph import Graph
 from flexclear.stages.new import write
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 from tests.paper import synthetic
 
 
@@ -82,7 +82,7 @@ def test_what_is_ideal_has_no_twin(tmp_path: Path):
     with pytest.raises(InputError, match="that could be taken away"):
         ideal(scene)
     with pytest.raises(InputError, match="one scene alone is compared with nothing"):
-        compare.bring([scene], workplace())
+        compare.bring([scene], open_workplace())
 
 
 def test_each_twin_is_made_once(crank: Path, tmp_path: Path):

@@ -57,7 +57,7 @@ def files(tmp_path: Path) -> list[Path]:
 def _two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever machine this is."""
     monkeypatch.setattr(cores, "cores", lambda: 2)
-    monkeypatch.setattr(cores, "_told", None)
+    monkeypatch.setattr(cores, "_others_idle", None)
 
 
 def nothing(path: Path) -> None:
@@ -209,18 +209,18 @@ def test_one_file_and_one_core_need_no_second_process(files: list[Path], monkeyp
     with compiler_process.second_process(files[:1]) as process:
         assert process is None
     monkeypatch.setattr(cores, "cores", lambda: 1)
-    assert not compiler_process.wanted()
+    assert not compiler_process.requested()
 
 
 def test_workers_have_no_second_process() -> None:
     """Each core has a worker already, unless theirs is the only task that can run."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
-        assert not pool.submit(compiler_process.wanted).result()
-    assert compiler_process.wanted()
+        assert not pool.submit(compiler_process.requested).result()
+    assert compiler_process.requested()
     cores.tell(others_idle=False)
-    assert not compiler_process.wanted()
+    assert not compiler_process.requested()
     cores.tell(others_idle=True)
-    assert compiler_process.wanted()
+    assert compiler_process.requested()
 
 
 @pytest.mark.parametrize("scenes, idle", [(["tiny/stays"], True), (["tiny/stays", "tiny/contact"], False)])

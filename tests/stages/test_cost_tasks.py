@@ -52,9 +52,9 @@ def study(swing: Scene, place: Workplace) -> cost.Study:
 
 
 def test_a_first_answer_has_tighter_and_looser_runs_and_another_family_of_methods(csj: Scene):
-    designs = cost_design.near(csj, OWN)
+    designs = cost_design.neighbours(csj, OWN)
     first = designs[: cost_design.FIRST]
-    assert first[0].key == "as it stands"
+    assert first[0].key == "as it is"
     tolerances = [d.scene.solver.rtol for d in first if d.scene.solver.integrator == "dop853"]
     assert min(tolerances) < OWN.rtol < max(tolerances)
     assert {d.scene.solver.integrator for d in first} - {"dop853"}
@@ -62,7 +62,7 @@ def test_a_first_answer_has_tighter_and_looser_runs_and_another_family_of_method
 
 
 def test_fixed_steps_are_compared_with_other_steps_and_with_chosen_ones(csj: Scene):
-    designs = cost_design.near(csj, Setting("rk4", 1e-10, 1e-5))
+    designs = cost_design.neighbours(csj, Setting("rk4", 1e-10, 1e-5))
     assert {d.scene.solver.step for d in designs if d.group == "step"} == {2.5e-6, 5e-6, 1e-5, 2e-5, 4e-5}
     assert {d.scene.solver.step for d in designs if d.group == "tolerance"} == {None}
 
@@ -99,7 +99,7 @@ def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.
 def test_a_small_budget_leaves_points_undone_and_a_larger_goes_on(swing: Scene, place: Workplace, study: cost.Study):
     small = cost.Study(swing, place, seconds=1e-3)
     small.first()
-    assert [d.key for d in small.points] == ["as it stands"]
+    assert [d.key for d in small.points] == ["as it is"]
     assert len(small.undone) == cost_design.FIRST - 1
     mine, others = small.task().inputs["point0"], study.task().inputs["point0"]
     assert mine.params == others.params
@@ -161,7 +161,7 @@ def test_integrators_that_are_named_are_compared_and_unknown_ones_refused(csj: S
 
 def test_points_keep_the_limits_of_the_scene(csj: Scene):
     limited = edited(csj, {"solver": {"rtol": 1e-7, "evaluations": 1234}})
-    designs = [*cost_design.near(limited, OWN), *cost_design.wide(limited)]
+    designs = [*cost_design.neighbours(limited, OWN), *cost_design.wide(limited)]
     assert {design.scene.solver.evaluations for design in designs} == {1234}
 
 

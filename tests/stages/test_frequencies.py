@@ -44,8 +44,8 @@ def test_the_command_prints_pose_residual_and_mobility_then_the_table(
     assert lines[0] == "checks/pendulum at t = 0.5 s, drives held"
     assert lines[1].startswith("equilibrium: largest unbalanced force")
     assert lines[2] == "mobility 1"
-    number, hertz, damping, owner, share = lines[-1].split(maxsplit=4)
-    assert (number, damping, owner, share) == ("1", "0", "bob", "(100 %)")
+    number, hertz, damping, owner, fraction = lines[-1].split(maxsplit=4)
+    assert (number, damping, owner, fraction) == ("1", "0", "bob", "(100 %)")
     assert float(hertz) == pytest.approx(np.sqrt(9.81) / (2.0 * np.pi), rel=1e-6)
 
 

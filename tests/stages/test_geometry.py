@@ -31,8 +31,8 @@ def lengths(layout: Layout, z: float, angle: float) -> np.ndarray:
 def test_poses_have_the_lengths_of_the_legs() -> None:
     layout, extensions = identify.fitted(*TAKEN), np.linspace(0.0, 0.06, 7)
     for extension, z, angle in zip(extensions, *poses(layout, extensions), strict=True):
-        wanted = layout.leg + np.array([extension, extension, 0.0, 0.0])
-        assert lengths(layout, z, angle) == pytest.approx(wanted, abs=1e-13)  # rounding of lengths below 0.5 m
+        requested = layout.leg + np.array([extension, extension, 0.0, 0.0])
+        assert lengths(layout, z, angle) == pytest.approx(requested, abs=1e-13)  # rounding of lengths below 0.5 m
 
 
 def test_the_answer_to_leg_1_is_that_of_finite_changes() -> None:

@@ -42,7 +42,7 @@ def often(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work is looked at often, and its state is written each time."""
     monkeypatch.setattr(trajectory, "SLICE", SLICE)
     monkeypatch.setattr(journal, "EVERY", -1.0)
-    monkeypatch.setattr(journal, "SHARE", np.inf)
+    monkeypatch.setattr(journal, "FRACTION", np.inf)
     monkeypatch.setattr(os, "fsync", lambda file: None)  # a busy disk takes its time
 
 
@@ -63,7 +63,7 @@ def interrupted(
     monkeypatch.setattr(trajectory, "_stop_when_asked", look)
     while True:
         try:
-            with journal.kept(folder, "key") as kept:
+            with journal.storage(folder, "key") as kept:
                 found = work()
         except KilledError:
             kills += 1
@@ -177,7 +177,7 @@ def test_a_killed_run_goes_on_with_the_straight_code_that_it_had(
 def test_what_an_engine_has_met_before_changes_no_bit(root: Path) -> None:
     """Sections and sweeps run again and again on one engine, and an earlier attempt may have done the first of them."""
     engine = engine_with(check(root, "bricard", **CHANGING))
-    engine.straight.wanted = True
+    engine.straight.requested = True
     start = consistent_start(engine)
     once, again = (trajectory.integrate(engine, start, silent) for _ in range(2))
     assert len(engine.straight.rows) == 2 or config.DISABLE_JIT
@@ -194,7 +194,7 @@ def test_a_killed_ensemble_goes_on_to_the_same_bits(
     monkeypatch.setattr(cores, "cores", lambda: 1)
     whole = dynamics.ensemble(scene, {}, silent)
     monkeypatch.setattr(cores, "cores", lambda: threads)
-    monkeypatch.setattr(cores, "_told", True)
+    monkeypatch.setattr(cores, "_others_idle", True)
     found, kills = interrupted(lambda: dynamics.ensemble(scene, {}, silent), tmp_path, monkeypatch)
     assert kills >= 3
     assert found.identical(whole)
@@ -249,11 +249,11 @@ def test_a_run_that_is_asked_to_stop_leaves_what_there_is_marked_and_goes_on_lat
     whole = dynamics.simulate(scene, {}, silent)
     monkeypatch.setattr(stopping, "_why", "")
 
-    def progress(share: float | None, text: str) -> None:
-        if share is not None and share > 0.3:
+    def progress(fraction: float | None, text: str) -> None:
+        if fraction is not None and fraction > 0.3:
             stopping.request("the time is over")
 
-    with pytest.raises(StoppedError) as told, journal.kept(tmp_path, "key"):
+    with pytest.raises(StoppedError) as told, journal.storage(tmp_path, "key"):
         dynamics.simulate(scene, {}, progress)
     monkeypatch.setattr(stopping, "_why", "")
     assert told.value.exit_code == 4
@@ -265,7 +265,7 @@ def test_a_run_that_is_asked_to_stop_leaves_what_there_is_marked_and_goes_on_lat
         derive(left)
     with pytest.raises(InputError, match="not complete"):
         comparison.assemble({"whole": whole, "left": left}, {}, [])
-    with journal.kept(tmp_path, "key") as kept:
+    with journal.storage(tmp_path, "key") as kept:
         assert dynamics.simulate(scene, {}, silent).identical(whole)
     assert kept.restored > 0.0
 
@@ -283,7 +283,7 @@ def test_what_a_part_of_the_work_leaves_is_not_taken_for_what_there_is_of_it(
     failed = schedule.attempt(task, {}, Store(tmp_path), Sources(tmp_path), silent)
     assert isinstance(failed, schedule.Failure)
     assert failed.exit_code == 4
-    assert failed.message == "bounce ensemble: the time is over; run it again, and it goes on from there"
+    assert failed.message == "bounce ensemble: the time is over; run it again, and it continues from there"
     assert not list(tmp_path.iterdir())
 
 

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledAr
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.stages.graph import Graph
 from flexclear.stages.new import write
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 
 
 def everything() -> xr.Dataset:
@@ -185,7 +185,7 @@ def test_what_all_stages_write_is_kept_as_it_would_be_read(tmp_path: Path, monke
         before = {name: {n: a.values.copy() for n, a in data.variables.items()} for name, data in seen.items()}
         held = dict(seen)
         graph = Graph(load_scene(scene, {"time.end": end}))
-        outcome = workplace().bring([graph.post], jobs=1)
+        outcome = open_workplace().bring([graph.post], jobs=1)
         assert not outcome.failures
         # nothing of the engine lies in what it has returned: another run in the same process changes none of it
         for name, values in before.items():

@@ -23,7 +23,7 @@ from flexclear.stages.as_json import as_json
 from flexclear.stages.new import KINDS, TEMPLATES, write
 from tests.stages.typical_mistakes import MISTAKES
 
-TOLD = dict(
+REPORTED = dict(
     re.findall(r"^## (.+)\n((?:.+\n?)+)", (Path(__file__).parent / "typical_mistakes.txt").read_text(), re.MULTILINE)
 )
 #: sweeps are no scenes, though they lie beside them
@@ -38,7 +38,7 @@ def test_what_new_writes_has_no_mistake(kind: str, tmp_path: Path, capsys: pytes
     assert main(["new", kind, str(tmp_path / "own")]) == 0
     scene, *_ = sorted((tmp_path / "own").glob("*.toml"), key=lambda path: "[body" not in path.read_text())
     assert main(["check", str(scene)]) == 0
-    assert "no mistake found" in capsys.readouterr().out
+    assert "no error" in capsys.readouterr().out
     assert main(["new", kind, str(tmp_path / "own")]) == 2
     assert "is there already" in capsys.readouterr().err
 
@@ -50,7 +50,7 @@ def test_all_beginnings_fit_into_one_folder(tmp_path: Path) -> None:
 
 def test_a_hundred_typical_mistakes_are_all_in_the_table():
     assert len(MISTAKES) >= 100
-    assert set(TOLD) == set(MISTAKES)
+    assert set(REPORTED) == set(MISTAKES)
 
 
 @pytest.mark.parametrize("name", MISTAKES)
@@ -64,7 +64,7 @@ def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, capsys: p
     assert main(["check", str(folder / "slider_crank.toml")]) == (4 if name in TOO_MUCH else 2)
     said = capsys.readouterr().err.replace(f"{folder.resolve()}/", "").replace(f"{folder}/", "")
     # lists of all names that there are grow with the program
-    assert re.sub(r"(known|one of): .*", r"\1: ...", said).strip() == TOLD[name].strip()
+    assert re.sub(r"(known|one of): .*", r"\1: ...", said).strip() == REPORTED[name].strip()
 
 
 @pytest.mark.parametrize(
@@ -234,7 +234,7 @@ def test_check_looks_at_a_recipe_as_a_recipe(tmp_path: Path, capsys: pytest.Capt
     _, rod = write("slider-crank", tmp_path)
     assert main(["check", str(rod)]) == 0
     # 200 mm x 12 mm x 8 mm of 7850 kg/m^3
-    assert f"{rod}: a mesh recipe, straight-beam, frames: big_end, middle, small_end, mass 0.15072 kg; no mistake" in (
+    assert f"{rod}: a mesh recipe, straight-beam, frames: big_end, middle, small_end, mass 0.15072 kg; no error" in (
         capsys.readouterr().out
     )
     text = rod.read_text()
@@ -305,7 +305,7 @@ def test_check_looks_at_sweeps_and_at_their_scenes(tmp_path: Path, capsys: pytes
 @pytest.mark.parametrize("name", ["clearance", "speed"])
 def test_the_sweeps_of_the_project_have_no_mistake(name: str, capsys: pytest.CaptureFixture[str]):
     assert main(["check", f"sweeps/{name}"]) == 0
-    assert "no mistake found" in capsys.readouterr().out
+    assert "no error" in capsys.readouterr().out
 
 
 def test_results_are_printed_as_json_for_scripts(

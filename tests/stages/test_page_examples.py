@@ -1,4 +1,4 @@
-"""What README and the tutorial show can be done as it stands there."""
+"""What README and the tutorial show can be done as it is there."""
 
 from __future__ import annotations
 

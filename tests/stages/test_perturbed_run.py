@@ -45,7 +45,7 @@ def parting(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def processors(monkeypatch: pytest.MonkeyPatch, count: int) -> None:
     monkeypatch.setattr(cores, "cores", lambda: count)
-    monkeypatch.setattr(cores, "_told", True)
+    monkeypatch.setattr(cores, "_others_idle", True)
 
 
 def check(root: Path, name: str, **changes: Any) -> Scene:
@@ -120,7 +120,7 @@ def test_a_run_and_its_twin_that_are_both_handed_over_are_the_same_side_by_side(
     scene, told = check(root, "socket_rolling", **{"time.end": 3e-3}), set[int]()
     expected = alone(scene, monkeypatch)
     assert expected.attrs["method"] == "radau"
-    found = dynamics.simulate(scene, {}, lambda share, text: told.add(threading.get_ident()))
+    found = dynamics.simulate(scene, {}, lambda fraction, text: told.add(threading.get_ident()))
     assert found.identical(expected)
     assert told == {threading.get_ident()}
 
@@ -174,7 +174,7 @@ def test_a_run_that_fails_does_not_wait_for_its_twin(root: Path, monkeypatch: py
     monkeypatch.setattr(trajectory, "SLICE", 100)
     calls, threads, began = 0, threading.active_count(), time.monotonic()
 
-    def progress(share: float | None, text: str) -> None:
+    def progress(fraction: float | None, text: str) -> None:
         nonlocal calls
         calls += 1
         if calls > 20:
@@ -230,8 +230,8 @@ def test_both_are_stopped_in_good_order_and_go_on_to_the_same_bits(
     scene = check(root, "bounce", **{"output.interval": 0.05})
     whole = alone(scene, monkeypatch)
 
-    def progress(share: float | None, text: str) -> None:
-        if share is not None and share > 0.3 and stopped == "run":
+    def progress(fraction: float | None, text: str) -> None:
+        if fraction is not None and fraction > 0.3 and stopped == "run":
             stopping.request("the time is over")
 
     def late_twin(self: Pair, twin: Any, alive: Progress) -> bool:
@@ -243,14 +243,14 @@ def test_both_are_stopped_in_good_order_and_go_on_to_the_same_bits(
     with monkeypatch.context() as patch:
         if stopped == "twin":
             patch.setattr(Pair, "_enough", late_twin)
-        with pytest.raises(StoppedError) as told, journal.kept(tmp_path, "key"):
+        with pytest.raises(StoppedError) as told, journal.storage(tmp_path, "key"):
             dynamics.simulate(scene, {}, progress)
     stopping._why = ""
     left = told.value.partial
     assert left.attrs["complete"] == 0
     assert left.position.identical(whole.position[: left.sizes["time"]])
     assert (left.sizes["time"] == whole.sizes["time"]) is (stopped == "twin")
-    with journal.kept(tmp_path, "key"):
+    with journal.storage(tmp_path, "key"):
         assert dynamics.simulate(scene, {}, silent).identical(whole)
 
 

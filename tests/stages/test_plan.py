@@ -35,7 +35,7 @@ from flexclear.stages import plan, s4_simulate, s4_watched, s8_plan
 from flexclear.stages.__main__ import main
 from flexclear.stages.graph import Graph
 from flexclear.stages.new import write
-from flexclear.stages.workplace import FailedTasksError, workplace
+from flexclear.stages.workplace import FailedTasksError, open_workplace
 
 #: of the leg's rod [m, Pa, kg/m^3], and what stands on it [kg]
 LENGTH, RADIUS, MODULUS, DENSITY, PLATFORM = 0.24, 0.01, 71.7e9, 2740.0, 3.0
@@ -61,7 +61,7 @@ def _response(scene: Scene, chosen: list[Quantity]) -> Response:
 
 def _ideal(scene: Scene) -> tuple[Run, dict[str, xr.Dataset]]:
     """The run of a scene's ideal twin, and what is known of its bodies."""
-    place, task = workplace(), s8_plan.task(edited(scene, {"accuracy": {"quantities": {}}}))
+    place, task = open_workplace(), s8_plan.task(edited(scene, {"accuracy": {"quantities": {}}}))
     outcome = place.bring(list(task.inputs.values()), 1)
     inputs = {name: place.store.load(outcome.records[id(below)]) for name, below in task.inputs.items()}
     gone = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
@@ -133,7 +133,7 @@ def test_the_elements_that_are_called_for_make_the_error_that_is_wanted(tmp_path
 
     def reduced(factor: int) -> xr.Dataset:
         task = Graph(coarse, shown=False, recipe={"elements": factor}).bundle["rod"]
-        place = workplace()
+        place = open_workplace()
         return place.store.load(place.bring([task], 1).records[id(task)])
 
     recipe = tmp_path / "coarse.toml"
@@ -249,11 +249,11 @@ def test_a_plan_keeps_a_rod_that_bends_by_more_than_is_wanted_and_drops_one_that
     moving = edited(leg, {"drive.stroke": load_scene(tmp_path / "leg.toml").drive["stroke"].model_dump(mode="json")})
     moving = edited(moving, {"time.end": 0.02})
     kept = {}
-    for wanted in (1e-4, 1e-8):
-        scene = edited(moving, {"accuracy": {"quantities": {"platform.position": {"absolute": wanted}}}})
+    for requested in (1e-4, 1e-8):
+        scene = edited(moving, {"accuracy": {"quantities": {"platform.position": {"absolute": requested}}}})
         planned, found = fc.plan(scene)
-        kept[wanted] = "rod" in planned.flexible()
-        assert bool(found["kept"].sel(effect="body.rod.modes")) == kept[wanted]
+        kept[requested] = "rod" in planned.flexible()
+        assert bool(found["kept"].sel(effect="body.rod.modes")) == kept[requested]
         assert found.attrs["evaluations"] > 0
     assert kept == {1e-4: False, 1e-8: True}
 
@@ -308,7 +308,7 @@ def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Pa
         _tight(_standing_leg(tmp_path)), {"accuracy": {"quantities": {"platform.position": {"absolute": 1.0}}}}
     )
     with pytest.raises((InputError, FailedTasksError), match="leave out everything") as refused:
-        plan.bring(scene, workplace())
+        plan.bring(scene, open_workplace())
     assert refused.value.exit_code == 2
     assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]
 
@@ -393,7 +393,7 @@ def test_a_scene_that_cannot_be_run_as_it_stands_has_no_plan(tmp_path: Path, res
             "accuracy": {"quantities": {"slider.position": {"absolute": 1e-3}}},
         },
     )
-    with pytest.raises(FailedTasksError, match="cannot be run as it stands") as refused:
-        plan.bring(wild, workplace())
+    with pytest.raises(FailedTasksError, match="cannot be run as it is") as refused:
+        plan.bring(wild, open_workplace())
     assert refused.value.exit_code == 3
     assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]

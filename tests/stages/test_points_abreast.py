@@ -11,7 +11,7 @@ import pytest
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
-from flexclear.pipeline.core.scene.output_quantities import parse_kept
+from flexclear.pipeline.core.scene.output_quantities import parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.dynamics.compile import stacks
@@ -26,7 +26,7 @@ BALL = ("ball.velocity.largest", "contact.peak_force", "contact.impact_times.las
 
 
 def runner(scene: Scene, keep: Sequence[str] = BALL, **asked: Any) -> Runner:
-    return Runner({}, [parse_kept(name, scene.owners()) for name in keep], **asked)
+    return Runner({}, [parse_recorded(name, scene.owners()) for name in keep], **asked)
 
 
 def alone(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> list[Point]:
@@ -49,13 +49,13 @@ def assert_same(found: Sequence[Point], known: Sequence[Point]) -> None:
 @pytest.fixture
 def evaluations_abreast(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many engines each crew lets step side by side."""
-    proper, made = batched_evaluation.Crew, list[int]()
+    proper, made = batched_evaluation.LaneGroup, list[int]()
 
-    def noted(kept: bytes, code: batched_evaluation.Code, lanes: int) -> batched_evaluation.Crew:
+    def noted(kept: bytes, code: batched_evaluation.Code, lanes: int) -> batched_evaluation.LaneGroup:
         made.append(lanes)
         return proper(kept, code, lanes)
 
-    monkeypatch.setattr(batched_evaluation, "Crew", noted)
+    monkeypatch.setattr(batched_evaluation, "LaneGroup", noted)
     return made
 
 

@@ -59,9 +59,9 @@ def test_the_rest_is_estimated_from_the_pace_without_compiling():
     assert screen.getvalue().splitlines()[-1].endswith("sps4/csj: simulate compiling")
     clock.now = 30.0
     monitor.update(name, 0.0, "")
-    for now, share in ((33.0, 0.1), (36.0, 0.2)):
+    for now, fraction in ((33.0, 0.1), (36.0, 0.2)):
         clock.now = now
-        monitor.update(name, share, "")
+        monitor.update(name, fraction, "")
         assert "left" not in screen.getvalue()  # one sample or two say little
     clock.now = 42.0
     monitor.update(name, 0.4, "t = 0.045 s")
@@ -83,9 +83,9 @@ def test_a_stretch_that_gets_slow_is_told_before_it_ends():
     monitor, screen, clock = watched(terminal=True)
     name = monitor.begin("a", "simulate")
     told = []
-    for now, share in [*((float(k), k / 50) for k in range(11)), (100.0, 0.201), (1000.0, 0.202)]:
+    for now, fraction in [*((float(k), k / 50) for k in range(11)), (100.0, 0.201), (1000.0, 0.202)]:
         clock.now = now
-        monitor.update(name, share, "")
+        monitor.update(name, fraction, "")
         told.append(screen.getvalue().split("\r\033[K")[-1])
     assert told[10].endswith("20% 40.0 s left")
     # ten samples of 1 s and 0.02 fade to sum 0.8^k = 3.57 of one, and the one that goes on counts whole:
@@ -147,9 +147,9 @@ def test_the_loggers_level_says_how_much_is_told():
         LOG.setLevel(level)
         monitor, screen, clock = watched(terminal=True)
         name = monitor.begin("a", "simulate")
-        for share in (0.1, 0.2):
+        for fraction in (0.1, 0.2):
             clock.now += 1.0
-            monitor.update(name, share, "")
+            monitor.update(name, fraction, "")
         monitor.say("a: warning: something")
         told[level] = screen.getvalue()
     assert told[logging.WARNING] == "flexclear: a: warning: something\n"

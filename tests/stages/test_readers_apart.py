@@ -14,8 +14,8 @@ import pytest
 
 from flexclear.pipeline.core import system
 from flexclear.pipeline.core.errors import InputError, ResourceError
-from flexclear.pipeline.core.external_files import apart, mesh, wire
-from flexclear.pipeline.core.external_files.apart import Limits, UnreadableError
+from flexclear.pipeline.core.external_files import isolated, mesh, wire
+from flexclear.pipeline.core.external_files.isolated import Limits, UnreadableError
 from flexclear.pipeline.core.workflow import file_dependencies
 from flexclear.pipeline.post.render import shape_files
 from tests.stages import bad_readers
@@ -33,7 +33,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def test_numbers_and_texts_come_back_as_they_are(file: Path) -> None:
-    found = apart.read(bad_readers.doubled, file)
+    found = isolated.read(bad_readers.doubled, file)
     assert found["bytes"].tobytes() == b"content"
     assert found["more"][:4] == [None, True, 1.5, "text"]
     np.testing.assert_array_equal(found["more"][4]["a"], np.eye(2, dtype=bool))
@@ -58,10 +58,10 @@ def test_what_a_file_does_to_its_reader_is_told(
 ) -> None:
     assert callable(reader)
     with pytest.raises(UnreadableError, match=words):
-        apart.read(reader, file, *arguments, limits=SMALL)
+        isolated.read(reader, file, *arguments, limits=SMALL)
     assert not (file.with_name("made").exists() and file.with_name("made").read_bytes())
     # the next file is read as if nothing had been
-    assert apart.read(bad_readers.doubled, file)["bytes"].tobytes() == b"content"
+    assert isolated.read(bad_readers.doubled, file)["bytes"].tobytes() == b"content"
 
 
 def test_a_folder_that_cannot_be_listed_may_hold_files(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,16 +69,16 @@ def test_a_folder_that_cannot_be_listed_may_hold_files(file: Path, monkeypatch: 
         raise PermissionError(path)
 
     monkeypatch.setattr(Path, "iterdir", closed)
-    assert apart.read(bad_readers.doubled, file)["bytes"].tobytes() == b"content"
+    assert isolated.read(bad_readers.doubled, file)["bytes"].tobytes() == b"content"
 
 
 def test_a_reader_that_waits_is_given_up(file: Path) -> None:
     with pytest.raises(UnreadableError, match=r"more than 0\.5 s"):
-        apart.read(bad_readers.sleeps, file, limits=Limits(300e6, 1.0, patience=0.5))
+        isolated.read(bad_readers.sleeps, file, limits=Limits(300e6, 1.0, patience=0.5))
 
 
 def test_one_child_reads_all_files_of_a_command(file: Path) -> None:
-    assert len({apart.read(bad_readers.number, file) for _ in range(3)} - {os.getpid()}) == 1
+    assert len({isolated.read(bad_readers.number, file) for _ in range(3)} - {os.getpid()}) == 1
 
 
 @pytest.mark.parametrize(
@@ -108,16 +108,16 @@ def test_what_the_child_opens_counts(tmp_path: Path) -> None:
     with file_dependencies.watched(tmp_path):
         (tmp_path / "a.obj").read_bytes()
         with pytest.raises(ResourceError, match="changed while it was read"):
-            file_dependencies.told({"a.obj": "another digest"}, tmp_path)
+            file_dependencies.add({"a.obj": "another digest"}, tmp_path)
 
 
 COMMAND = """
 import sys
 from pathlib import Path
-from flexclear.pipeline.core.external_files import apart
+from flexclear.pipeline.core.external_files import isolated
 from tests.stages import bad_readers
-print(apart.read(bad_readers.number, Path(sys.argv[1])), flush=True)
-apart.read(bad_readers.turns, Path(sys.argv[1]))
+print(isolated.read(bad_readers.number, Path(sys.argv[1])), flush=True)
+isolated.read(bad_readers.turns, Path(sys.argv[1]))
 """
 
 

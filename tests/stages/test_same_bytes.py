@@ -9,9 +9,9 @@ from pathlib import Path
 
 FIRST = """
 import numpy, scipy.linalg
-from flexclear.stages.run import graphs, workplace
+from flexclear.stages.run import graphs, open_workplace
 (graph,) = graphs(["checks/clamped_rod"])
-done = workplace().bring(list(graph.bundle.values()), jobs=1)
+done = open_workplace().bring(list(graph.bundle.values()), jobs=1)
 print(*(done.records[id(task)].digest for task in graph.bundle.values()))
 """
 

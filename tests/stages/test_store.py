@@ -269,7 +269,7 @@ def test_what_is_shown_shares_no_bytes_with_the_cache(store: Store, said: list[s
     assert shown.read_bytes() == kept.read_bytes()
     assert shown.with_name("run.edited.nc").read_bytes() == kept.read_bytes() + b"edited"
     (told,) = said
-    assert "run.nc was edited; the edit is kept as run.edited.nc" in told
+    assert "run.nc was edited; the edit is stored as run.edited.nc" in told
 
 
 def test_a_new_result_takes_the_place_of_the_last_one_without_a_word(store: Store, said: list[str]):

@@ -72,8 +72,8 @@ def test_a_grid_has_its_parameters_as_dimensions_and_coordinates_in_si(root: Pat
 
 @pytest.fixture
 def evaluated_as_points(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Runs and sections evaluate as points do, each operation rounded as it stands; else they differ by rounding."""
-    monkeypatch.setattr(engine, "Straight", partial(engine.Straight, wanted=True, exact=True))
+    """Runs and sections evaluate as points do, each operation rounded as it is; else they differ by rounding."""
+    monkeypatch.setattr(engine, "Straight", partial(engine.Straight, requested=True, exact=True))
 
 
 @pytest.mark.usefixtures("evaluated_as_points")
@@ -155,10 +155,10 @@ def test_more_values_take_the_finished_points_over(root: Path, fresh: Path, aske
 
 def test_refused_points_keep_their_reason_and_are_not_tried_again(root: Path, fresh: Path, asked: list[str]):
     arguments = (root / "scenes/checks/pendulum.toml", {"solver.evaluations": [100, 100_000]}, ["bob.velocity.final"])
-    for wanted in (2, 0):
+    for requested in (2, 0):
         asked.clear()
         found = pipeline.sweep(*arguments, workers=1)
-        assert len(asked) == wanted
+        assert len(asked) == requested
         assert found["status"].values.tolist() == [1, 0]
         assert "evaluations" in str(found["reason"].values[0])
         assert found["reason"].values[1] == ""
@@ -251,7 +251,7 @@ def test_what_turns_is_told_in_the_units_of_turning(root: Path):
     def units(scene: str, *keep: str) -> list[str]:
         table = {"scene": scene, "vary": {"time.end": [0.1, 0.2]}, "keep": keep}
         plan = sweep_plan.plan(read_sweep(table, "sweep"), load_scene(root / f"scenes/checks/{scene}.toml"), "sweep")
-        return [unit(one, plan.turning) for one in plan.kept]
+        return [unit(one, plan.turning) for one in plan.recorded]
 
     ends = [f"{stop}.upper.{what}" for stop in "AC" for what in ("peak_force", "impulse", "impact_times.count")]
     assert units("stops", *ends) == ["N", "N s", "1", "N m", "N m s", "1"]
@@ -348,9 +348,9 @@ import numpy, xarray
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
 from flexclear.stages import sweep_plan
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 table = {"scene": "x", "keep": ["pin.peak_force"], "vary": {"time.end": [1e-4]}}
-plan = sweep_plan.prepare(sweep_plan.plan(read_sweep(table, "x"), load_scene(sys.argv[1]), "x"), workplace())
+plan = sweep_plan.prepare(sweep_plan.plan(read_sweep(table, "x"), load_scene(sys.argv[1]), "x"), open_workplace())
 import pickle
 (family,), (job,) = plan.families, plan.jobs
 before = set(sys.modules)

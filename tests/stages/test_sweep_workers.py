@@ -20,7 +20,7 @@ from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.errors import ResourceError
 from flexclear.stages import sweep, sweep_engine, sweep_plan
 from flexclear.stages.__main__ import main
-from flexclear.stages.workplace import workplace
+from flexclear.stages.workplace import open_workplace
 from tests.stages.conftest import PATIENCE
 from tests.stages.sweeps import begun, flexclear, pendulum
 
@@ -50,8 +50,8 @@ def test_a_killed_sweep_goes_on_with_what_it_has_not(root: Path, tmp_path: Path,
     begun(process, fresh)
     process.send_signal(signal.SIGKILL)
     process.communicate()
-    plan = sweep_plan.prepare(sweep_plan.plan(*sweep.read(path), str(path)), workplace())
-    stored = {key for family in plan.families for key in family.find(workplace().store, plan.kept)}
+    plan = sweep_plan.prepare(sweep_plan.plan(*sweep.read(path), str(path)), open_workplace())
+    stored = {key for family in plan.families for key in family.find(open_workplace().store, plan.recorded)}
     assert main(["sweep", str(path), "--workers=1"]) == 0
     assert stored
     assert set(asked) == {job.key for job in plan.jobs} - stored

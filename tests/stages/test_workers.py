@@ -19,7 +19,7 @@ from flexclear.pipeline.core.workflow.task import Task
 
 def one(width: int = 1) -> tuple[int, int]:
     """Number of the process that does something for a crew of that width, and of the one that keeps its queue."""
-    with workers.crew(width) as crew:
+    with workers.team(width) as crew:
         return crew.pool.submit(os.getpid).result(), crew.server._process.pid
 
 
@@ -32,18 +32,18 @@ def alive(process: int) -> bool:
 
 
 def fail() -> None:
-    with pytest.raises(KeyError), workers.crew(1):
+    with pytest.raises(KeyError), workers.team(1):
         raise KeyError
 
 
 def stop() -> None:
-    with stopping.until(-1.0, "time is over"), workers.crew(1):
+    with stopping.until(-1.0, "time is over"), workers.team(1):
         assert stopping.requested()
 
 
 def test_a_command_starts_its_workers_once() -> None:
     """Also where a later part of it wants as many as there are cores."""
-    with workers.kept():
+    with workers.reused():
         first = one()
         assert one(cores.cores()) == first
         assert all(map(alive, first))
@@ -57,7 +57,7 @@ def test_outside_of_a_command_they_end_with_the_call() -> None:
 
 @pytest.mark.parametrize("end", [fail, stop])
 def test_workers_of_what_failed_or_was_stopped_are_not_kept(end: Callable[[], None]) -> None:
-    with workers.kept():
+    with workers.reused():
         first = one()
         end()
         assert not alive(first[1])

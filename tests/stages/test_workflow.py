@@ -249,7 +249,7 @@ def test_two_files_of_one_name_are_told_apart_or_refused(project: Project):
     done = project.run("run", paths[0], str(twin))
     assert done.returncode == 2
     assert "is called 'a', as" in done.stderr
-    assert "take each other's place" in done.stderr
+    assert "replace each other" in done.stderr
     project.run("run", paths[0], "--to", "simulate")
     done = project.run("run", str(twin), "--to", "simulate")
     assert done.returncode == 0
@@ -333,18 +333,20 @@ def test_what_a_run_is_to_be_doubted_for_ends_the_command_each_time(project: Pro
 
 
 def test_a_missed_accuracy_ends_with_3_unless_the_scene_allows_it(project: Project, add_scene: AddScene):
-    wanted = SCENE + JOINT + '[accuracy]\nball.position = "1 um"\n'
-    add_scene("wanted", wanted)
+    requested = SCENE + JOINT + '[accuracy]\nball.position = "1 um"\n'
+    add_scene("wanted", requested)
     for _ in range(2):
         done = project.run("run", "tiny/wanted")
         assert done.returncode == 3
-        assert "tiny/wanted [accuracy]: missed: ball.position is good to 2e-06, 2 times what is wanted" in done.stderr
+        assert (
+            "tiny/wanted [accuracy]: missed: ball.position is good to 2e-06, 2 times what is requested" in done.stderr
+        )
         assert "allow_missed = true" in done.stderr
         assert "Traceback" not in done.stderr
     kept = xr.load_dataset(project.results / "runs" / "tiny" / "wanted" / "run.nc", decode_times=False)
-    assert "2 times what is wanted" in kept.attrs["accuracy_verdict"]
+    assert "2 times what is requested" in kept.attrs["accuracy_verdict"]
     project.calls()
-    add_scene("wanted", wanted + "allow_missed = true\n")
+    add_scene("wanted", requested + "allow_missed = true\n")
     done = project.run("run", "tiny/wanted")
     assert done.returncode == 0
     assert "missed: ball.position" in done.stderr

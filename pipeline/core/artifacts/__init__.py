@@ -1,1 +1,1 @@
-"""The files in which the towers meet: what they hold (schema) and how they are kept (store)."""
+"""The files in which the towers meet: what they hold (schema) and how they are stored (store)."""

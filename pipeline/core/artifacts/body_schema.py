@@ -22,7 +22,7 @@ SOLID: Schema = {
     "tie_frame": _V(("tie",), "1", "index of the frame that it is tied to among `frame`"),
 }
 
-#: beside stage 3: what a rigid body made from a mesh needs
+#: next to stage 3: what a rigid body made from a mesh needs
 RIGID: Schema = {
     "mass": _V((), "kg", "mass"),
     "com": _V(("axis",), "m", "centre of mass in the mesh frame"),
@@ -35,7 +35,7 @@ RIGID: Schema = {
 MATRICES: Schema = {
     "unknown_node": _V(("unknown",), "1", "number of the node"),
     "unknown_component": _V(("unknown",), "", "ux uy uz rx ry rz, or internal where rigid motion has no part"),
-    "unknown_position": _V(("unknown", "axis"), "m", "place of the unknown in the mesh frame"),
+    "unknown_position": _V(("unknown", "axis"), "m", "position of the unknown in the mesh frame"),
     "stiffness_row": _V(("stiffness_entry",), "1", "row"),
     "stiffness_column": _V(("stiffness_entry",), "1", "column"),
     "stiffness_value": _V(
@@ -63,7 +63,9 @@ MATRICES: Schema = {
 
 #: stage 3 on request: what section forces and stresses follow from
 STRESS: Schema = {
-    "section_place": _V(("section",), "m", "place of the section along the rod; one at either end of each cell", True),
+    "section_place": _V(
+        ("section",), "m", "position of the section along the rod; one at either end of each cell", True
+    ),
     "section_position": _V(("section", "axis"), "m", "undeformed centre of the section, body frame", True),
     "section_rotation": _V(
         ("section", "axis", "axis2"), "1", "rotation matrix, section to body frame, undeformed", True
@@ -95,7 +97,7 @@ STRESS: Schema = {
     "section_round": _V(("section",), "1", "one where the section is the same about every axis", True),
 }
 
-#: stages 2 and 3: what the reduced body lacks beside the full model
+#: stages 2 and 3: what the reduced body lacks next to the full model
 DEFICITS: Schema = {
     "compliance_full": _V(
         ("frame", "frame_held", "direction"),
@@ -105,7 +107,7 @@ DEFICITS: Schema = {
         turning="rad N-1 m-1",
     ),
     "compliance_share": _V(
-        ("frame", "frame_held", "direction"), "1", "share of that compliance which the modes have", optional=True
+        ("frame", "frame_held", "direction"), "1", "fraction of that compliance which the modes have", optional=True
     ),
     "error_bound": _V(
         ("frame", "direction", "bound_frequency"),
@@ -136,12 +138,12 @@ MESH: Schema = {
     "frame_node": _V(("frame",), "1", "node to which the named frame is tied"),
     "frame_position": _V(("frame", "axis"), "m", "origin of the named frame in the mesh frame"),
     "frame_rotation": _V(("frame", "axis", "axis2"), "1", "rotation matrix, frame to mesh frame"),
-    "abscissa": _V(("node",), "m", "place of the node along the rod", optional=True),
+    "abscissa": _V(("node",), "m", "position of the node along the rod", optional=True),
     "rod_rotation": _V(
         ("axis", "axis2"), "1", "rotation matrix, rod axes (x along the rod) to mesh frame", optional=True
     ),
     "shear_coefficient": _V(
-        ("cell", "axis"), "1", "share of the area that carries force along x, y and z of the rod", optional=True
+        ("cell", "axis"), "1", "fraction of the area that carries force along x, y and z of the rod", optional=True
     ),
     "product_moment": _V(("cell",), "m4", "integral of y z over the section (stiffness)", optional=True),
     "inertia_product": _V(("cell",), "m4", "integral of y z over the section (mass)", optional=True),
@@ -161,13 +163,13 @@ MESH: Schema = {
 
 #: stage 2: frequencies and shapes under one reference condition, all FE degrees of freedom
 MODES: Schema = DEFICITS | {
-    "frequency": _V(("mode",), "Hz", "natural frequency of the kept coordinate in the reduced basis"),
+    "frequency": _V(("mode",), "Hz", "natural frequency of the retained coordinate in the reduced basis"),
     "shape": _V(("node", "dof", "mode"), "1", "mass-normalised shape: ux uy uz rx ry rz per unit modal coordinate"),
     "node_position": _V(("node", "axis"), "m", "node position in the mesh frame"),
     "cell_node": _V(("cell", "corner"), "1", "node indices of each drawn cell"),
     "vector": _V(("unknown", "mode"), "1", "mass-normalised shape, every unknown of the model"),
     "rigid_frequency": _V(("rigid_mode",), "Hz", "frequencies of the removed rigid-body modes", optional=True),
-    "kind": _V(("mode",), "", "bending, torsion or axial by share of kinetic energy"),
+    "kind": _V(("mode",), "", "bending, torsion or axial by fraction of kinetic energy"),
     "exact_euler_bernoulli": _V(
         ("mode",), "Hz", "exact frequency of the uniform rod, Euler-Bernoulli bending", optional=True
     ),

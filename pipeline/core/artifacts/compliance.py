@@ -38,10 +38,10 @@ def reduced(motion: np.ndarray, rigid: np.ndarray, relief: np.ndarray, stiffness
     return result
 
 
-def shares(found: np.ndarray, full: np.ndarray) -> np.ndarray:
-    """`found` as shares of `full`; one where the full model has no compliance to lack, as of a frame to itself."""
+def fractions(of_modes: np.ndarray, full: np.ndarray) -> np.ndarray:
+    """`found` as fractions of `full`; one where the full model has no compliance to lack, as of a frame to itself."""
     negligible = full <= 1e-9 * full.max(axis=(0, 1), keepdims=True)
-    return np.where(negligible, 1.0, found / np.where(negligible, 1.0, full))
+    return np.where(negligible, 1.0, of_modes / np.where(negligible, 1.0, full))
 
 
 def of_bundle(bundle: xr.Dataset) -> np.ndarray:

@@ -81,14 +81,14 @@ COORDINATES: Schema = {
     "lump": _number("lump", "number of the lumped mass, from 0"),
     "section": _number("section", "number of the section, from 0"),
     "section_body": _words("section", "body that the section belongs to"),
-    "section_place": _number("section", "place of the section along the rod", "m"),
+    "section_place": _number("section", "position of the section along the rod", "m"),
     "section_load": _words("section_load", "section force N, Qy, Qz, or moment T, My, Mz"),
     "section_load_motion": _words("section_load", "translation for forces, rotation for moments"),
     "stress": _words("stress", "axial stress, and shear stress along y and z"),
     "slice": _number("slice", "number of the slice, from 0"),
     "fibre": _number("fibre", "number of the fibre, from 0"),
     "member": _number("member", "number of the member, from 0"),
-    "quantile": _number("quantile", "share of the members below"),
+    "quantile": _number("quantile", "fraction of the members below"),
     "followed": _number("followed", "number of the period in which a neighbour was followed, from 0"),
     "vibration": _number("vibration", "number of the vibration, from 1"),
     "part": _words("part", "real or imaginary part"),
@@ -124,15 +124,15 @@ def motion(turning: bool) -> str:
 
 def with_names(data: LabelledArrays) -> LabelledArrays:
     """The same with the coordinates that follow from its dimensions alone."""
-    found: dict[str, LabelledArray] = {}
+    variables: dict[str, LabelledArray] = {}
     for name, length in data.sizes.items():
         if name in NAMED:
-            found[name] = LabelledArray((name,), np.array(NAMED[name]))
+            variables[name] = LabelledArray((name,), np.array(NAMED[name]))
         elif name in NUMBERED and name not in data.coords:
-            found[name] = LabelledArray((name,), np.arange(length, dtype=np.int32) + NUMBERED[name])
+            variables[name] = LabelledArray((name,), np.arange(length, dtype=np.int32) + NUMBERED[name])
         if name in MOTIONS:
-            found[f"{name}_motion"] = LabelledArray((name,), np.array(MOTIONS[name]))
-    return data.assign_coords(found)
+            variables[f"{name}_motion"] = LabelledArray((name,), np.array(MOTIONS[name]))
+    return data.assign_coords(variables)
 
 
 def turning(data: LabelledArrays, dims: tuple[str, ...]) -> tuple[str, np.ndarray]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-#: a share of the static compliance below this is worth a warning
+#: a fraction of the static compliance below this is worth a warning
 ENOUGH = 0.9
 #: references whose shapes answer static loads at the interfaces exactly
 STATIC = ("craig-bampton", "craig-chang", "residual-flexibility")
@@ -34,8 +34,8 @@ def table(bundle: xr.Dataset) -> str:
     names = [str(name) for name in bundle["frame"].values]
     for name in names:
         for held in [other for other in names if other != name] + [name]:
-            share = bundle["compliance_share"].sel(frame=name, frame_held=held).values
-            shown = [_percent(value) for value in share]
+            fraction = bundle["compliance_share"].sel(frame=name, frame_held=held).values
+            shown = [_percent(value) for value in fraction]
             lines.append(_row(name, "nothing" if held == name else held, shown))
     lines += ["  largest error of a frame's motion under a unit load on it, m/N and rad/(N m)"]
     lines.append(_row("frame", "load, Hz", bundle["direction"].values.tolist()))
@@ -60,20 +60,20 @@ def warnings(bundle: xr.Dataset, frames_used: Sequence[str], body: str = "the bo
     """
     used = list(dict.fromkeys(frames_used))
     pairs = [(i, j) for k, i in enumerate(used) for j in used[k + 1 :]] or [(i, i) for i in used]
-    found = []
+    messages = []
     for name, held in pairs:
         both = bundle["compliance_share"].sel(frame=[name, held], frame_held=[held, name]).values
-        share = bundle["direction"].copy(data=np.minimum(both[0, 0], both[1, 1]))
-        low = share.where(share < ENOUGH, drop=True)
+        fraction = bundle["direction"].copy(data=np.minimum(both[0, 0], both[1, 1]))
+        low = fraction.where(fraction < ENOUGH, drop=True)
         if low.size == 0:
             continue
         where = f"of '{name}'" if name == held else f"between '{held}' and '{name}'"
         amounts = ", ".join(f"{d} {_percent(v)} %" for d, v in zip(low["direction"].values, low.values, strict=True))
-        found.append(
+        messages.append(
             f"{body}: its {bundle.attrs['reference']} modes have too little of the static compliance {where} "
             f"({amounts} of the full model's); joints there find the body too stiff. {_remedy(bundle, used)}"
         )
-    return found
+    return messages
 
 
 def _remedy(bundle: xr.Dataset, used: Sequence[str]) -> str:
@@ -92,9 +92,9 @@ def _remedy(bundle: xr.Dataset, used: Sequence[str]) -> str:
     return f"Its static shapes are there: keep more normal modes than now (count = {bundle.attrs['count']})"
 
 
-def _percent(share: float) -> str:
+def _percent(fraction: float) -> str:
     """Per cent with three digits; rounding is nothing."""
-    return f"{100.0 * share:.3g}" if share > 1e-9 else "0"
+    return f"{100.0 * fraction:.3g}" if fraction > 1e-9 else "0"
 
 
 def _listed(names: Sequence[str]) -> str:

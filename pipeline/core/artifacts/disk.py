@@ -93,14 +93,14 @@ def settle(made: Path, path: Path) -> str:
         except OSError as error:
             failed.append(error)
 
-    beside = Thread(target=write)
-    if not system.started(beside):
+    writer = Thread(target=write)
+    if not system.started(writer):
         write()
     try:
         digest = digest_of(made)
     finally:
-        if beside.ident is not None:
-            beside.join()
+        if writer.ident is not None:
+            writer.join()
     if failed:
         raise failed[0]
     system.replace(made, path)
@@ -138,7 +138,7 @@ def copy(source: Path, target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     with temporary(target) as made:
         with source.open("rb") as old, made.open("wb") as new:
-            if not system.share(old, new):
+            if not system.share_blocks(old, new):
                 shutil.copyfileobj(old, new, PIECE)
         status = source.stat()
         os.utime(made, ns=(status.st_atime_ns, status.st_mtime_ns))
@@ -152,13 +152,13 @@ def is_copy(source: Path, target: Path) -> bool:
         old, new = source.stat(), target.stat()
     except OSError:
         return False
-    apart = (old.st_dev, old.st_ino) != (new.st_dev, new.st_ino)
-    return apart and (old.st_size, old.st_mtime_ns) == (new.st_size, new.st_mtime_ns)
+    separate = (old.st_dev, old.st_ino) != (new.st_dev, new.st_ino)
+    return separate and (old.st_size, old.st_mtime_ns) == (new.st_size, new.st_mtime_ns)
 
 
 @contextlib.contextmanager
 def temporary(path: Path) -> Iterator[Path]:
-    """A name beside `path` that no other process uses; gone afterwards, however it ends."""
+    """A name next to `path` that no other process uses; gone afterwards, however it ends."""
     stem = path.name.lstrip(".").partition(".")[0]
     made = path.with_name(f".{stem}.{_host()}-{os.getpid()}.{os.urandom(4).hex()}.tmp")
     try:
@@ -251,12 +251,12 @@ def sweep(root: Path) -> int:
 
 
 def _abandoned(path: Path) -> bool:
-    found = _TEMPORARY.fullmatch(path.name)
-    if found is None:
+    match = _TEMPORARY.fullmatch(path.name)
+    if match is None:
         return False  # none of ours
-    if found["host"] != _host():
+    if match["host"] != _host():
         return _old(path)
-    return not system.alive(int(found["pid"]))
+    return not system.alive(int(match["pid"]))
 
 
 def _old(path: Path) -> bool:

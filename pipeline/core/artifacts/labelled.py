@@ -66,14 +66,14 @@ class LabelledArrays:
         """Bytes of all values."""
         return sum(array.values.nbytes for array in self.variables.values())
 
-    def assign_attrs(self, **told: Any) -> LabelledArrays:
+    def assign_attrs(self, **text: Any) -> LabelledArrays:
         """The same with more attributes."""
-        return replace(self, attrs={**self.attrs, **told})
+        return replace(self, attrs={**self.attrs, **text})
 
-    def assign_coords(self, found: Mapping[str, LabelledArray]) -> LabelledArrays:
-        """The same with these coordinates last, in place of others of their names."""
-        kept = {name: array for name, array in self.variables.items() if name not in found}
-        return replace(self, variables=kept | dict(found), coords=self.coords | found.keys())
+    def assign_coords(self, coordinates: Mapping[str, LabelledArray]) -> LabelledArrays:
+        """The same with these coordinates last, instead of others of their names."""
+        remaining = {name: array for name, array in self.variables.items() if name not in coordinates}
+        return replace(self, variables=remaining | dict(coordinates), coords=self.coords | coordinates.keys())
 
     def to_xarray(self) -> xr.Dataset:
         """The same for users; values are shared."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.compliance import of_bundle, shares
+from flexclear.pipeline.core.artifacts.compliance import fractions, of_bundle
 from flexclear.pipeline.core.errors import InputError
 
 #: dimensions that count modes
@@ -29,7 +29,7 @@ class Modal:
         """The dataset with its first `count` modes only, in every variable that counts modes.
 
         The modes of a bundle are eigenvectors of its reduced matrices, so that the first of them are a basis of their
-        own. Shares of compliance are computed again; the error bound and the resolved frequency are dropped.
+        own. Fractions of compliance are computed again; the error bound and the resolved frequency are dropped.
         Raises InputError for a count that is not there, or that cuts a pair of equal frequencies.
         """
         self._check(count)
@@ -39,8 +39,8 @@ class Modal:
         if "count" in result.attrs:
             result.attrs["count"] = count
         if "compliance_full" in result and "modal_stiffness" in result:
-            found = shares(of_bundle(result), result["compliance_full"].values)
-            result["compliance_share"] = result["compliance_share"].copy(data=found)
+            kept_part = fractions(of_bundle(result), result["compliance_full"].values)
+            result["compliance_share"] = result["compliance_share"].copy(data=kept_part)
         return result
 
     def _check(self, count: int) -> None:

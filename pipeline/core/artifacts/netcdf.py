@@ -1,7 +1,7 @@
 """NetCDF-4 files of labelled arrays, with all that xarray writes into them: the one writer and the one reader.
 
-What xarray keeps beside NetCDF's own types is here, too: coordinates are listed in attributes `coordinates`, truth is
-kept as bytes with the attribute `dtype`, and floats have NaN for what was never written.
+What xarray keeps next to NetCDF's own types is here, too: coordinates are listed in attributes `coordinates`, truth is
+stored as bytes with the attribute `dtype`, and floats have NaN for what was never written.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledAr
 
 #: bytes of a dataset from which on room on the disk counts for more than time
 COMPRESSED = 1 << 26
-#: bytes of values from which on the library is told not to keep what it has read: that would cost more than it takes
+#: bytes of values from which on the library is given not to keep what it has read: that would cost more than it takes
 _LARGE = 1 << 16
 #: how the library takes values of a kind, where otherwise than they are
 _TAKEN = {"U": np.dtype("O"), "b": np.dtype("i1")}
@@ -63,11 +63,11 @@ def _define(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str
     """A variable of the file, with all but its values."""
     values, kind = array.values, array.values.dtype.kind
     truth = _BOOL if kind == "b" else {}
-    kept = str if kind in "OU" else values.dtype.newbyteorder("=") if not truth else np.dtype("i1")
+    stored_type = str if kind in "OU" else values.dtype.newbyteorder("=") if not truth else np.dtype("i1")
     numeric = bool(values.ndim and values.size and kind in "fiu")
     variable = file.createVariable(
         name,
-        kept,
+        stored_type,
         array.dims,
         zlib=numeric and compress,
         complevel=1 if numeric and compress else 4,
@@ -88,16 +88,16 @@ def _set_attribute(file: Any, name: str, value: Any) -> None:
 
 def _listed(data: LabelledArrays) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
     """The attribute `coordinates` of each array, and that of the file for those that no array has all dimensions of."""
-    beside = sorted(data.coords - data.sizes.keys())
-    found, left = dict[str, dict[str, str]](), set(beside)
+    additional = sorted(data.coords - data.sizes.keys())
+    attributes, left = dict[str, dict[str, str]](), set(additional)
     for name, array in data.variables.items():
-        if name in beside or name in array.dims:
+        if name in additional or name in array.dims:
             continue
-        own = [other for other in beside if set(data[other].dims) <= set(array.dims)]
+        own = [other for other in additional if set(data[other].dims) <= set(array.dims)]
         if own:
-            found[name] = {_COORDINATES: " ".join(own)}
+            attributes[name] = {_COORDINATES: " ".join(own)}
             left -= set(own)
-    return found, {_COORDINATES: " ".join(sorted(left))} if left else {}
+    return attributes, {_COORDINATES: " ".join(sorted(left))} if left else {}
 
 
 def read(content: bytes) -> LabelledArrays:

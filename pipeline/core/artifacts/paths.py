@@ -1,4 +1,4 @@
-"""Where results are kept."""
+"""Folders of results."""
 
 from __future__ import annotations
 

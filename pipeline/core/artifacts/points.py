@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION, RUN
 from flexclear.pipeline.core.scene.design import Axis, Design
-from flexclear.pipeline.core.scene.output_quantities import Kept
+from flexclear.pipeline.core.scene.output_quantities import Recorded
 from flexclear.pipeline.core.scene.requested_accuracy import KINDS
 from flexclear.pipeline.core.units import udunits
 
@@ -19,16 +19,17 @@ Values = dict[str, np.ndarray]
 #: what became of a point
 STATUS = ("done", "refused", "not_run")
 DONE, REFUSED, NOT_RUN = range(3)
-#: what is kept of each quantity: its value, and where asked for the difference from a run at a tighter tolerance, or
-#: the standard deviation over members
-SHARES = ("values", "error", "deviation")
+#: what is recorded of each quantity: its value, and where asked for the difference from a run at a tighter tolerance,
+#: or the standard deviation over members
+STATISTICS = ("values", "error", "deviation")
 
 
 @dataclass(frozen=True)
 class Point:
     """What is left of one point.
 
-    values: by the names of what is kept, in SI; with members their mean.  error: distance from the values at a tighter
+    values: by the names of the recorded quantities, in SI; with members their mean.  error: distance from the values at
+    a tighter
     tolerance.  deviation: standard deviation over the members.  Both are empty where nobody asked.
     evaluations: of the right-hand side, all runs of the point together.
     refused: why there are no values; else empty.
@@ -41,36 +42,37 @@ class Point:
     refused: str = ""
 
 
-def batch(points: Mapping[str, Point], kept: Sequence[Kept]) -> xr.Dataset:
+def batch(points: Mapping[str, Point], recorded: Sequence[Recorded]) -> xr.Dataset:
     """Finished points by their keys, as a dataset."""
     done = list(points.values())
-    variables = _arrays(done, kept, ("point",), (len(done),))
+    variables = _arrays(done, recorded, ("point",), (len(done),))
     variables["evaluations"] = (("point",), np.array([point.evaluations for point in done], dtype=np.int64))
     variables["refused"] = (("point",), np.array([point.refused for point in done], dtype=object))
     return xr.Dataset(variables, coords={"key": ("point", np.array(list(points), dtype=object))})
 
 
-def unpacked(stored: xr.Dataset, kept: Sequence[Kept]) -> dict[str, Point]:
+def unpacked(stored: xr.Dataset, recorded: Sequence[Recorded]) -> dict[str, Point]:
     """The points of a batch by their keys."""
     arrays = {str(name): stored[name].values for name in stored.variables}
-    found = {}
+    points = {}
     for k, key in enumerate(arrays["key"]):
         refused = str(arrays["refused"][k])
         values, error, deviation = (
-            {} if refused else {q.name: arrays[name][k] for q in kept if (name := variable(q, share)) in arrays}
-            for share in SHARES
+            {} if refused else {q.name: arrays[name][k] for q in recorded if (name := variable(q, statistic)) in arrays}
+            for statistic in STATISTICS
         )
-        found[str(key)] = Point(values, error, deviation, int(arrays["evaluations"][k]), refused)
-    return found
+        points[str(key)] = Point(values, error, deviation, int(arrays["evaluations"][k]), refused)
+    return points
 
 
-def variable(one: Kept, share: str) -> str:
+def variable(one: Recorded, statistic: str) -> str:
     """Name of a variable."""
-    return one.name if share == "values" else f"{one.name}.{share}"
+    return one.name if statistic == "values" else f"{one.name}.{statistic}"
 
 
-def unit(one: Kept, turning: Collection[str]) -> str:
-    """Unit of what is kept, as UDUNITS reads it. turning: names of the quantities that are about an axis, not along."""
+def unit(one: Recorded, turning: Collection[str]) -> str:
+    """Unit of a recorded quantity, as UDUNITS reads it. turning: names of the quantities that are about an axis, not
+    along."""
     declared = RUN[KINDS[one.quantity.kind].variable]
     along = declared.turning if one.quantity.name in turning else declared.units
     return "1" if one.reduction == "count" else along
@@ -78,28 +80,28 @@ def unit(one: Kept, turning: Collection[str]) -> str:
 
 def dataset(
     design: Design,
-    kept: Sequence[Kept],
+    recorded: Sequence[Recorded],
     keys: Sequence[str],
     points: Mapping[str, Point],
     time: np.ndarray,
     sections: int,
     turning: Collection[str],
     attributes: Mapping[str, str | int],
-    shares: Sequence[str] = SHARES[:1],
+    statistics: Sequence[str] = STATISTICS[:1],
 ) -> xr.Dataset:
     """All points of a sweep on its own dimensions; nan where there is no value.
 
-    keys: of the points, in their order.  points: the finished ones.  time: of the series that are kept [s].
+    keys: of the points, in their order.  points: the finished ones.  time: of the recorded series [s].
     sections: how many there are of each point.  turning: as of `unit`.  shares: of `SHARES`, those that are asked for.
     """
     dims, shape = design.dims, design.shape
     every = [points.get(key) for key in keys]
     lengths = dimensions(time, sections)
-    variables = _arrays(every, kept, dims, shape)
-    for one, share in itertools.product(kept, shares):  # where no point is done
-        if variable(one, share) not in variables:
+    variables = _arrays(every, recorded, dims, shape)
+    for one, statistic in itertools.product(recorded, statistics):  # where no point is done
+        if variable(one, statistic) not in variables:
             inner = [lengths[dim] for dim in one.dims]
-            variables[variable(one, share)] = ((*dims, *one.dims), np.full((*shape, *inner), np.nan))
+            variables[variable(one, statistic)] = ((*dims, *one.dims), np.full((*shape, *inner), np.nan))
     status = [NOT_RUN if p is None else REFUSED if p.refused else DONE for p in every]
     plain = {
         "status": (np.array(status, dtype=np.int8), "what became of the point"),
@@ -120,7 +122,7 @@ def dataset(
     coordinates |= {"quat": list(QUATERNION)} if "quat" in sizes else {}
     coordinates |= {"time": time} if "time" in sizes else {}
     result = xr.Dataset(variables, coords=coordinates)
-    _describe(result, design.axes, kept, turning)
+    _describe(result, design.axes, recorded, turning)
     for name, (_, meaning) in plain.items():
         result[name].attrs = {"long_name": meaning}
     result["status"].attrs |= {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(STATUS)}
@@ -129,40 +131,43 @@ def dataset(
 
 
 def dimensions(time: np.ndarray, sections: int) -> dict[str, int]:
-    """Lengths of the dimensions that what is kept of a point may have."""
+    """Lengths of the dimensions that what is recorded of a point may have."""
     return {"axis": len(AXES), "quat": len(QUATERNION), "time": len(time), "section": sections}
 
 
 def _arrays(
-    points: Sequence[Point | None], kept: Sequence[Kept], dims: tuple[str, ...], shape: tuple[int, ...]
+    points: Sequence[Point | None], recorded: Sequence[Recorded], dims: tuple[str, ...], shape: tuple[int, ...]
 ) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
     """Values of points, row by row in the order of the dimensions; nan where there are none."""
     arrays = {}
     done = next((point for point in points if point is not None and not point.refused), None)
-    for share in SHARES if done is not None else ():
-        for one in kept:
-            if one.name not in getattr(done, share):
+    for statistic in STATISTICS if done is not None else ():
+        for one in recorded:
+            if one.name not in getattr(done, statistic):
                 continue
-            inner = np.shape(getattr(done, share)[one.name])
+            inner = np.shape(getattr(done, statistic)[one.name])
             rows = np.full((len(points), *inner), np.nan)
             for k, point in enumerate(points):
                 if point is not None and not point.refused:
-                    rows[k] = getattr(point, share)[one.name]
-            arrays[variable(one, share)] = ((*dims, *one.dims), rows.reshape((*shape, *inner)))
+                    rows[k] = getattr(point, statistic)[one.name]
+            arrays[variable(one, statistic)] = ((*dims, *one.dims), rows.reshape((*shape, *inner)))
     return arrays
 
 
-def _describe(result: xr.Dataset, axes: Sequence[Axis], kept: Sequence[Kept], turning: Collection[str]) -> None:
+def _describe(result: xr.Dataset, axes: Sequence[Axis], recorded: Sequence[Recorded], turning: Collection[str]) -> None:
     """Units and meanings."""
     words = {
         "values": "",
         "error": "; distance from the value at a hundredth of the tolerance",
         "deviation": "; standard deviation over the members",
     }
-    for one in kept:
-        for share, more in words.items():
-            if variable(one, share) in result:
-                result[variable(one, share)].attrs = {"units": unit(one, turning), "long_name": f"{one.meaning}{more}"}
+    for one in recorded:
+        for statistic, more in words.items():
+            if variable(one, statistic) in result:
+                result[variable(one, statistic)].attrs = {
+                    "units": unit(one, turning),
+                    "long_name": f"{one.meaning}{more}",
+                }
     for axis in axes:
         units = {"units": udunits(axis.unit)} if udunits(axis.unit) else {}
         result[axis.name].attrs = {"long_name": ", ".join(axis.places), **units}

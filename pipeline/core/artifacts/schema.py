@@ -253,14 +253,14 @@ ENSEMBLE: Schema = {
     "peak_acceleration": _V(
         ("member", "body", "axis"), "m s-2", "largest magnitude of each component, of outputs and events"
     ),
-    "contact_time_share": _V(("member", "contact"), "1", "share of the run spent in contact"),
+    "contact_time_share": _V(("member", "contact"), "1", "fraction of the run spent in contact"),
 }
 
 _OF_SECTION = {
     name: _V(("section", *ENSEMBLE[name].dims[2:]), ENSEMBLE[name].units, ENSEMBLE[name].long_name)
     for name in ("position", "quaternion", "velocity", "angular_velocity", "acceleration")
 }
-#: sections of a periodic motion: the state once in each period, and the impacts of all kept periods
+#: sections of a periodic motion: the state once in each period, and the impacts of all recorded periods
 SECTIONS: Schema = _OF_SECTION | {
     "orbit_position": _V(("waypoint", "body", "axis"), "m", "centre of mass at waypoints of the last period"),
     "orbit_quaternion": _V(("waypoint", "body", "quat"), "1", "unit quaternion at waypoints of the last period"),
@@ -309,8 +309,8 @@ LINEAR: Schema = EQUILIBRIUM | {
     "undamped_frequency": _V(("vibration",), "Hz", "magnitude of the eigenvalue over 2 pi"),
     "decay_rate": _V(("vibration",), "s-1", "rate at which the vibration decays; negative when it grows"),
     "damping_ratio": _V(("vibration",), "1", "decay rate over the magnitude of the eigenvalue"),
-    "dominant": _V(("vibration",), "", "body with the largest share of the kinetic energy"),
-    "energy_share": _V(("vibration", "moving_body"), "1", "share of the body in the kinetic energy"),
+    "dominant": _V(("vibration",), "", "body with the largest fraction of the kinetic energy"),
+    "energy_share": _V(("vibration", "moving_body"), "1", "fraction of the body in the kinetic energy"),
     "frame_translation": _V(("vibration", "part", "frame", "axis"), "1", "displacement of the named frame, world axes"),
     "frame_rotation": _V(
         ("vibration", "part", "frame", "axis"), "rad m-1", "rotation vector of the named frame, world axes"
@@ -343,7 +343,7 @@ def conformed(data: LabelledArrays, schema: Schema, *, title: str, **attributes:
     if missing or unknown:
         raise ValueError(f"artifact lacks {missing} and has undeclared {unknown}")
     data = with_names(data)
-    found, units_of = dict(data.variables), dict[str, LabelledArray]()
+    variables, units_of = dict(data.variables), dict[str, LabelledArray]()
     for name, array in data.variables.items():
         if _is_unit(name):
             continue
@@ -353,13 +353,13 @@ def conformed(data: LabelledArrays, schema: Schema, *, title: str, **attributes:
         if array.values.dtype.kind == "f" and not name.startswith(_MAY_BE_OPEN) and not np.isfinite(array.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         units, mixed = _units(data, name, variable)
-        told = ({"units": units} if units else {}) | {"long_name": variable.long_name}
-        found[name] = replace(array, attrs=told)
+        described = ({"units": units} if units else {}) | {"long_name": variable.long_name}
+        variables[name] = replace(array, attrs=described)
         if mixed is not None:
             units_of[f"{name}_units"] = mixed
     made = {"Conventions": CONVENTIONS, "title": title, "source": f"{DISTRIBUTION} {version()}"}
-    coords = data.coords | units_of.keys() | (set(_NAMING) & found.keys())
-    return LabelledArrays(found | units_of, frozenset(coords), made | attributes)
+    coords = data.coords | units_of.keys() | (set(_NAMING) & variables.keys())
+    return LabelledArrays(variables | units_of, frozenset(coords), made | attributes)
 
 
 def _is_unit(name: str) -> bool:
@@ -391,5 +391,5 @@ def require_complete(run: xr.Dataset | LabelledArrays, what: str = "the run") ->
             what,
             f"it is not complete: it was stopped at t = {run.attrs.get('stopped_at', float('nan')):.6g} s "
             f"({run.attrs.get('stopped_by', 'nobody knows why')})",
-            "run the scene again, which goes on from there",
+            "run the scene again, which continues from there",
         )

@@ -46,11 +46,11 @@ if TYPE_CHECKING:
 _PART = re.compile(r"[^./\\\0][^/\\\0]{0,200}")
 #: the file of an artifact that other stages read
 MAIN = "nc"
-#: stands for the key of all artifacts of a stage, such as the batches of a sweep's points
+#: represents the key of all artifacts of a stage, such as the batches of a sweep's points
 FAMILY = "family"
-#: attributes of the main file that a command tells, without opening the file
-TOLD = ("warnings", "accuracy_verdict")
-#: lies beside what is shown and is not of the scene as it is now
+#: attributes of the main file that a command reports, without opening the file
+REPORTED = ("warnings", "accuracy_verdict")
+#: lies next to what is shown and is not of the scene as it is now
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
 PARTIAL = ".partial"
@@ -63,7 +63,7 @@ OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not 
 class Record:
     """What is known of a stored artifact: sha256 of each file by its name, and the facts of its key.
 
-    said: those of the main file's attributes that a command tells its user (`TOLD`).
+    said: those of the main file's attributes that a command shows its user (`REPORTED`).
     """
 
     stage: str
@@ -79,13 +79,13 @@ class Record:
 
     def table(self) -> dict[str, object]:
         """What its file holds, and `read_record` reads."""
-        kept = {"files": self.files, "facts": self.facts, "said": self.said}
-        return {"stage": self.stage, "key": self.key, **{name: dict(texts) for name, texts in kept.items()}}
+        content = {"files": self.files, "facts": self.facts, "said": self.said}
+        return {"stage": self.stage, "key": self.key, **{name: dict(texts) for name, texts in content.items()}}
 
 
 @dataclass(frozen=True, slots=True)
 class Store:
-    """Artifacts below `root` (the results folder). `say` is told, in one line, what was found broken."""
+    """Artifacts below `root` (the results folder). `say` prints one line about damaged files."""
 
     root: Path
     say: Callable[[str], None] = lambda text: None
@@ -109,10 +109,10 @@ class Store:
         for name, digest in record.files.items():
             path = self.path(record.stage, record.key, name)
             try:
-                found = digest_of(path)
+                actual = digest_of(path)
             except OSError:
                 return f"{self._shown(path)} is missing, or no file"
-            if found != digest:
+            if actual != digest:
                 _STORED.pop(digest, None)
                 return f"{self._shown(path)} is corrupt (its content differs from its sha256)"
         return None
@@ -129,7 +129,7 @@ class Store:
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
                 digests[name] = publish(path, content) if isinstance(content, bytes) else _store(path, content)
-            said = {name: str(value) for name, value in _attributes(product).items() if name in TOLD and value}
+            said = {name: str(value) for name, value in _attributes(product).items() if name in REPORTED and value}
             record = Record(stage, key, digests, dict(facts), said)
             publish(self.path(stage, key, "json"), checked(record.table()))
         return record
@@ -161,7 +161,8 @@ class Store:
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
         """Make the current artifact visible: read-only copies in `folder`, and its facts in ``folder/.facts``.
 
-        An empty `folder` shows nothing.  A shown file that somebody has edited is kept under another name, and told.
+        An empty `folder` shows nothing.  A shown file that somebody has edited is renamed, and
+        reported.
         """
         if not folder:
             return
@@ -187,10 +188,12 @@ class Store:
         if digest_of(target) != known if known else target.stat().st_mode & 0o222:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
             system.replace(target, aside)
-            self.say(f"{self._shown(target)} was edited; the edit is kept as {aside.name}, and the result shown again")
+            self.say(
+                f"{self._shown(target)} was edited; the edit is stored as {aside.name}, and the result shown again"
+            )
 
     def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:
-        """Put what is left of work that was stopped beside what is shown; its path, where anything is shown.
+        """Put what is left of work that was stopped next to what is shown; its path, where anything is shown.
 
         It is no artifact, and `show` takes it away.
         """
@@ -203,7 +206,7 @@ class Store:
         return path
 
     def outdated(self, folder: str, label: str, why: str) -> None:
-        """Note beside what is shown that it is of an earlier state, and why; `show` takes the note away."""
+        """Note next to what is shown that it is of an earlier state, and why; `show` takes the note away."""
         if not folder:
             return
         with disk_limits(self.root / folder):
@@ -232,7 +235,7 @@ class Store:
 
     def _tell_outdated(self, folder: str) -> None:
         path = self.root / folder / OUTDATED
-        notes = [read_checked(found) for found in sorted((path.parent / ".facts").glob("*.failed"))]
+        notes = [read_checked(path_of_note) for path_of_note in sorted((path.parent / ".facts").glob("*.failed"))]
         lines = [f"{note.get('label')}: {note.get('why')}\n" for note in notes if note is not None]
         if lines:
             publish(path, (OUTDATED_TEXT + "".join(lines)).encode())
@@ -288,12 +291,12 @@ def read_record(path: Path) -> Record | None:
     try:
         table = read_checked(path) or {}
         files, facts, said = (_texts(table.get(name, {})) for name in ("files", "facts", "said"))
-        found = Record(str(table["stage"]), str(table["key"]), files, facts, said)
+        record = Record(str(table["stage"]), str(table["key"]), files, facts, said)
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
     # a record of somebody else's must not lead out of its folder: what is pruned is removed
-    inside = all(_PART.fullmatch(name) for name in (*found.stage.split("/"), found.key, *found.files))
-    return found if inside and (found.files or found.key == FAMILY) else None
+    inside = all(_PART.fullmatch(name) for name in (*record.stage.split("/"), record.key, *record.files))
+    return record if inside and (record.files or record.key == FAMILY) else None
 
 
 def _texts(table: Mapping[object, object]) -> dict[str, str]:
@@ -301,7 +304,7 @@ def _texts(table: Mapping[object, object]) -> dict[str, str]:
 
 
 def _partial(shown: Path) -> Path:
-    """Where what is left of a stopped run stands, beside the shown file of a whole one."""
+    """Where what is left of a stopped run is, next to the shown file of a whole one."""
     return shown.with_name(f"{shown.stem}{PARTIAL}{shown.suffix}")
 
 
@@ -329,7 +332,7 @@ def _written(path: Path, data: LabelledArrays) -> str:
         try:
             netcdf.write(made, data)
         except (OSError, RuntimeError) as error:
-            # the HDF5 library tells that it cannot write, but not that the disk is full; plain bytes get the reason
+            # the HDF5 library reports that it cannot write, but not that the disk is full; plain bytes get the reason
             made.write_bytes(bytes(data.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
         return settle(made, path)
@@ -352,6 +355,6 @@ def _store(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
 
 
 def _identity(path: Path) -> tuple[int, ...]:
-    """What tells a file from others, and from itself after somebody wrote into it."""
+    """What distinguishes a file from others, and from itself after somebody wrote into it."""
     status = path.stat()
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns

@@ -11,7 +11,7 @@ from pathlib import Path
 from flexclear.pipeline.core.artifacts.disk import digest_of, read_checked
 from flexclear.pipeline.core.artifacts.store import FAMILY, Record, Store, read_record
 
-#: what stands beside artifacts and is none of their files
+#: what is next to artifacts and is none of their files
 BESIDE = (".json", ".lock", ".names", ".part", ".tmp")
 DAY = 86400.0
 #: a file of an artifact may be so long without its record [s]
@@ -57,23 +57,23 @@ def inventory(store: Store, *, whole: bool) -> Inventory:
     return Inventory(tuple(artifacts), tuple(damaged), tuple(unreadable), tuple(_orphans(store, known)))
 
 
-def prunable(store: Store, found: Inventory, older: float) -> list[Artifact]:
+def prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
     """Artifacts that no folder of results shows, and that were made more than `older` seconds ago.
 
     What the shown ones were made from stays as well: without it they would be made again. A sweep shows its families,
     all of whose points stay, since it goes on with them.
     """
-    made = {artifact.record.digest: artifact.record for artifact in found.artifacts}
-    kept, waiting = set(), list(_shown(store))
+    made = {artifact.record.digest: artifact.record for artifact in listed.artifacts}
+    in_use, waiting = set(), list(_shown(store))
     while waiting:
         record = waiting.pop()
-        if (record.stage, record.key) not in kept:
-            kept.add((record.stage, record.key))
+        if (record.stage, record.key) not in in_use:
+            in_use.add((record.stage, record.key))
             above = (digest for fact, digest in record.facts.items() if fact.startswith("input "))
             waiting += [made[digest] for digest in above if digest in made]
-    of_sweeps = {stage for stage, key in kept if key == FAMILY}
-    mine = [a for a in found.artifacts if a.age > older and a.record.stage not in of_sweeps]
-    return [a for a in mine if (a.record.stage, a.record.key) not in kept]
+    of_sweeps = {stage for stage, key in in_use if key == FAMILY}
+    mine = [a for a in listed.artifacts if a.age > older and a.record.stage not in of_sweeps]
+    return [a for a in mine if (a.record.stage, a.record.key) not in in_use]
 
 
 def remove(store: Store, artifact: Artifact) -> None:
@@ -92,8 +92,8 @@ def find(store: Store, what: str) -> Record | None:
             record = read_record(facts)
             if record is not None and any(_same(path, store.path(record.stage, record.key, f)) for f in record.files):
                 return record
-    found = [path for path in _records(store) if path.stem.startswith(what)]
-    return read_record(found[0]) if len(found) == 1 else None
+    records = [path for path in _records(store) if path.stem.startswith(what)]
+    return read_record(records[0]) if len(records) == 1 else None
 
 
 def _same(path: Path, other: Path) -> bool:
@@ -106,7 +106,7 @@ def _same(path: Path, other: Path) -> bool:
 def _records(store: Store) -> list[Path]:
     """Of all stages; those of a sweep's points have a folder for each family.
 
-    A memo of a whole command lies beside the stages, and a file of an artifact may be called ``<key>.index.json``.
+    A memo of a whole command lies next to the stages, and a file of an artifact may be called ``<key>.index.json``.
     """
     cache = store.root / "cache"
     return sorted(path for path in cache.rglob("*.json") if path.parent != cache and "." not in path.stem)

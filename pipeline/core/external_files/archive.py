@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 
 from flexclear.pipeline.core import machine
-from flexclear.pipeline.core.external_files import apart
+from flexclear.pipeline.core.external_files import isolated
 
 
 def read(path: Path, where: str, copies: float, remedy: str) -> dict[str, np.ndarray]:
     """All arrays of a file by name; objects of Python, which would be code, are not read.
 
     copies: how often what is unpacked will be in memory.  remedy: what helps where that is too much.
-    Raises ResourceError for that, `apart.UnreadableError`, and as `apart.read` does.
+    Raises ResourceError for that, `isolated.UnreadableError`, and as `isolated.read` does.
     """
-    found: dict[str, np.ndarray] = apart.read(unpacked, path, where, copies, remedy, apart.allowed())
-    return found
+    arrays: dict[str, np.ndarray] = isolated.read(unpacked, path, where, copies, remedy, isolated.allowed())
+    return arrays
 
 
 def unpacked(path: Path, where: str, copies: float, remedy: str, allowed: float) -> dict[str, np.ndarray]:

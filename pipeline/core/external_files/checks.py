@@ -15,7 +15,7 @@ COPIES = 5.0
 #: points of a structured grid, which a header of a hundred bytes may promise without end
 MOST_POINTS = 2_000_000
 _GRID = re.compile(rb"^DATASET\s+(?:STRUCTURED|RECTILINEAR)\w*\s+DIMENSIONS((?:\s+\d{1,12}){3})\s", re.MULTILINE)
-#: bytes of the header of a VTK file that are looked at
+#: bytes of the header of a VTK file that are examined
 HEADER = 2000
 
 
@@ -31,8 +31,8 @@ def require_mesh(path: Path, where: str, largest: int | None = None) -> None:
     machine.require_memory(COPIES * size, f"{where}: '{path.name}'", "use a coarser mesh")
     if path.suffix == ".vtk":
         with path.open("rb") as file:
-            found = _GRID.search(file.read(HEADER))
-        count = prod(int(number) for number in found[1].split()) if found is not None else 0
+            match = _GRID.search(file.read(HEADER))
+        count = prod(int(number) for number in match[1].split()) if match is not None else 0
         if count > MOST_POINTS:
             raise InputError(where, f"'{path.name}' promises a grid of {count:.3g} points, more than {MOST_POINTS}")
 

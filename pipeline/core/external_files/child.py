@@ -53,5 +53,5 @@ def _answer(asked: dict[str, Any], answers: IO[bytes]) -> None:
 
 
 def main() -> None:
-    """What the command of `apart` runs."""
+    """Main function of the process that `isolated` starts."""
     serve(int(sys.argv[2]), by_main_thread=sys.argv[3] == "main")

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.external_files import apart
+from flexclear.pipeline.core.external_files import isolated
 from flexclear.pipeline.core.workflow import file_dependencies
 
 #: what meshio keeps among the sets of cells of a Gmsh 4 file, but numbers of curves and points
@@ -48,10 +48,10 @@ class Mesh:
 
 
 def read(path: Path) -> Mesh:
-    """The mesh in a file.  Raises `apart.UnreadableError`, and as `apart.read` does."""
-    found = apart.read(parse, path)
-    cells = tuple(Block(**block) for block in found.pop("cells"))
-    return Mesh(cells=cells, **found)
+    """The mesh in a file.  Raises `isolated.UnreadableError`, and as `isolated.read` does."""
+    mesh = isolated.read(parse, path)
+    cells = tuple(Block(**block) for block in mesh.pop("cells"))
+    return Mesh(cells=cells, **mesh)
 
 
 def parse(path: Path) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def parse(path: Path) -> dict[str, Any]:
             name: [_numbers(c) for c in chosen] for name, chosen in (mesh.cell_sets or {}).items() if name != NO_CELLS
         },
         "cell_data": _integers(mesh.cell_data or {}),
-        "field_data": {name: [int(n) for n in found] for name, found in (mesh.field_data or {}).items()},
+        "field_data": {name: [int(n) for n in pair] for name, pair in (mesh.field_data or {}).items()},
     }
 
 
@@ -93,10 +93,10 @@ def _numbers(data: Any) -> np.ndarray:
 
 
 def _integers(data: Mapping[str, Any]) -> dict[str, list[np.ndarray]]:
-    found = {name: [np.asarray(part) for part in parts] for name, parts in data.items()}
+    arrays = {name: [np.asarray(part) for part in parts] for name, parts in data.items()}
     return {
         name: parts
-        for name, parts in found.items()
+        for name, parts in arrays.items()
         if all(part.dtype.kind in "iu" and part.ndim == 1 for part in parts)
     }
 

@@ -27,7 +27,7 @@ def send(file: IO[bytes], value: Any) -> None:
     Raises TypeError for others.
     """
     arrays: list[np.ndarray] = []
-    head = json.dumps(_told(value, arrays)).encode()
+    head = json.dumps(_encoded(value, arrays)).encode()
     file.write(_LENGTH.pack(len(head)) + head)
     for array in arrays:
         file.write(array.reshape(-1).view(np.uint8).data)
@@ -41,15 +41,15 @@ def receive(file: IO[bytes], most: float) -> Any:
     """
     head = _exactly(file, _length(file, min(LARGEST_HEAD, most)))
     try:
-        told = json.loads(bytes(head))
-        types = _arrays(told)
+        header = json.loads(bytes(head))
+        types = _arrays(header)
     except RecursionError:
         raise ValueError("a message is nested too deeply") from None
     sizes = [dtype.itemsize * prod(shape) for dtype, shape in types]
     if sum(sizes) > most:
         raise ValueError(f"{sum(sizes)} bytes are more than the {most:.0f} that are allowed")
     arrays = iter([_exactly(file, size).view(dtype).reshape(shape) for size, (dtype, shape) in zip(sizes, types)])  # noqa: B905
-    return _value(told, arrays)
+    return _value(header, arrays)
 
 
 def _length(file: IO[bytes], most: float) -> int:
@@ -61,26 +61,26 @@ def _length(file: IO[bytes], most: float) -> int:
 
 def _exactly(file: IO[bytes], count: int) -> np.ndarray:
     """So many bytes; EOFError where there are fewer."""
-    found = np.empty(count, dtype=np.uint8)
-    view, done = found.data, 0
+    buffer = np.empty(count, dtype=np.uint8)
+    view, done = buffer.data, 0
     while done < count:
         more = file.readinto(view[done:])  # type: ignore[attr-defined]
         if not more:
             raise EOFError("the other process is gone")
         done += more
-    return found
+    return buffer
 
 
-def _told(value: Any, arrays: list[np.ndarray]) -> Any:
+def _encoded(value: Any, arrays: list[np.ndarray]) -> Any:
     """A value as JSON; its arrays of numbers are put into the list."""
     if isinstance(value, np.generic):
         value = value.item()
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
     if isinstance(value, dict):
-        return {"table": {str(name): _told(part, arrays) for name, part in value.items()}}
+        return {"table": {str(name): _encoded(part, arrays) for name, part in value.items()}}
     if isinstance(value, (list, tuple)):
-        return {"list": [_told(part, arrays) for part in value]}
+        return {"list": [_encoded(part, arrays) for part in value]}
     if isinstance(value, np.ndarray) and value.dtype.kind in KINDS:
         native = np.ascontiguousarray(value, dtype=value.dtype.newbyteorder("="))
         arrays.append(native)
@@ -90,24 +90,24 @@ def _told(value: Any, arrays: list[np.ndarray]) -> Any:
     raise TypeError(f"it holds {f'an array of {value.dtype}' if isinstance(value, np.ndarray) else type(value)}")
 
 
-def _arrays(told: Any) -> list[tuple[np.dtype, tuple[int, ...]]]:
+def _arrays(node: Any) -> list[tuple[np.dtype, tuple[int, ...]]]:
     """Types and shapes of the arrays that a head names, in its order."""
-    if not isinstance(told, dict):
+    if not isinstance(node, dict):
         return []
-    ((kind, content),) = told.items()
+    ((kind, content),) = node.items()
     if kind == "array":
         name, shape = content
         if not _TYPE.fullmatch(name) or any(type(n) is not int or n < 0 for n in shape):
             raise ValueError(f"an array of {name!r}, {shape!r}")
         return [(np.dtype(name), tuple(shape))]
     parts = content if kind == "list" else content.values() if kind == "table" else ()
-    return [found for part in parts for found in _arrays(part)]
+    return [array for part in parts for array in _arrays(part)]
 
 
-def _value(told: Any, arrays: Any) -> Any:
-    if not isinstance(told, dict):
-        return told
-    ((kind, content),) = told.items()
+def _value(node: Any, arrays: Any) -> Any:
+    if not isinstance(node, dict):
+        return node
+    ((kind, content),) = node.items()
     if kind == "array":
         return next(arrays)
     if kind == "texts":

@@ -47,7 +47,7 @@ class FileShape(Part):
     """A surface from a file that meshio reads: STL, VTK, PLY, OBJ; of volume meshes their boundary."""
 
     type: Literal["file"]
-    file: str = Field(description="the file, looked for beside the scene")
+    file: str = Field(description="the file, searched for next to the scene")
     unit: Annotated[Length, Positive] = Field(default=1.0, description='length of one unit of the file, as "1 mm"')
     pose: Pose = Field(default=Pose(), description="of the file's axes in the body frame")
 

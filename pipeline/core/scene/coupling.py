@@ -24,37 +24,37 @@ def uncoupled(scene: Scene, asked: Collection[str]) -> tuple[str, ...]:
     table = scene.model_dump(mode="json", exclude_none=True)
     parts = {f"{family}.{name}": part for family in FAMILIES for name, part in table.get(family, {}).items()}
     moving = [name for name, body in scene.body.items() if body.type != "ground"]
-    beside: dict[str, set[str]] = {f"body.{name}": set() for name in moving}
-    for place, part in parts.items():
-        if place.startswith("body."):
+    neighbours: dict[str, set[str]] = {f"body.{name}": set() for name in moving}
+    for part_name, part in parts.items():
+        if part_name.startswith("body."):
             continue
         stems = {text.partition(".")[0] for text in _texts(part)}
         named = {f"body.{n}" for n in stems & set(moving)} | {f"joint.{n}" for n in stems & set(scene.joint)}
-        for other in named - {place}:
-            beside.setdefault(place, set()).add(other)
-            beside.setdefault(other, set()).add(place)
-    ends = [place for place in beside if place.partition(".")[2] in asked]
-    if {place.partition(".")[2] for place in ends} != set(asked):
+        for other in named - {part_name}:
+            neighbours.setdefault(part_name, set()).add(other)
+            neighbours.setdefault(other, set()).add(part_name)
+    ends = [part_name for part_name in neighbours if part_name.partition(".")[2] in asked]
+    if {part_name.partition(".")[2] for part_name in ends} != set(asked):
         return ()
     reached = set(ends)
     while ends:
-        new = beside[ends.pop()] - reached
+        new = neighbours[ends.pop()] - reached
         reached |= new
         ends += new
-    apart = [place for place in parts if place in beside and place not in reached]
-    names = {place.partition(".")[2] for place in apart}
+    uncoupled_parts = [part_name for part_name in parts if part_name in neighbours and part_name not in reached]
+    names = {part_name.partition(".")[2] for part_name in uncoupled_parts}
     spoken = {text.partition(".")[0] for key in SETTINGS if key not in FOLLOWING for text in _texts(table.get(key))}
-    return () if names & spoken else tuple(apart)
+    return () if names & spoken else tuple(uncoupled_parts)
 
 
-def lessened(scene: Scene, apart: Collection[str]) -> Scene:
+def lessened(scene: Scene, removed: Collection[str]) -> Scene:
     """The scene without these parts; the scene itself where there are none."""
-    if not apart:
+    if not removed:
         return scene
     changes: dict[str, Any] = {}
-    for family in dict.fromkeys(place.partition(".")[0] for place in apart):
+    for family in dict.fromkeys(where.partition(".")[0] for where in removed):
         parts = {n: p.model_dump(mode="json", exclude_none=True) for n, p in getattr(scene, family).items()}
-        changes[family] = {n: p for n, p in parts.items() if f"{family}.{n}" not in apart}
+        changes[family] = {n: p for n, p in parts.items() if f"{family}.{n}" not in removed}
     return edited(scene, changes | {key: None for key in FOLLOWING if getattr(scene, key) is not None})
 
 

@@ -1,4 +1,4 @@
-"""The points of a sweep: values of all its parameters, and the places of the scene that take them."""
+"""The points of a sweep: values of all its parameters, and the paths in the scene that take them."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Design:
         """Place of the scene -> value, point by point."""
         combined = (itertools.product if self.grid else zip)(*(axis.values for axis in self.axes))
         return [
-            {place: value for axis, value in zip(self.axes, values, strict=True) for place in axis.places}
+            {where: value for axis, value in zip(self.axes, values, strict=True) for where in axis.places}
             for values in combined
         ]
 
@@ -63,8 +63,8 @@ class Design:
 def design(sweep: Sweep) -> Design:
     """The points of a sweep; the same ones whenever it is asked."""
     if sweep.sample is not None:
-        shares = _shares(sweep.sample, len(sweep.vary)).T
-        axes = [_sampled(sweep, name, share) for name, share in zip(sweep.vary, shares, strict=True)]
+        fractions = _shares(sweep.sample, len(sweep.vary)).T
+        axes = [_sampled(sweep, name, fraction) for name, fraction in zip(sweep.vary, fractions, strict=True)]
         return Design(tuple(axes), grid=False)
     return Design(tuple(_listed(sweep, name) for name in sweep.vary), grid=sweep.combine == "grid")
 
@@ -79,17 +79,17 @@ def _listed(sweep: Sweep, name: str) -> Axis:
     return _numbered(sweep, name, spaced(a, b, parameter.count or 2))
 
 
-def _sampled(sweep: Sweep, name: str, shares: np.ndarray) -> Axis:
+def _sampled(sweep: Sweep, name: str, fractions: np.ndarray) -> Axis:
     """A parameter whose distribution has these shares below each value, shape (points,)."""
     parameter = sweep.vary[name]
     if parameter.mean is not None:
         from scipy.special import ndtri
 
         mean, deviation = parameter.numbers("mean", "deviation")
-        return _numbered(sweep, name, mean + deviation * ndtri(shares))
+        return _numbered(sweep, name, mean + deviation * ndtri(fractions))
     a, b = parameter.numbers("first", "last")
     log = parameter.spacing == "log"
-    return _numbered(sweep, name, a * (b / a) ** shares if log else a + (b - a) * shares)
+    return _numbered(sweep, name, a * (b / a) ** fractions if log else a + (b - a) * fractions)
 
 
 def _numbered(sweep: Sweep, name: str, numbers: np.ndarray) -> Axis:

@@ -131,8 +131,8 @@ def _principal(rows: list[list[float]]) -> list[float]:
         return sorted(rows[k][k] for k in range(3))
     import numpy as np  # here, as in `Pose`: most scenes are checked without it, and commands start in half the time
 
-    found: list[float] = np.linalg.eigvalsh(np.array(rows)).tolist()
-    return found
+    moments: list[float] = np.linalg.eigvalsh(np.array(rows)).tolist()
+    return moments
 
 
 Inertia = Annotated[
@@ -148,7 +148,7 @@ LONGEST_NAME, LONGEST_BYTES = 100, 200
 
 
 def part_name(name: str) -> str:
-    """A part's name that may stand in places such as ``body.FRAME`` and in names of files; ValueError otherwise."""
+    """A part's name that may be part of paths such as ``body.FRAME`` and in names of files; ValueError otherwise."""
     if len(name) > LONGEST_NAME or not re.fullmatch(_NAME, name):
         raise ValueError(f"'{name}' is no name: it is made of up to {LONGEST_NAME} letters, digits, _ and -")
     if len(name.encode()) > LONGEST_BYTES:
@@ -174,7 +174,7 @@ Source = str | dict[str, str]
 class Part(BaseModel):
     """Base of everything a scene may say: frozen, and no unknown keys.
 
-    Modules of parts evaluate their annotations as they stand: as texts each would be compiled by each command.
+    Modules of parts evaluate their annotations as they are: as texts each would be compiled by each command.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
@@ -185,15 +185,15 @@ class Part(BaseModel):
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The schema, with the meanings of keys that the docstring tells."""
+        """The schema, with the meanings of keys from the docstring."""
         from flexclear.pipeline.core.scene.key_descriptions import meanings  # reads docstrings, which only schemas need
 
-        found = handler(core)
-        properties = handler.resolve_ref_schema(found).get("properties", {})
+        schema = handler(core)
+        properties = handler.resolve_ref_schema(schema).get("properties", {})
         for key, meaning in meanings(cls, properties.keys()).items():
             old = properties[key].get("description")
             properties[key]["description"] = f"{meaning}; {old}" if old else meaning
-        return found
+        return schema
 
 
 def given_once(part: Part, ways: tuple[str, ...]) -> None:

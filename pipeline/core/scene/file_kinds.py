@@ -1,4 +1,5 @@
-"""What a TOML file is: a scene, a sweep of one, or a mesh recipe; another kind than wanted is refused with a way on."""
+"""What a TOML file is: a scene, a sweep of one, or a mesh recipe; another kind than requested is refused with a way
+on."""
 
 from __future__ import annotations
 
@@ -24,13 +25,13 @@ USE = {
 
 
 def kind_of_file(table: Mapping[str, Any]) -> str:
-    """SCENE, SWEEP or RECIPE: what most of a file's keys say; SCENE where none tells."""
-    found = {kind: len(keys & set(table)) for kind, keys in TELLING.items()}
-    return max(found, key=lambda kind: found[kind])
+    """SCENE, SWEEP or RECIPE: the kind that most of a file's keys belong to; SCENE where none decides."""
+    matches = {kind: len(keys & set(table)) for kind, keys in TELLING.items()}
+    return max(matches, key=lambda kind: matches[kind])
 
 
-def require_kind(table: Mapping[str, Any], path: Path, wanted: str) -> None:
-    """InputError when the table in a file is of another kind than is wanted."""
+def require_kind(table: Mapping[str, Any], path: Path, requested: str) -> None:
+    """InputError when the table in a file is of another kind than requested."""
     kind = kind_of_file(table)
-    if kind != wanted and (kind != SCENE or TELLING[SCENE] & set(table)):
-        raise InputError(str(path), f"is {kind}, not {wanted}", USE[kind].format(path=path))
+    if kind != requested and (kind != SCENE or TELLING[SCENE] & set(table)):
+        raise InputError(str(path), f"is {kind}, not {requested}", USE[kind].format(path=path))

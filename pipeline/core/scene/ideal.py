@@ -1,4 +1,4 @@
-"""The ideal twin of a scene: clearance or flexibility taken away, everything else as it is."""
+"""The ideal mechanism of a scene: clearance or flexibility taken away, everything else as it is."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 
 #: effects that can be taken away, and how a scene without them is called
 EFFECTS = {"clearance": "without clearance", "flexibility": "rigid"}
-#: joint with clearance -> the joint that holds the same places together without; slots and planes have none
+#: joint with clearance -> the joint that connects the same frames without; slots and planes have none
 WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
 #: keys of a flexible body that a rigid one from the same recipe has, too
 KEPT = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
@@ -31,8 +31,8 @@ def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
             changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[joint.type], "between": list(joint.between)}
     if "flexibility" in effects:
         for name, body in scene.flexible().items():
-            kept = body.model_dump(mode="json", include=set(KEPT), exclude_none=True)
-            changes[f"body.{name}"] = {"type": "rigid", **kept}
+            unchanged = body.model_dump(mode="json", include=set(KEPT), exclude_none=True)
+            changes[f"body.{name}"] = {"type": "rigid", **unchanged}
     if not changes:
         raise InputError(
             str(scene.path or scene.name),
@@ -51,26 +51,26 @@ def loose(scene: Scene) -> dict[str, Clearance]:
 
 def owned(scene: Scene, left: Collection[str]) -> dict[str, Any]:
     """Edits of what is asked for, where the joints with clearance, or the stops, of these names are taken away."""
-    found: dict[str, Any] = {}
+    keys: dict[str, Any] = {}
     owners = scene.owners()
     if left:
         contacts = tuple(name for name in owners["contact"] if name.partition(".")[0] not in left)
         owners = {**owners, "contact": contacts}
         if not contacts:
-            found["ensemble"] = None
+            keys["ensemble"] = None
         if scene.accuracy is not None:
-            wanted = {
+            requested = {
                 n: w.model_dump(exclude_none=True) for n, w in scene.accuracy.quantities.items() if _has(n, owners)
             }
             rest = scene.accuracy.model_dump(exclude={"quantities"}, exclude_none=True)
-            found["accuracy"] = {**rest, "quantities": wanted} if wanted else None
+            keys["accuracy"] = {**rest, "quantities": requested} if requested else None
         if scene.view is not None and scene.view.watch is not None:
             watched = [name for name in scene.view.watch if _has(name, owners)]
-            found["view.watch"] = watched or None
+            keys["view.watch"] = watched or None
             if not watched:
-                found["view"] = None
-                del found["view.watch"]
-    return found
+                keys["view"] = None
+                del keys["view.watch"]
+    return keys
 
 
 def _has(name: str, owners: dict[str, tuple[str, ...]]) -> bool:

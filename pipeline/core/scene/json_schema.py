@@ -1,7 +1,7 @@
 """JSON schemas of scene files, for editors that complete and check while one types.
 
 A file may say less than a whole scene: with `extends` it only says what differs, and under `set` parts may be given in
-part.  What stands in a file may be text with a unit wherever a number is meant; the loader knows which unit fits.
+part.  What is in a file may be text with a unit wherever a number is meant; the loader knows which unit fits.
 """
 
 from __future__ import annotations
@@ -13,32 +13,32 @@ from flexclear.pipeline.core.scene.load import FAMILIES, SETTINGS
 from flexclear.pipeline.core.scene.schema import Scene
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
-#: definitions of parts of which only some keys are given, beside those of whole parts
+#: definitions of parts of which only some keys are given, next to those of whole parts
 PARTIAL = "Partial"
 
 
 def scene_schema() -> dict[str, Any]:
     """The schema of a scene file, with everything by which it may edit another."""
-    found = Scene.model_json_schema(mode="validation")
-    definitions, properties = found["$defs"], found["properties"]
-    required = found.pop("required")
+    schema = Scene.model_json_schema(mode="validation")
+    definitions, properties = schema["$defs"], schema["properties"]
+    required = schema.pop("required")
     definitions["Accuracy"] = _accuracy(definitions["Accuracy"])
     for name in list(definitions):
         definitions[PARTIAL + name] = _partial(definitions[name])
     properties["extends"] = {"type": "string", "description": "scene file that this one edits, relative to it"}
-    properties["replace"] = _edit("parts put in the place of others; nothing of the old ones stays", properties)
+    properties["replace"] = _edit("parts put instead of others; nothing of the old ones stays", properties)
     properties["set"] = _edit("keys that change in parts and settings; the others stay", properties, SETTINGS)
     properties["set"]["properties"] = {k: _partial(p) for k, p in properties["set"]["properties"].items()}
     properties["remove"] = {
         "type": "array",
         "items": {"type": "string"},
-        "description": 'places that are taken away, such as "joint.A1"',
+        "description": 'paths that are taken away, such as "joint.A1"',
     }
-    found |= {
+    schema |= {
         "if": {"not": {"required": ["extends"]}},
         "then": {"required": required, **{"properties": dict.fromkeys(("replace", "set", "remove"), False)}},
     }
-    return identified(found, "scene")
+    return identified(schema, "scene")
 
 
 def identified(schema: dict[str, Any], kind: str) -> dict[str, Any]:
@@ -55,8 +55,8 @@ def _accuracy(flat: dict[str, Any]) -> dict[str, Any]:
     """A file writes quantities as they are, nested or quoted, not below a key of their own."""
     value = {"type": ["number", "string", "object"], "description": '"1 um", "0.1 %", or { relative = 1e-6 }'}
     settings = {name: flat["properties"][name] for name in ("source", "allow_missed")}
-    told = flat.get("description", "")
-    return {"type": "object", "description": told, "properties": settings, "additionalProperties": value}
+    description = flat.get("description", "")
+    return {"type": "object", "description": description, "properties": settings, "additionalProperties": value}
 
 
 def _partial(node: Any) -> Any:
@@ -69,7 +69,7 @@ def _partial(node: Any) -> Any:
     for key, value in node.items():
         if key in ("required", "discriminator", "minProperties"):
             continue
-        if key == "oneOf":  # without what tells them apart, several may fit
+        if key == "oneOf":  # without what distinguishes them, several may fit
             key = "anyOf"
         result[key] = value.replace("#/$defs/", f"#/$defs/{PARTIAL}") if key == "$ref" else _partial(value)
     return result

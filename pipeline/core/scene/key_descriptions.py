@@ -8,7 +8,7 @@ from collections.abc import Collection
 
 
 def meanings(part: type, keys: Collection[str]) -> dict[str, str]:
-    """Meaning of each of the keys that a class, or one that it is made from, tells of in its docstring.
+    """Meaning of each of the keys that a class, or one that it is made from, describes in its docstring.
 
     >>> class Pin:
     ...     '''A pin.  radius: outer one.  from, to: its ends [m], of which
@@ -16,20 +16,20 @@ def meanings(part: type, keys: Collection[str]) -> dict[str, str]:
     >>> meanings(Pin, ["radius", "from", "to", "colour"])["from"]
     'its ends [m], of which the second is free'
     """
-    found: dict[str, str] = {}
+    descriptions: dict[str, str] = {}
     for owner in reversed(part.__mro__):
-        found |= _told(" ".join(inspect.cleandoc(owner.__dict__.get("__doc__") or "").split()), keys)
-    return found
+        descriptions |= _descriptions(" ".join(inspect.cleandoc(owner.__dict__.get("__doc__") or "").split()), keys)
+    return descriptions
 
 
-def _told(text: str, keys: Collection[str]) -> dict[str, str]:
+def _descriptions(text: str, keys: Collection[str]) -> dict[str, str]:
     if not keys:
         return {}
     one = "(?:" + "|".join(re.escape(key) for key in sorted(keys, key=len, reverse=True)) + ")"
     marks = list(re.finditer(rf"(?:^|(?<=[.;:] ))({one}(?:, {one}| and {one})*)( \[[^\]]*\])?: ", text))
     ends = [mark.start() for mark in marks[1:]] + [len(text)]
-    found: dict[str, str] = {}
+    descriptions: dict[str, str] = {}
     for mark, end in zip(marks, ends, strict=False):
         words = text[mark.end() : end].strip().removesuffix(".").removesuffix(";") + (mark[2] or "")
-        found |= dict.fromkeys(re.split(", | and ", mark[1]), words)
-    return found
+        descriptions |= dict.fromkeys(re.split(", | and ", mark[1]), words)
+    return descriptions

@@ -1,6 +1,6 @@
 """Laws of time: what a prescribed coordinate, or the size of a load, does. One language for drives and loads.
 
-The values of a law are lengths, angles, forces or torques, as the place where it stands demands;
+The values of a law are lengths, angles, forces or torques, as the quantity that it prescribes demands;
 a bare number is in SI units. How a law of type 'step' goes is in `pipeline.dynamics.drives.step`.
 """
 
@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, mo
 from flexclear.pipeline.core.scene.fields import Angle, Part, Rate, Time
 from flexclear.pipeline.core.units import UNITS, any_quantity, quantity, unit
 
-_TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits where the law stands"}
+_TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits the quantity"}
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]
 
 
@@ -32,7 +32,7 @@ Times: TypeAlias = Annotated[tuple[Time, ...], _LIST]
 LARGEST_TABLE = 16 << 20
 #: most coefficients of a polynomial law
 COEFFICIENTS = 8
-#: most steps of one law, and pieces of laws that are made of others: each is looked at beside all others
+#: most steps of one law, and pieces of laws that are made of others: each is examined next to all others
 MOST_STEPS, MOST_PIECES = 5_000, 200_000
 #: most pieces of a sum times its laws, each of which is evaluated at the start of each piece
 MOST_SUMMED = 1_000_000
@@ -81,7 +81,7 @@ class Step(Part):
 
 
 def _coefficient(value: Any) -> Any:
-    """A number, or text with a unit; which one belongs there is known where the law stands."""
+    """A number, or text with a unit; which one belongs there is known where the law is."""
     if isinstance(value, str) and not any(character.isalpha() for character in value):
         return quantity(value, "number")
     return value if isinstance(value, str) else quantity(value, "number")
@@ -150,7 +150,7 @@ class Spline(Part):
 
 
 class Column(Part):
-    """A column of a table: its header, or its number from 1, and the unit of what stands there.
+    """A column of a table: its header, or its number from 1, and the unit of what is there.
 
     column: header, or number from 1.  unit: of the numbers in the column.
     """
@@ -167,7 +167,7 @@ class Column(Part):
 
 
 class Table(Part):
-    """A spline through the rows of a CSV file, looked for beside the scene and in the folders above it.
+    """A spline through the rows of a CSV file, searched for next to the scene and in the folders above it.
 
     The file is read with the scene: `points` are its numbers, time in seconds, values in their column's unit.
     file: name of the CSV file.  time, value: columns of the times and of the values.  degree: of the spline, 3 or 5.
@@ -185,7 +185,7 @@ class Table(Part):
     @model_validator(mode="before")
     @classmethod
     def _read(cls, data: Any) -> Any:
-        """Read the file unless its numbers are there; afterwards only its name is kept."""
+        """Read the file unless its numbers are there; afterwards only its name is stored."""
         if not isinstance(data, dict) or "points" in data or not isinstance(data.get("file"), str):
             return data
         if not isinstance(data.get("time"), dict) or not isinstance(data.get("value"), dict):
@@ -301,8 +301,8 @@ def _count(law: Any) -> int:
 
 def _check_count(law: Any) -> None:
     if _count(law) > MOST_PIECES:
-        told = f"{min(_count(law), 10**300):.6g}"
-        raise ValueError(f"it is made of {told} pieces, at each of which integration stops: at most {MOST_PIECES}")
+        text = f"{min(_count(law), 10**300):.6g}"
+        raise ValueError(f"it is made of {text} pieces, at each of which integration stops: at most {MOST_PIECES}")
 
 
 def law_types(node: object) -> Iterator[str]:
@@ -338,15 +338,15 @@ def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list
     return points
 
 
-def _column(path: Path, header: list[str], rows: list[list[str]], wanted: object) -> int:
-    if isinstance(wanted, int) and not isinstance(wanted, bool):
-        if rows and not 1 <= wanted <= len(rows[0]):
-            raise ValueError(f"{path.name} has {len(rows[0])} columns, no column {wanted}")
-        return wanted - 1
-    if wanted not in header:
+def _column(path: Path, header: list[str], rows: list[list[str]], requested: object) -> int:
+    if isinstance(requested, int) and not isinstance(requested, bool):
+        if rows and not 1 <= requested <= len(rows[0]):
+            raise ValueError(f"{path.name} has {len(rows[0])} columns, no column {requested}")
+        return requested - 1
+    if requested not in header:
         known = ", ".join(header) or "it has no header; give the column's number"
-        raise ValueError(f"{path.name} has no column '{wanted}'; known: {known}")
-    return header.index(str(wanted))
+        raise ValueError(f"{path.name} has no column '{requested}'; known: {known}")
+    return header.index(str(requested))
 
 
 def _is_number(cell: str) -> bool:

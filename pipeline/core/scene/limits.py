@@ -17,10 +17,10 @@ _SIZE = re.compile(r"(\d{1,15}(?:\.\d{1,15})?) ?([kMGT]?B)")
 def _bytes(value: Any) -> Any:
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         return value
-    found = _SIZE.fullmatch(value.strip()) if isinstance(value, str) else None
-    if found is None:
+    match = _SIZE.fullmatch(value.strip()) if isinstance(value, str) else None
+    if match is None:
         raise ValueError(f"expected a size such as '4 GB', in {', '.join(_UNITS)}")
-    return float(found[1]) * _UNITS[found[2]]
+    return float(match[1]) * _UNITS[match[2]]
 
 
 _TEXT = {"type": "string", "description": "size such as '4 GB'"}
@@ -48,7 +48,7 @@ class Limits(Part):
 
     @property
     def time_words(self) -> str:
-        """What is told when the time is over."""
+        """The message when the time is over."""
         return f"it has taken the {self.time or 0.0:.6g} s that limits.time allows"
 
     def written(self) -> dict[str, Any]:
@@ -65,11 +65,11 @@ def check_rows(rows: float, interval: float, limits: Limits) -> None:
         )
 
 
-def check_members(members: int, limits: Limits, place: str = "[ensemble.members]") -> None:
+def check_members(members: int, limits: Limits, where: str = "[ensemble.members]") -> None:
     """ResourceError when an ensemble is to have more members than it may."""
     if members > limits.members:
-        told = f"{min(members, 10**300):.6g}"  # a whole number may be beyond any float
-        raise ResourceError(f"{place}: {told} are more than the {limits.members} that limits.members allows")
+        text = f"{min(members, 10**300):.6g}"  # a whole number may be beyond any float
+        raise ResourceError(f"{where}: {text} are more than the {limits.members} that limits.members allows")
 
 
 def check_parts(table: dict[str, Any], path: Path, families: tuple[str, ...]) -> None:
@@ -94,5 +94,5 @@ def check_cells(shape: Any, elements: Any, limits: Limits, recipe: Path) -> None
         given = cells if isinstance(cells, list) else list(cells.values()) if isinstance(cells, dict) else given
     count = prod(max(n, 1) for n in given if isinstance(n, int)) if given else 0
     if count > limits.cells:
-        told = f"{min(count, 10**300):.3g}"  # a whole number may be beyond any float
-        raise ResourceError(f"{recipe}: {told} cells are more than the {limits.cells} that limits.cells allows")
+        text = f"{min(count, 10**300):.3g}"  # a whole number may be beyond any float
+        raise ResourceError(f"{recipe}: {text} cells are more than the {limits.cells} that limits.cells allows")

@@ -1,6 +1,6 @@
-"""Where in a TOML file a place like ``body.rod.mesh`` is written: errors then name the line.
+"""Where in a TOML file a path like ``body.rod.mesh`` is written: errors then name the line.
 
-The reader of the standard library tells no lines, so that keys are looked for in the text.
+The reader of the standard library gives no line numbers, so that keys are searched for in the text.
 """
 
 from __future__ import annotations
@@ -17,25 +17,25 @@ _DOTTED = rf"{_KEY}(?:[ \t]*\.[ \t]*{_KEY})*"
 _HEADER = re.compile(rf"^[ \t]*\[\[?[ \t]*({_DOTTED})[ \t]*\]\]?[ \t]*(?:#.*)?$")
 _VALUE = re.compile(rf"^[ \t]*({_DOTTED})[ \t]*=")
 _PLACE = re.compile(r"^(?P<file>.+\.toml) \[(?P<keys>[^\[\]]+)\]$")
-#: tables of edits that a place may stand below
+#: tables of edits that a path may stand below
 EDITS: tuple[tuple[str, ...], ...] = ((), ("replace",), ("set",))
 
 
 def located(error: InputError) -> InputError:
-    """The error with the line of its place behind the place, where a file has it; of several, each."""
+    """The error with the line of its path behind the path, where a file has it; of several, each."""
     if isinstance(error, InputErrors):
         return InputErrors([located(one) for one in error.errors])
-    found = where(error)
-    if found is None:
+    position = where(error)
+    if position is None:
         return error
-    file, line = found
+    file, line = position
     said = _PLACE.match(error.place)
     other = "" if said is None or Path(said["file"]).resolve() == file.resolve() else f" of {file}"
     return InputError(f"{error.place}, line {line}{other}", error.problem, error.remedy)
 
 
 def where(error: InputError) -> tuple[Path, int] | None:
-    """File and line of an error's place; the place may be written in a scene that its file extends."""
+    """File and line of an error's path; the path may be written in a scene that its file extends."""
     said = _PLACE.match(error.place)
     if said is None:
         return None
@@ -47,7 +47,7 @@ def _found(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[
         extends, lines = _read(file.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError):
         return None
-    # the part itself: of a place below it, the nearest key that is written out
+    # the part itself: of a path below it, the nearest key that is written out
     for length in range(len(keys), min(len(keys), 2) - 1, -1):
         for edit in EDITS:
             if (*edit, *keys[:length]) in lines:
@@ -61,13 +61,13 @@ def _found(file: Path, keys: tuple[str, ...], above: tuple[Path, ...]) -> tuple[
 
 @lru_cache(maxsize=16)
 def _read(text: str) -> tuple[object, dict[tuple[str, ...], int]]:
-    """What a text extends, and its lines; many mistakes are looked for in one text."""
+    """What a text extends, and its lines; many mistakes are searched for in one text."""
     return tomllib.loads(text).get("extends"), written(text)
 
 
 def written(text: str) -> dict[tuple[str, ...], int]:
     """The line on which each key of a TOML text is first written, tables included."""
-    found: dict[tuple[str, ...], int] = {}
+    lines_of: dict[tuple[str, ...], int] = {}
     table: tuple[str, ...] = ()
     quote = ""
     for number, line in enumerate(text.splitlines(), start=1):
@@ -82,8 +82,8 @@ def written(text: str) -> dict[tuple[str, ...], int]:
             keys = (*table, *_keys(value[1]))
             quote = next((q for q in ('"""', "'''") if line.count(q) == 1), "")
         for length in range(1, len(keys) + 1):
-            found.setdefault(keys[:length], number)
-    return found
+            lines_of.setdefault(keys[:length], number)
+    return lines_of
 
 
 def _keys(dotted: str) -> tuple[str, ...]:

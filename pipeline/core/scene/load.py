@@ -32,7 +32,7 @@ _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
 DEEP = re.compile(rf"(?<![\w\\-])(?:{_PART}[ \t]*+\.[ \t]*+){{50}}")
 #: scenes that extend each other in a row; each is read, and what it extends is copied
 LONGEST_CHAIN = 50
-#: keys of parts that name files, which are looked for where the scene is
+#: keys of parts that name files, which are searched for where the scene is
 FILES = ("mesh", "file")
 EDITS = ("extends", "replace", "set", "remove")
 
@@ -40,14 +40,14 @@ EDITS = ("extends", "replace", "set", "remove")
 def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
     """The scene in a TOML file, with everything that it extends.
 
-    override: dotted place -> value, e.g. ``{"joint.A1.clearance": "0.2 mm"}``; the place's parent
+    override: dotted path -> value, e.g. ``{"joint.A1.clearance": "0.2 mm"}``; the path's parent
     must be there.  Raises InputError (all mistakes at once).
     """
     path = Path(path)
     name = scene_name(path)
     table = compose(path)
-    for place, value in (override or {}).items():
-        _put(table, place, value, f"override of {path}")
+    for where, value in (override or {}).items():
+        _put(table, where, value, f"override of {path}")
     _absolute_files(table, path)
     check_parts(table, path, FAMILIES)
     scene = _read(table, path)
@@ -61,49 +61,50 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
 
     override and errors as of `load_scene`.  Its name is its title's.
     """
-    place = Path("scene")
-    found = copy.deepcopy(dict(table))
-    _require_tables(found, place)
-    if any(key in found for key in EDITS):
+    origin = Path("scene")
+    copied = copy.deepcopy(dict(table))
+    _require_tables(copied, origin)
+    if any(key in copied for key in EDITS):
         raise InputError("scene", "edits another scene, which only files do", "use edited(scene, changes)")
-    _absolute_files(found, Path.cwd() / place)
+    _absolute_files(copied, Path.cwd() / origin)
     for key, value in (override or {}).items():
-        _put(found, key, value, "override of scene")
-    check_parts(found, place, FAMILIES)
-    scene = _read(found, place)
+        _put(copied, key, value, "override of scene")
+    check_parts(copied, origin, FAMILIES)
+    scene = _read(copied, origin)
     name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
     scene._name = f"{name}-scene" if portable.is_device(name) else name
     return scene
 
 
 def edited(scene: Scene, override: Mapping[str, object]) -> Scene:
-    """A copy of a scene with dotted places changed, as in `load_scene`; None takes a setting, a part or a key away.
+    """A copy of a scene with dotted paths changed, as in `load_scene`; None takes a setting, a part or a key away.
 
     Raises InputError for a part or key that is not there; a setting may be missing already.
     """
     table = scene.model_dump(mode="json", exclude_none=True)
-    for place, value in override.items():
+    for where, value in override.items():
         if value is not None:
-            _put(table, place, value, f"edit of {scene.name}")
-        elif "." in place:
-            owner, last = _find(table, place, f"edit of {scene.name}")
+            _put(table, where, value, f"edit of {scene.name}")
+        elif "." in where:
+            owner, last = _find(table, where, f"edit of {scene.name}")
             del owner[last]
         else:
-            table.pop(place, None)
+            table.pop(where, None)
     _absolute_files(table, scene._path or Path.cwd() / "scene")
     result = _read(table, Path(scene.name))
     result._name, result._path = scene._name, scene._path
     return result
 
 
-def _read(table: dict[str, Any], place: Path) -> Scene:
-    """The scene that a table says; mistakes, and what asks for more than `[limits]` allows, are told of this place."""
+def _read(table: dict[str, Any], where: Path) -> Scene:
+    """The scene that a table says; mistakes, and what asks for more than `[limits]` allows, are reported of this
+    path."""
     try:
         return Scene.model_validate(table)
     except ValidationError as error:
-        raise input_errors(place, error, Scene) from None
+        raise input_errors(where, error, Scene) from None
     except ResourceError as error:
-        raise ResourceError(f"{place} {error}") from None
+        raise ResourceError(f"{where} {error}") from None
 
 
 def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
@@ -112,8 +113,8 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
     For many edits of one scene.  Raises InputError as `edited` does.
     """
     changed: dict[tuple[str, str], dict[str, object]] = {}
-    for place, value in override.items():
-        family, _, rest = place.partition(".")
+    for where, value in override.items():
+        family, _, rest = where.partition(".")
         name, _, key = rest.partition(".") if family in FAMILIES else ("", "", rest)
         names_file = key.rpartition(".")[2] in FILES or any(_tables(value))
         if value is None or not key or names_file or (family not in FAMILIES and family not in SETTINGS):
@@ -133,7 +134,7 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
             result = result.model_copy(update={family: whole})
             result.check()
         except (ValidationError, InputError, ResourceError, ValueError):
-            return edited(scene, override)  # which tells what is wrong, with its place
+            return edited(scene, override)  # which reports what is wrong, and where
     return result
 
 
@@ -219,8 +220,8 @@ def _require_tables(table: dict[str, Any], path: Path) -> None:
                     f"write [{prefix}{family}.NAME]",
                 )
     removed = table.get("remove", [])
-    if not isinstance(removed, list) or not all(isinstance(place, str) for place in removed):
-        raise InputError(f"{path} [remove]", f"is a list of places, not {removed!r}", 'write remove = ["joint.A1"]')
+    if not isinstance(removed, list) or not all(isinstance(where, str) for where in removed):
+        raise InputError(f"{path} [remove]", f"is a list of paths, not {removed!r}", 'write remove = ["joint.A1"]')
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -238,8 +239,8 @@ def read_toml(path: Path) -> dict[str, Any]:
         text = path.read_text(encoding="utf-8-sig")
         if DEEP.search(text):
             raise InputError(str(path), "nests tables too deeply to be read: a key has more than 50 parts")
-        found: dict[str, Any] = _copied(_parsed(text))
-        return found
+        content: dict[str, Any] = _copied(_parsed(text))
+        return content
     except FileNotFoundError:
         raise InputError(str(path), "there is no such file", _neighbours(path)) from None
     except UnicodeDecodeError as error:
@@ -276,8 +277,8 @@ def _neighbours(path: Path) -> str | None:
 
 def _edited(result: dict[str, Any], table: dict[str, Any], path: Path) -> dict[str, Any]:
     """What a table makes of the one that it extends, which is changed."""
-    for place in table.get("remove", []):
-        parent, key = _find(result, place, f"{path} [remove]")
+    for where in table.get("remove", []):
+        parent, key = _find(result, where, f"{path} [remove]")
         del parent[key]
     for edit in ("replace", "set"):
         for family, parts in table.get(edit, {}).items():
@@ -332,9 +333,9 @@ def _add_parts(result: dict[str, Any], family: str, parts: dict[str, Any], path:
         there[name] = part
 
 
-def _find(table: Any, place: object, where: str) -> tuple[Any, Any]:
-    """The table or list that holds a place, and its last key; entries of lists are numbered from 0."""
-    keys = str(place).split(".")
+def _find(table: Any, path: object, where: str) -> tuple[Any, Any]:
+    """The table or list that holds a path, and its last key; entries of lists are numbered from 0."""
+    keys = str(path).split(".")
     for depth, name in enumerate(keys):
         key = _entry(table, name)
         if key is None:
@@ -354,8 +355,8 @@ def _entry(table: Any, name: str) -> str | int | None:
     return int(name) if isinstance(table, list) and name.isdecimal() and int(name) < len(table) else None
 
 
-def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
-    parent, _, key = place.rpartition(".")
+def _put(table: dict[str, Any], path: str, value: object, where: str) -> None:
+    parent, _, key = path.rpartition(".")
     if parent in SETTINGS:
         table.setdefault(parent, {})
     owner: Any = table
@@ -363,7 +364,7 @@ def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
         above, last = _find(table, parent, where)
         owner = above[last]
     if isinstance(owner, list):
-        owner, last = _find(table, place, where)
+        owner, last = _find(table, path, where)
         owner[last] = value
     elif isinstance(owner, dict):
         owner[key] = value
@@ -372,22 +373,22 @@ def _put(table: dict[str, Any], place: str, value: object, where: str) -> None:
 
 
 def _absolute_files(table: dict[str, Any], path: Path) -> None:
-    """Recipes, tables and shapes are looked for beside the scene, then in each folder above it."""
+    """Recipes, tables and shapes are searched for next to the scene, then in each folder above it."""
 
-    def found(name: str) -> str:
+    def absolute(name: str) -> str:
         return str(next((p for p in (folder / name for folder in path.parents) if is_file(p)), path.parent / name))
 
     for body in table.get("body", {}).values():
         mesh = body.get("mesh") if isinstance(body, dict) else None
         if isinstance(mesh, str) and not Path(mesh).is_absolute():
-            body["mesh"] = found(mesh)
+            body["mesh"] = absolute(mesh)
         for shape in body.get("geometry") or () if isinstance(body, dict) else ():
             file = shape.get("file") if isinstance(shape, dict) else None
             if isinstance(file, str) and not Path(file).is_absolute():
-                shape["file"] = found(file)
+                shape["file"] = absolute(file)
     for law in _tables([table.get("drive"), table.get("load")]):
         if not Path(law["file"]).is_absolute():
-            law["file"] = found(law["file"])
+            law["file"] = absolute(law["file"])
 
 
 def _tables(node: object) -> Iterator[dict[str, Any]]:

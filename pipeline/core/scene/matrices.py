@@ -46,8 +46,8 @@ def _checked(rows: list[list[float]], what: str) -> Matrix:
     """The matrix, symmetric to the last digit; ValueError unless it is symmetric and positive semidefinite."""
     sizes = [math.sqrt(abs(rows[k][k])) for k in range(6)]
     for j, i in combinations(range(6), 2):
-        apart = abs(rows[i][j] - rows[j][i])
-        if apart > _ROUNDING * max(abs(rows[i][j]), abs(rows[j][i]), sizes[i] * sizes[j]):
+        asymmetry = abs(rows[i][j] - rows[j][i])
+        if asymmetry > _ROUNDING * max(abs(rows[i][j]), abs(rows[j][i]), sizes[i] * sizes[j]):
             raise ValueError(
                 f"a {what} matrix must be symmetric; the entries between {_DIRECTIONS[i]} and {_DIRECTIONS[j]} are "
                 f"{rows[i][j]:g} and {rows[j][i]:g}"

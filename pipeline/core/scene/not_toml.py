@@ -13,7 +13,7 @@ LONGEST = 300
 _LINE = re.compile(r"\(at line (\d+)")
 _PLACE = re.compile(r" \(at (?:line \d+, column \d+|end of document)\)$")
 _OTHER = "names with other characters than letters A to z, digits, - and _ stand in quotation marks"
-#: text in quotation marks, or a comment, both left alone; or a number and what stands after it like a unit
+#: text in quotation marks, or a comment, both left alone; or a number and what is after it like a unit
 _PARTS = re.compile(
     r"""("[^"]*"|'[^']*'|\#.*)"""
     r"""|(?<![\w.])([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)[ \t]*"""
@@ -23,12 +23,12 @@ _PARTS = re.compile(
 
 def not_toml(path: Path, text: str, message: str) -> InputError:
     """The error of a file with this text, which the reader of TOML refuses with this message."""
-    found, lines = _LINE.search(message), text.splitlines()
-    number = int(found[1]) if found else 0
+    match, lines = _LINE.search(message), text.splitlines()
+    number = int(match[1]) if match else 0
     line = lines[number - 1] if 0 < number <= len(lines) else ""
-    place = f"{path}, line {number}" if number else str(path)
+    where = f"{path}, line {number}" if number else str(path)
     problem, hint = _guessed(line) or _said(message, line)
-    return InputError(place, f"is not TOML: {problem}", hint)
+    return InputError(where, f"is not TOML: {problem}", hint)
 
 
 def _guessed(line: str) -> tuple[str, str] | None:
@@ -55,7 +55,7 @@ def _guessed(line: str) -> tuple[str, str] | None:
 
 
 def _said(message: str, line: str) -> tuple[str, str | None]:
-    """The reader's own message without its place, and a hint where it needs one."""
+    """The reader's own message without its path, and a hint where it needs one."""
     text = _PLACE.sub("", message)
     twice = re.match(r"Cannot declare \((.*?),?\) twice", text)
     if twice:
@@ -66,7 +66,7 @@ def _said(message: str, line: str) -> tuple[str, str | None]:
     if text == "Cannot overwrite a value":
         return f"a key is given twice: {line.strip()}", "take one of the two away"
     if "key part" in text and line.strip().endswith("{"):
-        return f"{text}: {line.strip()}", "a table in { } stands on one line; longer ones have a [heading] of their own"
+        return f"{text}: {line.strip()}", "a table in { } is on one line; longer ones have a [heading] of their own"
     if "Unclosed" in text or "Expected ']'" in text:
         hint = _OTHER if _odd_name(line) else "close each bracket, with commas between entries"
         return f"{text}: {line.strip()}", hint

@@ -33,15 +33,15 @@ OF_CONTACTS = {
 }
 #: reductions that need the quantity at all output times, and those whose value has no direction
 THROUGHOUT, MAGNITUDES = ("largest", "rms", "mean", "series"), ("largest", "rms")
-#: quantities that are looked at once in each period: a contact that happens to be open then tells nothing by its force
+#: quantities that are examined once in each period: a contact that happens to be open then says nothing by its force
 OF_SECTIONS = ("position", "orientation", "velocity", "angular_velocity")
 #: quantities with one component
 SCALARS = ("drive_force",)
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
-    """A quantity and the reduction of it that is kept."""
+class Recorded:
+    """A quantity and the reduction of it that is recorded."""
 
     quantity: Quantity
     reduction: str
@@ -80,17 +80,17 @@ def reductions(kind: str) -> dict[str, str]:
     return OF_CONTACTS.get(kind, without)
 
 
-def parse_kept(text: str, owners: Mapping[str, Collection[str]]) -> Kept:
+def parse_recorded(text: str, owners: Mapping[str, Collection[str]]) -> Recorded:
     """What is called `text`; the reduction may be left out where a quantity has one only.
 
-    owners: as of `wanted.parse`.  Raises ValueError that names what could have been meant.
+    owners: as of `requested.parse`.  Raises ValueError that names what could have been meant.
     """
     head, _, last = text.rpartition(".")
     if last in KINDS:
         only = list(reductions(last))
         if len(only) > 1:
             raise ValueError(f"what of '{text}' is kept? write {' or '.join(f'{text}.{name}' for name in only)}")
-        return Kept(parse(text, owners), only[0])
+        return Recorded(parse(text, owners), only[0])
     if head.rpartition(".")[2] not in KINDS:
         raise ValueError(
             f"'{text}' is no quantity: write <owner>.<quantity>.<reduction>, as in 'platform.velocity.largest' "
@@ -100,4 +100,4 @@ def parse_kept(text: str, owners: Mapping[str, Collection[str]]) -> Kept:
     known = reductions(quantity.kind)
     if last not in known:
         raise ValueError(f"'{quantity.name}' has no '{last}' ({suggestion(last, list(known))})")
-    return Kept(quantity, last)
+    return Recorded(quantity, last)

@@ -29,7 +29,7 @@ Positive = Field(gt=0.0)
 class Ground(Seen):
     """The fixed world; listed only to give it frames.
 
-    frames: named places in the world.
+    frames: named frames fixed in the world.
     """
 
     type: Literal["ground"]
@@ -39,8 +39,8 @@ class Ground(Seen):
 class RigidBody(Seen):
     """Mass, centre of mass and inertia about it, all in the body frame.
 
-    mass: mass of the body.  com: centre of mass in the body frame.  frames: named places on the body, in the body
-    frame.
+    mass: mass of the body.  com: centre of mass in the body frame.  frames: named points with axes on the body, in the
+    body frame.
     """
 
     type: Literal["rigid"]
@@ -71,9 +71,9 @@ class Modes(Part):
 
     count: number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete
     basis; 0 makes a rigid body with the recipe's mass and inertia.
-    up_to: highest frequency of the normal modes that are kept, e.g. "5000 Hz".
-    compliance: least share of the static compliance between the interfaces, in each of the six directions.
-    mass: least share of the body's mass that moves with the basis, in each direction.
+    up_to: highest frequency of the retained normal modes, e.g. "5000 Hz".
+    compliance: least fraction of the static compliance between the interfaces, in each of the six directions.
+    mass: least fraction of the body's mass that moves with the basis, in each direction.
     interfaces: the recipe's frames that a basis is built for; default: the recipe's own list.
     held: motions held by the reference "constrained", as "top.rz": frame and x, y, z, rx, ry or rz in its axes.
     of: the reference whose shapes "mean-axis" is based on.
@@ -95,7 +95,7 @@ class Modes(Part):
         given = [name for name in ways if getattr(self, name) is not None]
         if len(given) != 1:
             shown = "nothing does" if not given else f"{' and '.join(given)} do"
-            raise ValueError(f"one of {', '.join(ways)} says how many modes are kept; here {shown}")
+            raise ValueError(f"one of {', '.join(ways)} says how many modes are retained; here {shown}")
         return self
 
 
@@ -130,7 +130,8 @@ class FlexibleBody(Seen):
     pose: start pose of the undeformed mesh frame.
     damping: one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh's; absent means none.
     stiffening: ``{}`` for a beam that turns fast or carries large axial loads; absent means linear shapes.
-    mesh: file of the mesh recipe, relative to the scene.  modes: which elastic coordinates are kept.  velocity: start
+    mesh: file of the mesh recipe, relative to the scene.  modes: which elastic coordinates are retained.  velocity:
+    start
     velocity of the centre of mass, world axes.  angular_velocity: start angular velocity of the body frame, world axes.
     """
 

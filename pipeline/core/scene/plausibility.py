@@ -28,8 +28,8 @@ def _clearances(scene: Scene) -> Iterator[InputError]:
     for name, joint in scene.joint.items():
         if isinstance(joint, (ClearanceRevolute, ClearanceSlot, ClearanceSpherical)) and joint.clearance > joint.radius:
             inner = "ball" if isinstance(joint, ClearanceSpherical) else "pin"
-            told = f"{1e3 * joint.clearance:g} mm is more than the {inner}'s radius, {1e3 * joint.radius:g} mm"
-            yield _odd(scene, f"joint.{name}.clearance", told)
+            text = f"{1e3 * joint.clearance:g} mm is more than the {inner}'s radius, {1e3 * joint.radius:g} mm"
+            yield _odd(scene, f"joint.{name}.clearance", text)
 
 
 def _inertias(scene: Scene) -> Iterator[InputError]:
@@ -47,6 +47,6 @@ def _inertias(scene: Scene) -> Iterator[InputError]:
             )
 
 
-def _odd(scene: Scene, key: str, told: str) -> InputError:
+def _odd(scene: Scene, key: str, text: str) -> InputError:
     where = f"{scene.path} [{key}]" if scene.path is not None else f"[{key}]"
-    return InputError(where, told, 'bare numbers are SI; with a unit they are text, as "0.2 mm" or "100 kg mm^2"')
+    return InputError(where, text, 'bare numbers are SI; with a unit they are text, as "0.2 mm" or "100 kg mm^2"')

@@ -1,4 +1,4 @@
-"""Where values come from: what scenes and recipes say of that in `source`, told by place, or left out."""
+"""Where values come from: what scenes and recipes say of that in `source`, reported by path, or left out."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 
-def told(table: Mapping[str, Any], place: str = "") -> dict[str, str]:
-    """Place -> text of every `source` at and below a table; of the table itself by its place, or by that of its key."""
-    found: dict[str, str] = {}
-    for where, source in _sources(table, place):
-        found |= {where: source} if isinstance(source, str) else {_below(where, key): t for key, t in source.items()}
-    return found
+def sources(table: Mapping[str, Any], path: str = "") -> dict[str, str]:
+    """Place -> text of every `source` at and below a table; of the table itself by its path, or by that of its key."""
+    sources: dict[str, str] = {}
+    for where, source in _sources(table, path):
+        sources |= {where: source} if isinstance(source, str) else {_below(where, key): t for key, t in source.items()}
+    return sources
 
 
 def mistaken(table: Mapping[str, Any]) -> str | None:
@@ -23,26 +23,26 @@ def mistaken(table: Mapping[str, Any]) -> str | None:
     return None
 
 
-def _sources(node: Any, place: str) -> Iterator[tuple[str, Any]]:
-    """Every `source` that is there, with the place of what it is about."""
+def _sources(node: Any, where: str) -> Iterator[tuple[str, Any]]:
+    """Every `source` that is there, with the path of what it is about."""
     if isinstance(node, Mapping):
         if node.get("source") is not None:
-            yield place, node["source"]
+            yield where, node["source"]
         items = ((key, value) for key, value in node.items() if key != "source")
     else:
         items = ((number, value) for number, value in enumerate(node))
     for key, value in items:
         if isinstance(value, (dict, list, tuple)):  # most lists are of numbers
-            yield from _sources(value, _below(place, str(key)))
+            yield from _sources(value, _below(where, str(key)))
 
 
-def _below(place: str, key: str) -> str:
-    return f"{place}.{key}" if place else key
+def _below(where: str, key: str) -> str:
+    return f"{where}.{key}" if where else key
 
 
 def assumed(sources: dict[str, str]) -> dict[str, str]:
     """Those that say ``assumed: why``."""
-    return {place: text for place, text in sources.items() if text.startswith("assumed")}
+    return {where: text for where, text in sources.items() if text.startswith("assumed")}
 
 
 def without(node: Any) -> Any:

@@ -11,26 +11,26 @@ from typing import Any
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import suggestion
 
-#: names of the frames in the mesh recipe of this path; None where that cannot be told
+#: names of the frames in the mesh recipe of this path; None where that cannot be determined
 Recipe = Callable[[str], Collection[str] | None]
 
 
 def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputError]:
-    """Every name in a composed scene table that leads nowhere; `path` opens each place."""
+    """Every name in a composed scene table that leads nowhere; `path` opens each location."""
     frames = {name: _frames(body, recipe) for name, body in _tables(table.get("body"))}
     joints = [name for name, _ in _tables(table.get("joint"))]
-    found: list[InputError] = []
-    for place, name in _named_frames(table):
-        found += _frame(f"{path} [{place}]", name, frames)
-    for place, name in _named_joints(table):
+    errors: list[InputError] = []
+    for where, name in _named_frames(table):
+        errors += _frame(f"{path} [{where}]", name, frames)
+    for where, name in _named_joints(table):
         if name not in joints:
-            found.append(InputError(f"{path} [{place}]", f"there is no joint '{name}'", suggestion(name, joints)))
-    for place, name in _named_bodies(table):
+            errors.append(InputError(f"{path} [{where}]", f"there is no joint '{name}'", suggestion(name, joints)))
+    for where, name in _named_bodies(table):
         if name not in frames:
-            found.append(InputError(f"{path} [{place}]", f"there is no body '{name}'", suggestion(name, frames)))
+            errors.append(InputError(f"{path} [{where}]", f"there is no body '{name}'", suggestion(name, frames)))
     for name, body in _tables(table.get("body")):
-        found += _interfaces(f"{path} [body.{name}.modes", body, frames[name])
-    return found
+        errors += _interfaces(f"{path} [body.{name}.modes", body, frames[name])
+    return errors
 
 
 def _tables(family: object) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -39,33 +39,33 @@ def _tables(family: object) -> Iterator[tuple[str, dict[str, Any]]]:
 
 
 def _frames(body: Mapping[str, Any], recipe: Recipe) -> Collection[str] | None:
-    """Names of a body's frames; None where they cannot be told, which is another mistake than this module's."""
+    """Names of a body's frames; None where they cannot be determined, which is another mistake than this module's."""
     if isinstance(body.get("mesh"), str):
         return recipe(body["mesh"])
     frames = body.get("frames", {})
     return list(frames) if isinstance(frames, dict) else None
 
 
-def _frame(place: str, name: str, frames: Mapping[str, Collection[str] | None]) -> list[InputError]:
+def _frame(where: str, name: str, frames: Mapping[str, Collection[str] | None]) -> list[InputError]:
     body, _, frame = name.partition(".")
     if not frame:
         return []  # it is said elsewhere that a frame is named with its body
     if body not in frames:
-        return [InputError(place, f"'{name}': there is no body '{body}'", suggestion(body, frames))]
+        return [InputError(where, f"'{name}': there is no body '{body}'", suggestion(body, frames))]
     known = frames[body]
     if known is None or frame in known:
         return []
-    return [InputError(place, f"'{name}': body '{body}' has no frame '{frame}'", suggestion(frame, list(known)))]
+    return [InputError(where, f"'{name}': body '{body}' has no frame '{frame}'", suggestion(frame, list(known)))]
 
 
-def _interfaces(place: str, body: Mapping[str, Any], frames: Collection[str] | None) -> list[InputError]:
+def _interfaces(where: str, body: Mapping[str, Any], frames: Collection[str] | None) -> list[InputError]:
     modes = body.get("modes")
     if frames is None or not isinstance(modes, dict):
         return []
     named = [("interfaces", name) for name in _texts(modes.get("interfaces"))]
     named += [("held", name.partition(".")[0]) for name in _texts(modes.get("held"))]
     return [
-        InputError(f"{place}.{key}]", f"the recipe has no frame '{name}'", suggestion(name, list(frames)))
+        InputError(f"{where}.{key}]", f"the recipe has no frame '{name}'", suggestion(name, list(frames)))
         for key, name in named
         if name not in frames
     ]

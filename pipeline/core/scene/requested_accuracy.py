@@ -1,4 +1,4 @@
-"""Quantities of interest by name: what `[accuracy]` may ask for, and what is looked at where nothing is asked.
+"""Quantities of interest by name: what `[accuracy]` may ask for, and what is examined where nothing is asked.
 
 A quantity is ``<owner>.<kind>``, e.g. ``platform.position`` or ``A1.peak_force``. How runs hold them and differ in
 them is known to `pipeline.core.quantities`, which needs NumPy; a command that finds everything fresh does not.

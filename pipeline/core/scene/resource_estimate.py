@@ -12,7 +12,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 ALWAYS, BODY, JOINT, CONTACT, LOAD, MODE = 200, 160, 100, 350, 100, 24
 #: a run is in memory so many times at its end, measured 3.5 to 4.4; and on disk, in the cache and shown
 HELD, KEPT = 4.5, 2.0
-#: of a member of an ensemble only some bodies' motion is kept, at most as often as this
+#: of a member of an ensemble only some bodies' motion is recorded, at most as often as this
 MEMBER_ROWS = 2000
 SPEND = "choose a longer output.interval, or say more in [limits]"
 
@@ -25,8 +25,8 @@ def check_run(scene: Scene, results: Path) -> None:
     machine.require_memory(HELD * need, what, SPEND, scene.limits.memory)
     machine.require_disk(KEPT * need, what, results, SPEND, scene.limits.disk)
     if scene.ensemble is not None:
-        kept = len(scene.ensemble.bodies or scene.contacts() or scene.body)
-        need = scene.ensemble.members * min(rows, MEMBER_ROWS) * kept * BODY
+        n_bodies = len(scene.ensemble.bodies or scene.contacts() or scene.body)
+        need = scene.ensemble.members * min(rows, MEMBER_ROWS) * n_bodies * BODY
         what = f"an ensemble of {scene.ensemble.members} members"
         machine.require_memory(HELD * need, what, "ask for fewer members, or say more in [limits]", scene.limits.memory)
     for name, body in scene.flexible().items():

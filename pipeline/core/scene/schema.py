@@ -36,7 +36,7 @@ from flexclear.pipeline.core.scene.stops import Stop
 from flexclear.pipeline.core.units import quantity
 
 Positive = Field(gt=0.0)
-#: types of joints with one freedom: driving it tells the whole relative motion
+#: types of joints with one freedom: driving it determines the whole relative motion
 SINGLE = ("revolute", "prismatic")
 #: samples of a controller; at each of them a step ends
 MOST_SAMPLES = 1e6
@@ -61,7 +61,7 @@ class TimeSpan(Part):
 class Ensemble(Part):
     """Members that start with the ball of every clearance joint offset in a random direction.
 
-    bodies: whose motion is kept; default: the bodies that carry the clearance joints.
+    bodies: whose motion is recorded; default: the bodies that carry the clearance joints.
     members: how many runs.  perturbation: by which length the balls are offset.  seed: of the random directions.
     """
 
@@ -75,10 +75,11 @@ class Sections(Part):
     """A motion that its laws repeat, looked at once in each period: see ``flexclear sections``.
 
     period: of the laws of drives and loads, from the run's start on; without it the run is one period.
-    phase: when in the period the motion is looked at [s].  transient: periods that are not kept, before the `periods`
-    that are.  exponent_periods: how many of these are followed by a neighbour too, which tells the rate at which
-    motions part.  bodies: whose motion is kept; default: as of an ensemble, or all without clearance.
-    periods: that are kept.
+    phase: when in the period the motion is examined [s].  transient: periods that are not recorded, before the
+    `periods`
+    that are.  exponent_periods: how many of these are followed by a neighbour too, which gives the rate at which
+    motions part.  bodies: whose motion is recorded; default: as of an ensemble, or all without clearance.
+    periods: that are recorded.
     """
 
     period: Annotated[Time, Field(gt=0.0)] | None = None
@@ -89,10 +90,10 @@ class Sections(Part):
     bodies: tuple[str, ...] | None = None
 
 
-class Wanted(Part):
-    """A wanted accuracy: absolute in SI, or relative to the quantity's own size.
+class Request(Part):
+    """A requested accuracy: absolute in SI, or relative to the quantity's own size.
 
-    absolute: in the SI unit of the quantity.  relative: share of the largest change of the quantity.
+    absolute: in the SI unit of the quantity.  relative: fraction of the largest change of the quantity.
     """
 
     absolute: Annotated[Number, Field(gt=0.0)] | None = None
@@ -100,17 +101,18 @@ class Wanted(Part):
 
 
 class Accuracy(Part):
-    """Wanted accuracy of the time integration per quantity, e.g. ``platform.position = "1 um"``.
+    """Requested accuracy of the time integration per quantity, e.g. ``platform.position = "1 um"``.
 
-    The value is an absolute one with a unit (or bare, in SI), or a share like ``"0.1 %"`` or
+    The value is an absolute one with a unit (or bare, in SI), or a fraction like ``"0.1 %"`` or
     ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities:
     `pipeline.core.scene.requested_accuracy`.
     quantities: a file writes them without this key.
-    allow_missed: what is missed is told either way, and the run kept; without this the command ends with an error.
+    allow_missed: what is missed is reported either way, and the run is stored; without this the command ends with an
+    error.
     by_need: whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step.
     """
 
-    quantities: dict[str, Wanted] = Field(default_factory=dict)
+    quantities: dict[str, Request] = Field(default_factory=dict)
     allow_missed: bool = False
     by_need: bool | None = None
 
@@ -120,13 +122,13 @@ class Accuracy(Part):
         plain = {"allow_missed", "by_need", "source"}
         if not isinstance(table, dict) or set(table) <= {"quantities"} | plain:
             return table
-        wanted = {name: value for name, value in table.items() if name not in plain}
-        found = {name: _wanted(name, value) for name, value in _leaves(wanted, "")}
-        return {"quantities": found} | {name: table[name] for name in plain & set(table)}
+        requested = {name: value for name, value in table.items() if name not in plain}
+        accuracies = {name: _requested(name, value) for name, value in _leaves(requested, "")}
+        return {"quantities": accuracies} | {name: table[name] for name in plain & set(table)}
 
 
 class View(Part):
-    """What is looked at; no effect on the motion.
+    """What is examined; no effect on the motion.
 
     watch: quantities that comparisons, error tables and films show, as ``platform.position`` or ``A1.peak_force``;
     default: those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts.
@@ -161,26 +163,26 @@ class View(Part):
         return self
 
 
-def _leaves(table: dict[str, Any], place: str) -> list[tuple[str, Any]]:
+def _leaves(table: dict[str, Any], where: str) -> list[tuple[str, Any]]:
     """Dotted name -> value, of nested tables or quoted names alike."""
-    found = []
+    leaves = []
     for key, value in table.items():
-        name = f"{place}.{key}".lstrip(".")
+        name = f"{where}.{key}".lstrip(".")
         if isinstance(value, dict) and not set(value) <= {"absolute", "relative"}:
-            found += _leaves(value, name)
+            leaves += _leaves(value, name)
         elif name != "source":
-            found.append((name, value))
-    return found
+            leaves.append((name, value))
+    return leaves
 
 
-def _wanted(name: str, value: Any) -> Any:
+def _requested(name: str, value: Any) -> Any:
     if isinstance(value, dict):
         return value
     if isinstance(value, str) and value.rstrip().endswith("%"):
         return {"relative": quantity(value, "number")}
     kind = KINDS.get(name.rpartition(".")[2])
     if kind is None:
-        return {"absolute": 1.0}  # the scene, which knows its parts, tells what could have been meant
+        return {"absolute": 1.0}  # the scene, which knows its parts, names what could have been meant
     problems = []
     for dimension in kind.dimensions:
         try:
@@ -198,8 +200,8 @@ class Scene(Part):
     name.  stop: ends of joint coordinates by name.  gear: coupled joint coordinates by name.  time: begin and end of
     the run.  start: how the run begins, beyond poses and velocities of bodies.  solver: integrator and tolerance.
     output: what is recorded.  ensemble: runs from nearby starts.  sections: repeated motion, looked at once in each
-    period.  accuracy: wanted accuracy by quantity.  limits: what the work may take of the machine.  view: what pictures
-    and comparisons look at.
+    period.  accuracy: requested accuracy by quantity.  limits: what the work may take of the machine.  view: what
+    pictures and comparisons look at.
     """
 
     title: str
@@ -239,11 +241,11 @@ class Scene(Part):
     def _quantities_are_there(self) -> None:
         named = [("accuracy.", name) for name in (self.accuracy.quantities if self.accuracy else ())]
         named += [("view.watch: ", name) for name in (self.view and self.view.watch) or ()]
-        for place, name in named:
+        for where, name in named:
             try:
                 parse(name, self.owners())
             except ValueError as error:
-                raise ValueError(f"{place}{name}: {error}") from None
+                raise ValueError(f"{where}{name}: {error}") from None
 
     def _stressed_bodies_are_flexible(self) -> None:
         for name in self.output.stress or ():
@@ -253,17 +255,17 @@ class Scene(Part):
 
     def _bodies_have_files_of_their_own(self) -> None:
         """Results are sent from one system to another: meshes and modes of bodies are files called by their names."""
-        found: dict[str, str] = {}
+        names: dict[str, str] = {}
         for name in self.recipes():
             if portable.is_device(name):
                 raise ValueError(
                     f"body.{name}: '{name}' is a device on Windows, and files are called by this name: give it another"
                 )
-            other = found.setdefault(portable.folded(name), name)
+            other = names.setdefault(portable.folded(name), name)
             if other != name:
                 raise ValueError(
                     f"body.{name}: is called as '{other}' but for capitals or accents, which names of files on Windows "
-                    "and macOS do not tell apart: give it another"
+                    "and macOS do not distinguish: give it another"
                 )
 
     @model_validator(mode="before")
@@ -303,7 +305,7 @@ class Scene(Part):
             "contact": tuple([*self.contacts(), *self.stop_ends()]),
         }
 
-    def wanted(self) -> list[Quantity]:
+    def requested(self) -> list[Quantity]:
         """The quantities that `[accuracy]` names; without it the usual ones."""
         if self.accuracy is not None and self.accuracy.quantities:
             return [parse(name, self.owners()) for name in self.accuracy.quantities]
@@ -322,21 +324,21 @@ class Scene(Part):
     def _prescribed(self) -> set[str]:
         """Rigid bodies whose motion drives tell: from the ground on by fixed joints and driven ones of one freedom."""
         driven = {getattr(drive, "joint", None) for drive in self.drive.values()}
-        told = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
+        prescribed = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
         known = {name for name, body in self.body.items() if isinstance(body, Ground)}
-        found = set(known)
-        for _ in told:
-            for joint in told:
+        known_bodies = set(known)
+        for _ in prescribed:
+            for joint in prescribed:
                 pair = {frame.partition(".")[0] for frame in joint.between}
-                if pair & found:
-                    found |= {name for name in pair if not isinstance(self.body.get(name), FlexibleBody)}
-        return found - known
+                if pair & known_bodies:
+                    known_bodies |= {name for name in pair if not isinstance(self.body.get(name), FlexibleBody)}
+        return known_bodies - known
 
     def watched(self) -> list[Quantity]:
-        """The quantities that are looked at: those that `[view]` names, else as `wanted`."""
+        """The quantities that are examined: those that `[view]` names, else as `requested`."""
         if self.view is not None and self.view.watch is not None:
             return [parse(name, self.owners()) for name in self.view.watch]
-        return self.wanted()
+        return self.requested()
 
     def _hosts(self) -> dict[str, str]:
         """For every moving body the body that it is fixed to, or itself."""
@@ -424,8 +426,8 @@ class Scene(Part):
 
     def sources(self) -> dict[str, str]:
         """Where each value comes from: ``part.key`` (or ``part``) -> text."""
-        found = provenance.told(self.model_dump())
-        return {place or "scene": text for place, text in found.items()}
+        given = provenance.sources(self.model_dump())
+        return {where or "scene": text for where, text in given.items()}
 
     def assumptions(self) -> dict[str, str]:
         """The sources that say ``assumed: why``."""

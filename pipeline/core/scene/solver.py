@@ -14,7 +14,8 @@ class Stepping(Part):
     """What all integrators have.
 
     rtol: relative tolerance; of the steps where they are chosen, and always of loop closures and Newton iterations.
-    ledger_tolerance: largest energy error of a run, as a share of the energy that it turns over; default 1e5 rtol, but
+    ledger_tolerance: largest energy error of a run, as a fraction of the energy that it turns over; default 1e5 rtol,
+    but
         from 1e-4 to 1e-3, where the error chooses the steps (1e-3 of methods that damp by their order: that of
         generalized-alpha is 2), and 0.1 for fixed steps.
     evaluations: most right-hand sides of one run.  step: present means steps of this length.

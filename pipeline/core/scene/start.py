@@ -17,8 +17,8 @@ Measure = float | str
 class JointStart(Part):
     """Start of one joint coordinate; its unit, where text gives one, is that of the coordinate or of its rate.
 
-    position: where it starts, kept.  near: of several ways to assemble the mechanism, the one in which it is nearest to
-    this; without the poses of bodies it is also where the assembly is looked for.  velocity: its rate.
+    position: where it starts, exactly.  near: of several ways to assemble the mechanism, the one in which it is closest
+    to this; without the poses of bodies it is also where the assembly is searched for.  velocity: its rate.
     """
 
     position: Measure | None = None
@@ -35,7 +35,7 @@ class JointStart(Part):
 
 
 def _coordinates(value: Any) -> Any:
-    """A joint with one coordinate need not name it; the empty name stands for it."""
+    """A joint with one coordinate need not name it; the empty name represents it."""
     if isinstance(value, Mapping) and (not value or set(value) & {*KEYS, "source"}):
         return {"": value}
     return value

@@ -1,4 +1,4 @@
-"""A sweep: one scene, what is varied in it, and what is kept of every point. See docs/sweeps.md."""
+"""A sweep: one scene, what is varied in it, and what is recorded of every point. See docs/sweeps.md."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Parameter(Part):
 
     values: one by one.  from, to: a range, of `count` points in a grid; in samples a uniform distribution.
     spacing: of a range; `log` needs ends of one sign.  mean, deviation: of a normal distribution, in samples.
-    places: the places of the scene that all take the value; default: the parameter's name.
+    places: the paths in the scene that all take the value; default: the parameter's name.
     count: points of a range in a grid.
     """
 
@@ -96,11 +96,11 @@ class Parameter(Part):
 
 def number_and_unit(value: Any) -> tuple[float, str]:
     """SI value and SI unit of a number, or of text with a unit; ValueError in words."""
-    found = any_quantity(value)
-    if isinstance(found, str):
-        number, _, unit = found.partition(" ")
+    quantity = any_quantity(value)
+    if isinstance(quantity, str):
+        number, _, unit = quantity.partition(" ")
         return float(number), unit
-    return found, ""
+    return quantity, ""
 
 
 class Sample(Part):
@@ -119,10 +119,10 @@ class Sweep(Part):
     """Everything that a sweep file says.
 
     scene: a scene file, or the name of one below scenes/.  set: changes of the scene that hold at all points.
-    vary: parameters by name; the name is a place of the scene unless `places` says which ones.
+    vary: parameters by name; the name is a path in the scene unless `places` says which ones.
     combine: every value with every other (grid), or the first values, the second ones and so on (list).
-    keep: what is kept of each point, see `pipeline.core.scene.output_quantities`.
-    members: starts of each point that differ by a hair (`[ensemble]` of the scene); mean and deviation are kept.
+    keep: what is recorded of each point, see `pipeline.core.scene.output_quantities`.
+    members: starts of each point that differ by a hair (`[ensemble]` of the scene); mean and deviation are recorded.
     error: run each point at a hundredth of its tolerance as well, and keep the differences.
     title: what it is, in a line.  description: more words.  sample: points spread over all parameters, instead of a
     grid.
@@ -158,9 +158,9 @@ class Sweep(Part):
                 raise ValueError(f"vary.{name}: a range needs its count where there is no [sample]")
         lengths = {name: self.length(name) for name in self.vary}
         if self.combine == "list" and len(set(lengths.values())) > 1:
-            told = ", ".join(f"{name} {n}" for name, n in lengths.items())
+            text = ", ".join(f"{name} {n}" for name, n in lengths.items())
             raise ValueError(
-                f"combine: parameters that go together must have as many values as each other; here {told}"
+                f"combine: parameters that go together must have as many values as each other; here {text}"
             )
         points = 1
         for n in lengths.values() if self.combine == "grid" else list(lengths.values())[:1]:
@@ -177,10 +177,10 @@ class Sweep(Part):
                 raise ValueError(f"vary.{name}: results have a dimension '{name}' already; choose another name")
             if not name.strip() or "/" in name or not name.isprintable():
                 raise ValueError(f"vary.{name}: is no name of a dimension; choose one without slashes")
-            for place in self.places(name):
-                if place in seen:
-                    raise ValueError(f"vary.{name}: '{place}' is varied by '{seen[place]}' already")
-                seen[place] = name
+            for where in self.places(name):
+                if where in seen:
+                    raise ValueError(f"vary.{name}: '{where}' is varied by '{seen[where]}' already")
+                seen[where] = name
         return self
 
     def _check_sample(self) -> None:
@@ -193,7 +193,7 @@ class Sweep(Part):
                 raise ValueError(f"vary.{name}: in a [sample] write from and to without count, or mean and deviation")
 
     def places(self, name: str) -> tuple[str, ...]:
-        """The places of the scene that a parameter sets."""
+        """The paths in the scene that a parameter sets."""
         return self.vary[name].places or (name,)
 
     def length(self, name: str) -> int:

@@ -1,4 +1,5 @@
-"""What is wrong with a scene file, in words: pydantic's findings as input errors with place, value, rule and remedy."""
+"""What is wrong with a scene file, in words: pydantic's findings as input errors with location, value, rule and
+remedy."""
 
 from __future__ import annotations
 
@@ -37,13 +38,13 @@ CHOOSING = ("type", "law")
 #: bounds of numbers, whose messages hold the bound
 BOUNDS = ("greater_than", "greater_than_equal", "less_than", "less_than_equal")
 
-#: a message of a whole scene that opens with the place that it is about
+#: a message of a whole scene that opens with the path that it is about
 _NAMED = re.compile(r"([a-z_]+(?:\.[\w-]+)+): ")
 
-#: how pydantic calls, in a place, the alternative of a number or text that a validator reads
+#: how pydantic calls, in a path, the alternative of a number or text that a validator reads
 VALIDATORS = ("function-", "constrained-", "literal[")
 
-#: models that are chosen otherwise than by their type -> how pydantic calls them in a place
+#: models that are chosen otherwise than by their type -> how pydantic calls them in a path
 TAGS = {
     "MeshedRigidBody": ("meshed",),
     "JointDrive": ("joint-drive",),
@@ -56,19 +57,19 @@ TAGS = {
 
 
 def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel]) -> InputErrors:
-    """Everything that pydantic found in a file that should be a `model`."""
+    """All validation errors of a file that should be a `model`."""
     places: dict[str, list[tuple[str, InputError]]] = {}
     for e in error.errors(include_url=False)[:MOST]:
-        found = _input_error(path, e, model)
-        places.setdefault(found.place, []).append((e["type"], found))
-    unique = {str(found): found for there in places.values() for found in _nearest(there)}
+        invalid = _input_error(path, e, model)
+        places.setdefault(invalid.place, []).append((e["type"], invalid))
+    unique = {str(e): e for there in places.values() for e in _nearest(there)}
     return InputErrors(list(unique.values()))
 
 
 def _nearest(there: list[tuple[str, InputError]]) -> list[InputError]:
-    """What to tell of one place: where there are alternatives, only what is wrong with those of the value's kind."""
-    fitting = [found for kind, found in there if kind not in OTHER_KIND]
-    others = {found.problem: found for kind, found in there if kind in OTHER_KIND}
+    """What to describe one place: where there are alternatives, only what is wrong with those of the value's kind."""
+    fitting = [candidate for kind, candidate in there if kind not in OTHER_KIND]
+    others = {candidate.problem: candidate for kind, candidate in there if kind in OTHER_KIND}
     if fitting or len(others) < 2:
         return fitting or list(others.values())
     problems = [problem.partition(" (got ") for problem in others]
@@ -81,10 +82,10 @@ def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputE
     keys, known, types = _place(model, error["loc"])
     message, remedy = EXPECTED.get(kind) or _reworded(error), None
     if kind == "extra_forbidden":
-        near = [key for key in known if key != keys[-1]]
+        candidates = [key for key in known if key != keys[-1]]
         if len(keys) == 1 and isinstance(value, dict):
-            near = [key for key in near if key not in ("title", "description", "source")]  # no tables
-        remedy = suggestion(str(keys[-1]), near)
+            candidates = [key for key in candidates if key not in ("title", "description", "source")]  # no tables
+        remedy = suggestion(str(keys[-1]), candidates)
     elif not keys and kind == "value_error" and (named := _NAMED.match(message)):
         keys, message = [named[1]], message[named.end() :]
     elif kind == "union_tag_not_found":
@@ -92,14 +93,14 @@ def _input_error(path: Path | str, error: Any, model: type[BaseModel]) -> InputE
     elif kind == "union_tag_invalid":
         keys, value = [*keys, _choosing(context)], context["tag"]
         message, remedy = f"there is no such {keys[-1]}", suggestion(str(value), types)
-    place = ".".join(str(key) for key in keys if key != "[key]")
-    told = isinstance(value, (str, int, float)) and kind not in ("missing", "union_tag_not_found")
-    shown = f" (got {value!r})" if told and (kind in BOUNDS or repr(value) not in message) else ""
-    return InputError(f"{path} [{place}]" if place else str(path), f"{message}{shown}", remedy)
+    where = ".".join(str(key) for key in keys if key != "[key]")
+    shows_value = isinstance(value, (str, int, float)) and kind not in ("missing", "union_tag_not_found")
+    shown = f" (got {value!r})" if shows_value and (kind in BOUNDS or repr(value) not in message) else ""
+    return InputError(f"{path} [{where}]" if where else str(path), f"{message}{shown}", remedy)
 
 
 def _choosing(context: dict[str, Any]) -> str:
-    """The key by which pydantic looks for the right model; chosen by several keys, a part is told by its type."""
+    """The key by which pydantic searches for the right model; chosen by several keys, a part is given by its type."""
     key = str(context.get("discriminator", "")).strip("'")
     return key if key in CHOOSING else "type"
 
@@ -114,22 +115,22 @@ def _reworded(error: Any) -> str:
 
 
 def _place(model: type[BaseModel], loc: tuple[Any, ...]) -> tuple[list[Any], list[str], list[str]]:
-    """Keys of a place as the file has them, the keys that are known beside its last one, and the types it may have.
+    """Keys of a path as the file has them, the keys that are known next to its last one, and the types it may have.
 
-    pydantic puts the type by which it chose a part's model into the place; the file has no such key.
+    pydantic puts the type by which it chose a part's model into the path; the file has no such key.
     """
-    keys, here, beside = list[Any](), [model], list[str]()
+    keys, here, known_keys = list[Any](), [model], list[str]()
     for key in loc:
-        inner = [found for a in here for found in _inside(a, key)]
+        inner = [candidate for a in here for candidate in _inside(a, key)]
         if inner:
             keys.append(key)
-            beside, here = _keys(here), inner
+            known_keys, here = _keys(here), inner
         elif any(_chosen_by(a, key) for a in here):
             here = [a for a in here if _chosen_by(a, key)]
         elif any(_is_model(a) for a in here) and not str(key).startswith(VALIDATORS):
             keys.append(key)
-            beside, here = _keys(here), []
-    return keys, beside, [kind for a in here for kind in _types(a)]
+            known_keys, here = _keys(here), []
+    return keys, known_keys, [kind for a in here for kind in _types(a)]
 
 
 def _alternatives(annotation: Any) -> Iterator[Any]:
@@ -168,8 +169,8 @@ def _keys(alternatives: list[Any]) -> list[str]:
 def _types(alternative: Any) -> tuple[str, ...]:
     """Names by which a part says that it is this one."""
     fields = alternative.model_fields if _is_model(alternative) else {}
-    found = (fields[key].annotation for key in CHOOSING if key in fields)
-    return tuple(name for annotation in found if get_origin(annotation) is Literal for name in get_args(annotation))
+    kinds = (fields[key].annotation for key in CHOOSING if key in fields)
+    return tuple(name for annotation in kinds if get_origin(annotation) is Literal for name in get_args(annotation))
 
 
 def _chosen_by(alternative: Any, tag: Any) -> bool:

@@ -1,6 +1,6 @@
 """Variants of a scene: which of its effects can be taken away, the scene without some of them, and that as a file.
 
-An effect is named by the place that goes with it: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
+An effect is named by the path that goes with it: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
 ``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant differs from its scene by parts
 replaced and removed only, so that it can be written as a file that extends the scene's.
 """
@@ -23,14 +23,14 @@ from flexclear.pipeline.core.scene.schema import Scene
 
 #: loads that are effects of the world on a mechanism, not what moves it
 OF_THE_WORLD = ("gravity", "joint-friction")
-#: kinds of effects, as they are told
+#: kinds of effects, as they are reported
 CLEARANCE, FLEXIBILITY = "clearance", "flexibility"
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """One effect of a scene. name: the place that goes with it.  kind: what it is.  within: the effect without which
+    """One effect of a scene. name: the path that goes with it.  kind: what it is.  within: the effect without which
     it is nothing, as friction is without its clearance; else empty."""
 
     name: str
@@ -50,33 +50,33 @@ class Effect:
 
 def effects(scene: Scene) -> tuple[Effect, ...]:
     """The effects of a scene that can be taken away, flexible bodies first, what lies within one right after it."""
-    found = list[Effect]()
+    listed = list[Effect]()
     for name, body in scene.flexible().items():
         whole = Effect(f"body.{name}.modes", FLEXIBILITY)
-        found.append(whole)
+        listed.append(whole)
         for key in ("damping", "stiffening"):
             if getattr(body, key) is not None:
-                found.append(Effect(f"body.{name}.{key}", key, whole.name))
+                listed.append(Effect(f"body.{name}.{key}", key, whole.name))
     for name, joint in scene.contacts().items():
         there = name in loose(scene)
         if there:
-            found.append(Effect(f"joint.{name}.clearance", CLEARANCE))
+            listed.append(Effect(f"joint.{name}.clearance", CLEARANCE))
         if joint.friction is not None:
-            found.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if there else ""))
-    found += [Effect(f"joint.{name}.friction", "friction") for name in scene.rubbing()]
+            listed.append(Effect(f"joint.{name}.friction", "friction", f"joint.{name}.clearance" if there else ""))
+    listed += [Effect(f"joint.{name}.friction", "friction") for name in scene.rubbing()]
     for name, load in scene.load.items():
         if load.type in OF_THE_WORLD:
-            found.append(Effect(f"load.{name}", "gravity" if load.type == "gravity" else "friction"))
-    found += [Effect(f"stop.{name}", "stop") for name in scene.stop]
-    return tuple(found)
+            listed.append(Effect(f"load.{name}", "gravity" if load.type == "gravity" else "friction"))
+    listed += [Effect(f"stop.{name}", "stop") for name in scene.stop]
+    return tuple(listed)
 
 
-def named(scene: Scene, names: Iterable[str], place: str) -> tuple[Effect, ...]:
+def named(scene: Scene, names: Iterable[str], where: str) -> tuple[Effect, ...]:
     """The effects of these names; InputError, with the nearest one, for a name that is none."""
     known = {effect.name: effect for effect in effects(scene)}
     for name in names:
         if name not in known:
-            raise InputError(f"{place} {name}", "is no effect of this scene", suggestion(name, known))
+            raise InputError(f"{where} {name}", "is no effect of this scene", suggestion(name, known))
     return tuple(known[name] for name in names)
 
 
@@ -88,9 +88,9 @@ def without(scene: Scene, gone: Collection[Effect]) -> Scene:
     if not gone:
         return scene
     changes = dict(_changes(scene, gone))
-    removed = [place for place, value in changes.items() if value is None]
-    table = {place: value for place, value in changes.items() if value is not None}
-    for family in dict.fromkeys(place.split(".")[0] for place in removed):
+    removed = [where for where, value in changes.items() if value is None]
+    table = {where: value for where, value in changes.items() if value is not None}
+    for family in dict.fromkeys(where.split(".")[0] for where in removed):
         left = {n: p.model_dump(mode="json", exclude_none=True) for n, p in getattr(scene, family).items()}
         table[family] = {n: p for n, p in left.items() if f"{family}.{n}" not in removed}
     result = edited(scene, table | _settings(scene, gone) | owned(scene, _left(gone)))
@@ -101,15 +101,15 @@ def without(scene: Scene, gone: Collection[Effect]) -> Scene:
 def _settings(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
     """Edits of settings that speak of flexible bodies which are gone: stresses asked for, deformations at the start."""
     rigid = {effect.owner for effect in gone if effect.kind == FLEXIBILITY}
-    found: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     if scene.output.stress is not None and rigid & set(scene.output.stress):
         output = scene.output.model_dump(mode="json", exclude={"stress"}, exclude_none=True)
         left = [name for name in scene.output.stress if name not in rigid]
-        found["output"] = output | ({"stress": left} if left else {})
+        settings["output"] = output | ({"stress": left} if left else {})
     if scene.start is not None and rigid & set(scene.start.modal):
         start = scene.start.model_dump(mode="json", exclude_none=True)
-        found["start"] = start | {"modal": {k: v for k, v in start["modal"].items() if k not in rigid}}
-    return found
+        settings["start"] = start | {"modal": {k: v for k, v in start["modal"].items() if k not in rigid}}
+    return settings
 
 
 def _left(gone: Collection[Effect]) -> frozenset[str]:
@@ -118,8 +118,8 @@ def _left(gone: Collection[Effect]) -> frozenset[str]:
 
 
 def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
-    """Place -> what stands there instead, or None for what is removed."""
-    found: dict[str, Any] = {}
+    """Place -> what is there instead, or None for what is removed."""
+    changes: dict[str, Any] = {}
     places = {effect.name for effect in gone}
     for effect in gone:
         if effect.within in places:
@@ -127,17 +127,17 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
         family, name = effect.name.split(".")[:2]
         part = getattr(scene, family)[name]
         if effect.kind == CLEARANCE:
-            found[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[part.type], "between": list(part.between)}
+            changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[part.type], "between": list(part.between)}
         elif effect.kind == FLEXIBILITY:
-            kept = part.model_dump(mode="json", include=set(KEPT), exclude_none=True)
-            found[f"body.{name}"] = {"type": "rigid", **kept}
+            unchanged = part.model_dump(mode="json", include=set(KEPT), exclude_none=True)
+            changes[f"body.{name}"] = {"type": "rigid", **unchanged}
         elif effect.name.count(".") == 1:
-            found[effect.name] = None
+            changes[effect.name] = None
         else:
             key = effect.name.split(".")[2]
-            table = found.get(f"{family}.{name}") or part.model_dump(mode="json", exclude_none=True)
-            found[f"{family}.{name}"] = {k: v for k, v in table.items() if k != key}
-    return found
+            table = changes.get(f"{family}.{name}") or part.model_dump(mode="json", exclude_none=True)
+            changes[f"{family}.{name}"] = {k: v for k, v in table.items() if k != key}
+    return changes
 
 
 def with_modes(scene: Scene, counts: Mapping[str, int]) -> Scene:
@@ -153,7 +153,7 @@ def with_modes(scene: Scene, counts: Mapping[str, int]) -> Scene:
 def text(scene: Scene, planned: Scene, extends: str, comments: Iterable[str] = ()) -> str:
     """The file of a variant: it extends the scene's, and says of parts and settings only what differs.
 
-    Parts are replaced or removed; of a setting that differs the whole table stands.  comments: lines at its head.
+    Parts are replaced or removed; of a setting that differs the whole table is.  comments: lines at its head.
     """
     lines = [f"# {line}" for line in comments]
     lines += [f"extends = {json.dumps(extends)}", f"title = {json.dumps(planned.title, ensure_ascii=False)}"]

@@ -16,24 +16,24 @@ from flexclear.pipeline.core.system import cores, started
 __all__ = ["cores", "free", "meanwhile", "side_by_side", "tell", "width"]
 
 Result = TypeVar("Result")
-#: how long a thread is waited for before this one listens to the keyboard [s]: some systems interrupt no wait
+#: how long a thread is awaited before this one listens to the keyboard [s]: some systems interrupt no wait
 TICK = 0.1
-#: threads beside other tasks, which will end and leave their cores: so many, where there are as many cores
+#: threads while other tasks run, which will end and leave their cores: so many, where there are as many cores
 BESIDE = 4
 
-_told: bool | None = None
+_others_idle: bool | None = None
 
 
 def tell(others_idle: bool) -> None:
     """In a worker, with each task: whether nothing else can run while it does."""
-    global _told
-    _told = others_idle
+    global _others_idle
+    _others_idle = others_idle
 
 
 def free() -> bool:
     """Whether a processor is free, for all that this program knows; in workers of another program none is."""
     known = sys.modules.get("multiprocessing.process")  # its workers have imported it; others need not, for 4 ms
-    idle = (known is None or known.parent_process() is None) if _told is None else _told
+    idle = (known is None or known.parent_process() is None) if _others_idle is None else _others_idle
     return idle and cores() > 1
 
 
@@ -48,8 +48,8 @@ def side_by_side(
     """Results of work(0) .. work(count - 1), made in threads: for what is mostly compiled code, which lets others run.
 
     work: is given a progress to call now and then, which ends it when another one has failed or Ctrl-C was pressed.
-    done: told how many are finished.  threads: how many; `width` by default.  Raises what the first one that failed
-    raised.
+    done: receives the number of finished ones.  threads: how many; `width` by default.  Raises the error of the first
+    one that failed.
     """
     from concurrent.futures import CancelledError, ThreadPoolExecutor
 
@@ -81,7 +81,7 @@ class _GivenUpError(Exception):
 def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Result]]:
     """Meanwhile a thread does some work that is mostly compiled code; gives what waits for its result.
 
-    work: is given a progress to call now and then, and while it waits, which ends it when what goes on beside it has
+    work: is given a progress to call now and then, and while it waits, which ends it when what goes on next to it has
     failed.  Where no processor is free, or no thread is to be had, it is done when its result is asked for.  What waits
     raises what the work raised.
     """

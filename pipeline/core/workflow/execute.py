@@ -16,7 +16,7 @@ from flexclear.pipeline.core.workflow.task import ARRAYS, Task, facts, in_order,
 
 @dataclass(frozen=True)
 class State:
-    """Where a task stands. record: its artifact, when it is fresh. why: else the reasons, in words."""
+    """Where a task is. record: its artifact, when it is fresh. why: else the reasons, in words."""
 
     task: Task
     record: Record | None
@@ -44,7 +44,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
     known = _facts(task, inputs, sources)
     plain = key(known)
     with store.lock(task.stage, plain, lambda: progress(None, "waiting for another process that makes the same")):
-        # whoever asked for the task has told its faults
+        # whoever requested the task has reported its faults
         record = Store(store.root).find(task.stage, _with_files(task, known, store)[1])
         if record is None:
             module, _, function = task.run.partition(":")
@@ -54,26 +54,26 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             begun = store.path(task.stage, _with_files(task, known, store)[1], "part")
             with (
                 threads.one(),
-                journal.kept(begun.parent, begun.stem) as kept,
+                journal.storage(begun.parent, begun.stem) as storage,
                 file_dependencies.watched(task.base, outside=(store.root,)) as read,
             ):
                 product = run({**task.params, **task.context}, data, progress)
             known |= _noted(task, plain, read, store)
             record = store.put(task.stage, key(known), product, known)
-            kept.remove()
+            storage.remove()
     store.show(record, task.folder, task.names, task.label)
     return record
 
 
 def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
     """State of each task and all its inputs, inputs first; nothing is run."""
-    found: dict[int, State] = {}
+    states_of: dict[int, State] = {}
     for task in in_order(tasks):
-        above = {name: found[id(t)].record for name, t in task.inputs.items()}
+        above = {name: states_of[id(t)].record for name, t in task.inputs.items()}
         fresh = {name: record for name, record in above.items() if record is not None}
         stale = frozenset(above.keys() - fresh.keys())
-        found[id(task)] = _state(task, fresh, stale, store, sources)
-    return list(found.values())
+        states_of[id(task)] = _state(task, fresh, stale, store, sources)
+    return list(states_of.values())
 
 
 def _state(task: Task, fresh: Mapping[str, Record], stale: frozenset[str], store: Store, sources: Sources) -> State:
@@ -111,7 +111,8 @@ def _with_files(task: Task, known: Mapping[str, str], store: Store) -> tuple[Map
 
 
 def _noted(task: Task, plain: str, read: Mapping[str, str], store: Store) -> dict[str, str]:
-    """Facts of the files that were opened now, and of others that once were; their names are kept for the next time."""
+    """Facts of the files that were opened now, and of others that once were; their names are stored for the next
+    time."""
     names = set(store.names(task.stage, plain))
     if not names >= read.keys():
         store.keep_names(task.stage, plain, sorted(names | read.keys()))

@@ -9,7 +9,7 @@ import time
 
 from flexclear.pipeline.core import system
 
-#: where the system sends none, the parent is looked for so often [s]
+#: where the system sends none, the parent is searched for so often [s]
 LOOK = 1.0
 
 

@@ -1,7 +1,7 @@
 """Which files a task opens: what they hold decides its result, so it is among the facts of its key.
 
-Taken from what was opened, not from a list: formats have companions (`b.node` beside `b.ele`) that only their reader
-knows. Python tells of every file that it opens; what a library in C opens is noted by whoever calls that
+Taken from what was opened, not from a list: formats have companions (`b.node` next to `b.ele`) that only their reader
+knows. Python reports every file that it opens; what a library in C opens is noted by whoever calls that
 library (`note`).
 """
 
@@ -24,7 +24,7 @@ from typing import Any
 from flexclear.pipeline.core.artifacts.paths import kernel_root
 from flexclear.pipeline.core.errors import ResourceError
 
-#: what stands in the facts for a file that is not there, and for what is no file
+#: what is in the facts for a file that is not there, and for what is no file
 ABSENT, SPECIAL = "absent", "no file"
 #: code counts by module and by library, see `fingerprint`
 CODE = (".py", ".pyc", ".so", ".pyd", ".pth")
@@ -65,7 +65,8 @@ class Opened:
         # Matplotlib's list of fonts, in a temporary folder where the home folder cannot be written
         if name.startswith(os.environ.get("MPLCONFIGDIR") or "\0"):
             return True
-        # where modules are looked for there may be archives, which need not be there; editable installs add bare names
+        # where modules are searched for there may be archives, which need not be there; editable installs add bare
+        # names
         return name in map(os.path.abspath, sys.path)
 
 
@@ -74,19 +75,19 @@ _ordinary = False
 
 
 def note(path: Path) -> None:
-    """A file is about to be read in a way that Python does not tell of."""
+    """A file is about to be read in a way that Python does not report."""
     if _current is not None:
         _current.see(path, writing=False)
 
 
-def told(read: Mapping[str, str], base: Path) -> None:
+def add(read: Mapping[str, str], base: Path) -> None:
     """Files that another process has read for this one, as its `watched` found them.
 
     Raises ResourceError where such a file was another one when this process read it itself.
     """
     if _current is not None:
-        for place, then in read.items():
-            _current.learn(os.path.normpath(base / place), then)
+        for file, then in read.items():
+            _current.learn(os.path.normpath(base / file), then)
 
 
 @contextmanager
@@ -115,11 +116,11 @@ def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]
     global _current
     _listen()
     places = (*_system(), *(str(folder) for folder in (kernel_root(), *outside)))
-    found: dict[str, str] = {}
+    watched_files: dict[str, str] = {}
     before, _current = _current, Opened(tuple(f"{place.rstrip(os.sep)}{os.sep}" for place in places))
     seen = _current
     try:
-        yield found
+        yield watched_files
     finally:
         _current = before
     temporary = tempfile.gettempdir()
@@ -129,11 +130,11 @@ def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]
             continue  # the process's own: made by a task, or by a library for itself
         if now != then:
             raise changed(name)
-        found[_place(name, base)] = then
+        watched_files[_place(name, base)] = then
 
 
 def changed(name: str) -> ResourceError:
-    """What is told of a file that was not the same all the time."""
+    """Message about a file that was not the same all the time."""
     return ResourceError(f"{name} changed while it was read; run again")
 
 
@@ -146,7 +147,7 @@ def _place(name: str, base: Path) -> str:
 
 
 def digests(names: Iterable[str], base: Path) -> dict[str, str]:
-    """What the files of these places hold now, as `watched` tells it."""
+    """Content of the files in these folders, as `watched` gives it."""
     return {name: digest(os.path.normpath(base / name)) for name in names}
 
 
@@ -161,14 +162,14 @@ def digest(path: str) -> str:
         return ABSENT
 
 
-def facts(found: Mapping[str, str]) -> dict[str, str]:
+def facts(file_digests: Mapping[str, str]) -> dict[str, str]:
     """As facts of a key."""
-    return {f"file {name}": value for name, value in sorted(found.items())}
+    return {f"file {name}": value for name, value in sorted(file_digests.items())}
 
 
 @cache
 def _listen() -> None:
-    """From now on Python tells of what it opens; a hook cannot be taken away again."""
+    """From now on Python reports what it opens; a hook cannot be taken away again."""
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
         if event == "open" and _ordinary:
@@ -198,7 +199,7 @@ def _system() -> tuple[str, ...]:
     state = os.environ.get("XDG_CACHE_HOME"), os.environ.get("XDG_CONFIG_HOME")
     paths = sysconfig.get_paths()  # not its prefix: an environment may be the folder of a project itself
     own = {paths[name] for name in ("stdlib", "platstdlib", "purelib", "platlib", "scripts")}
-    own |= {os.path.realpath(place) for place in own}
+    own |= {os.path.realpath(folder) for folder in own}
     system = (
         "/proc",
         "/sys",

@@ -93,33 +93,33 @@ class Sources:
 
         Raises LookupError for a root that is no module of the tree.
         """
-        wanted = frozenset(roots)
-        if wanted not in self.closures:
+        requested = frozenset(roots)
+        if requested not in self.closures:
             self._remember()
             known = dict(self.imports)
-            self.closures[wanted] = self._reach(wanted)
-            for name, module in self.closures[wanted].items():
+            self.closures[requested] = self._reach(requested)
+            for name, module in self.closures[requested].items():
                 if self.imports.get(name, [""])[0] != module.text:
                     self.imports[name] = (module.text, module.digest, sorted(module.own), sorted(module.libraries))
             if self.memo is not None and self.imports != known:
                 with contextlib.suppress(OSError):
                     publish(self.memo, checked(self.imports))
-        return self.closures[wanted]
+        return self.closures[requested]
 
     def code(self, roots: Iterable[str]) -> dict[str, str]:
         """Facts of the code that `roots` reach, by kind and name: digests of modules, versions of libraries.
 
         Many tasks share them: they are not to be changed.
         """
-        wanted = frozenset(roots)
-        if wanted not in self.codes:
-            closure = self.closure(wanted)
+        requested = frozenset(roots)
+        if requested not in self.codes:
+            closure = self.closure(requested)
             libraries = frozenset().union(*(module.libraries for module in closure.values()))
             counting = {name: module for name, module in closure.items() if name not in WORDING}
-            self.codes[wanted] = {f"module {name}": module.digest for name, module in counting.items()} | {
+            self.codes[requested] = {f"module {name}": module.digest for name, module in counting.items()} | {
                 f"library {name}": version for name, version in library_versions(libraries).items()
             }
-        return self.codes[wanted]
+        return self.codes[requested]
 
     def module(self, name: str) -> Module | None:
         """The module called `name`, or None when there is no such file (an attribute, say)."""
@@ -130,19 +130,19 @@ class Sources:
             self.read[name] = None if path is None else self._parse(path, name)
         return self.read[name]
 
-    def _reach(self, wanted: frozenset[str]) -> dict[str, Module]:
-        found: dict[str, Module] = {}
-        waiting = sorted(wanted)
+    def _reach(self, requested: frozenset[str]) -> dict[str, Module]:
+        modules: dict[str, Module] = {}
+        waiting = sorted(requested)
         for name in waiting:
             if self.module(name) is None:
                 raise LookupError(f"no module {name} under {self.root}")
         while waiting:
             name = waiting.pop()
             module = self.read[name]
-            if name not in found and module is not None:
-                found[name] = module
+            if name not in modules and module is not None:
+                modules[name] = module
                 waiting.extend(self._next(name, module))
-        return found
+        return modules
 
     def _next(self, name: str, module: Module) -> tuple[str, ...]:
         """The modules that one reaches at once: what it imports may be an attribute of a module, and no module."""
@@ -182,9 +182,9 @@ def sources_of(root: Path, memo: Path | None = None) -> Sources:
 def source_file(root: Path, name: str) -> Path | None:
     """The file of the module called `name` in the source tree under `root`, or None when there is none."""
     first, _, rest = name.partition(".")
-    # in a checkout whose links are not followed the packages below `flexclear` stand beside it
+    # in a checkout whose links are not followed the packages below `flexclear` are next to it
     places = [name, *([rest] if first == "flexclear" and rest else [])]
-    # hundreds of modules are looked for by every command: paths as texts take a fifth of the time
+    # hundreds of modules are searched for by every command: paths as texts take a fifth of the time
     bases = [f"{root}{os.sep}{place.replace('.', os.sep)}" for place in places]
     files = (path for base in bases for path in (f"{base}.py", f"{base}{os.sep}__init__.py"))
     return next((Path(path) for path in files if os.path.isfile(path)), None)
@@ -259,7 +259,7 @@ _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def _parsed(source: bytes) -> ast.Module:
-    """The syntax tree. CPython counts in one place how deep all threads are in theirs, and may find that it is wrong.
+    """The syntax tree. CPython has one counter of how deep all threads are in theirs, and may find that it is wrong.
 
     That is so in 3.11 and 3.12 at least (its issue 106905); runs, perturbed runs and members of ensembles are threads.
     """
@@ -297,14 +297,14 @@ def _is_type_checking(test: ast.expr) -> bool:
 @cache
 def library_versions(packages: frozenset[str]) -> dict[str, str]:
     """Versions of the libraries that hold these import packages, and of all that those require in turn."""
-    found = {name: library_version(name) for name in packages}
+    versions = {name: library_version(name) for name in packages}
     waiting = sorted(packages)
     while waiting:
         for name in _required(waiting.pop()):
-            if name not in found and library_version(name) != "absent":
-                found[name] = library_version(name)
+            if name not in versions and library_version(name) != "absent":
+                versions[name] = library_version(name)
                 waiting.append(name)
-    return dict(sorted(found.items()))
+    return dict(sorted(versions.items()))
 
 
 @cache
@@ -312,8 +312,8 @@ def library_version(package: str) -> str:
     """Version of the distribution that holds an import package; 'absent' when it is not installed."""
     metadata = _metadata(package)
     # `importlib.metadata.version` parses the whole description as an e-mail, 5 ms for each library
-    found = metadata and re.search(r"^Version: (.+)$", metadata, re.MULTILINE)
-    return "absent" if metadata is None else found[1].strip() if found else "unknown"
+    match = metadata and re.search(r"^Version: (.+)$", metadata, re.MULTILINE)
+    return "absent" if metadata is None else match[1].strip() if match else "unknown"
 
 
 @cache
@@ -328,9 +328,9 @@ def _metadata(package: str) -> str | None:
     from importlib.metadata import PackageNotFoundError, distribution  # here, since it brings readers of e-mail
 
     try:
-        found = distribution(DISTRIBUTIONS.get(package, package))
+        installed = distribution(DISTRIBUTIONS.get(package, package))
     except PackageNotFoundError:
         return None
-    # in a checkout that is on the path itself, the program's own stands under its older name
-    text = found.read_text("METADATA") or found.read_text("PKG-INFO") or ""
+    # in a checkout that is on the path itself, the program's own is under its older name
+    text = installed.read_text("METADATA") or installed.read_text("PKG-INFO") or ""
     return text.partition("\n\n")[0]  # the rest describes the library

@@ -2,7 +2,8 @@
 
 A task does its work in pieces, one integration each. A piece is named by all that decides it, so that a later
 attempt at the same task asks for the same pieces, in the same order; what it finds, it need not do again. Pieces lie
-beside the artifact that shall come of them, ``cache/<stage>/<key>.<piece>.part``, each with a digest that only its user
+next to the artifact that shall come of them, ``cache/<stage>/<key>.<piece>.part``, each with a digest that only its
+user
 can make, and hold numbers only: arrays and JSON, no code. They go when the artifact is there.
 """
 
@@ -22,8 +23,8 @@ from typing import Any
 from flexclear.pipeline.core.artifacts.disk import publish, read_whole
 from flexclear.pipeline.core.artifacts.seal import same, sealed
 
-#: how often unfinished work is written [s], and the share of the time that writing may take where it is slow
-EVERY, SHARE = 20.0, 0.05
+#: how often unfinished work is written [s], and the fraction of the time that writing may take where it is slow
+EVERY, FRACTION = 20.0, 0.05
 #: what a file of a piece begins with is a digest of so many characters, and a line's end
 DIGEST = 64
 
@@ -76,10 +77,10 @@ class Journal:
         """What an earlier attempt left of a piece; None where there is nothing, or something is damaged."""
         import numpy as np
 
-        found = self._read(name)
-        if found is None:
+        entry = self._read(name)
+        if entry is None:
             return None
-        arrays, notes = found
+        arrays, notes = entry
         chunks, rows = [(int(count), str(digest)) for count, digest in notes["chunks"]], []
         for k, (_, digest) in enumerate(chunks):
             more = self._read(f"{name}-{k}", digest)
@@ -92,8 +93,8 @@ class Journal:
         return State(arrays, notes["notes"], np.concatenate(rows), float(notes["seconds"]))
 
     def due(self, name: str = "") -> bool:
-        """Whether it is time to write; a piece of that name, whenever others were written, as threads do beside it."""
-        return self.clock() - self._saved.get(name, self._written) > max(EVERY, self._took / SHARE)
+        """Whether it is time to write; a piece of that name, whenever others were written, as threads do next to it."""
+        return self.clock() - self._saved.get(name, self._written) > max(EVERY, self._took / FRACTION)
 
     def finish(self, name: str, state: State) -> None:
         """A piece is done; it is written with what is written next."""
@@ -158,9 +159,9 @@ class Journal:
     def _publish(self, name: str, arrays: Mapping[str, Any], notes: Mapping[str, Any]) -> str:
         import numpy as np
 
-        told = np.frombuffer(json.dumps(notes).encode(), np.uint8)
+        encoded = np.frombuffer(json.dumps(notes).encode(), np.uint8)
         buffer = io.BytesIO()
-        np.savez(buffer, allow_pickle=False, notes=told, **arrays)
+        np.savez(buffer, allow_pickle=False, notes=encoded, **arrays)
         content = buffer.getvalue()
         digest = sealed(content)
         publish(self._path(name), digest.encode() + b"\n" + content)
@@ -196,12 +197,12 @@ _current: ContextVar[Journal | None] = ContextVar("journal", default=None)
 
 
 def current() -> Journal | None:
-    """The journal of the task that is worked on; None where nothing is kept."""
+    """The journal of the task that is worked on; None where nothing is stored."""
     return _current.get()
 
 
 @contextlib.contextmanager
-def kept(folder: Path, key: str) -> Iterator[Journal]:
+def storage(folder: Path, key: str) -> Iterator[Journal]:
     """Meanwhile unfinished work is written; whoever has stored what came of it removes it."""
     made = Journal(folder, key)
     before = _current.set(made)
@@ -212,6 +213,6 @@ def kept(folder: Path, key: str) -> Iterator[Journal]:
 
 
 def seconds() -> float:
-    """Processor time of this process [s], as if the work had never been interrupted, and nothing were kept of it."""
+    """Processor time of this process [s], as if the work had never been interrupted, and nothing of it were stored."""
     mine = _current.get()
     return time.process_time() + (mine.restored - mine.aside if mine is not None else 0.0)

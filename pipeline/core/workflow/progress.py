@@ -18,7 +18,7 @@ from flexclear.pipeline.core.log import LOG, write_to
 SPARSE = 10.0
 #: least time between two redraws of the line on a terminal [s]
 REDRAW = 0.1
-#: the rest is estimated from so many samples of the pace at least, each of a share of the work or more
+#: the rest is estimated from so many samples of the pace at least, each of a fraction of the work or more
 SAMPLES, ENOUGH = 3, 0.01
 #: the pace of the last samples counts most: of each earlier one by this factor less
 FADING = 0.8
@@ -32,7 +32,7 @@ class Job:
 
     name: str
     begun: float
-    since: tuple[float, float] | None = None  #: time and done share where the last sample of the pace began
+    since: tuple[float, float] | None = None  #: time and finished fraction where the last sample of the pace began
     samples: list[tuple[float, float]] = field(default_factory=list)  #: seconds, and shares done in them
     fraction: float | None = None
     text: str = ""
@@ -139,12 +139,12 @@ class Monitor:
         return " ".join([*parts, *([job.text] if job.text else [])])
 
     def _pace(self, job: Job) -> float:
-        """Seconds per share; what goes on counts as soon as it is slower than what was before."""
+        """Seconds per fraction; what goes on counts as soon as it is slower than what was before."""
         known = pace(job.samples)
         if job.since is None or job.fraction is None:
             return known
-        spent, share = self.clock() - job.since[0], job.fraction - job.since[1]
-        return pace([*job.samples, (spent, share)]) if spent > known * share else known
+        spent, fraction = self.clock() - job.since[0], job.fraction - job.since[1]
+        return pace([*job.samples, (spent, fraction)]) if spent > known * fraction else known
 
     def _show(self, text: str) -> None:
         if self.quiet:
@@ -162,9 +162,9 @@ class Monitor:
 
 
 def pace(samples: list[tuple[float, float]]) -> float:
-    """Seconds per share of the work, of samples (seconds, share), the later ones counting more."""
-    faded = [(FADING**k * spent, FADING**k * share) for k, (spent, share) in enumerate(reversed(samples))]
-    return sum(spent for spent, _ in faded) / sum(share for _, share in faded)
+    """Seconds per fraction of the work, of samples (seconds, share), the later ones counting more."""
+    faded = [(FADING**k * spent, FADING**k * fraction) for k, (spent, fraction) in enumerate(reversed(samples))]
+    return sum(spent for spent, _ in faded) / sum(fraction for _, fraction in faded)
 
 
 def duration(seconds: float) -> str:

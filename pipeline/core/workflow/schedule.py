@@ -24,9 +24,9 @@ from flexclear.pipeline.core.workflow.task import Task, in_order
 if TYPE_CHECKING:
     from concurrent.futures import Future, ProcessPoolExecutor
 
-#: noted beside what is shown until it has been brought up to date
+#: noted next to what is shown until it has been brought up to date
 UNFINISHED = "making it again was begun and not finished"
-#: how often the progress of workers is looked at [s]
+#: how often the progress of workers is examined [s]
 TICK = 0.2
 #: workers that are asked to stop have so long for it [s]; a step of 20 000 evaluations, and writing what there is
 GRACE = 60.0
@@ -150,13 +150,13 @@ def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> Non
 def _together(plan: _Plan, store: Store, sources: Sources, monitor: Monitor, width: int) -> None:
     """In worker processes."""
     running: dict[Future[Record | Failure], _Running] = {}
-    with workers.crew(width) as crew, stopping.heeded():
+    with workers.team(width) as team, stopping.heeded():
         while (plan.waiting or running) and not stopping.requested():
-            _submit(plan, running, crew.pool, width, (store, sources, crew.reports), monitor)
+            _submit(plan, running, team.pool, width, (store, sources, team.reports), monitor)
             _collect(plan, running, monitor)
-            _relay(crew.reports, monitor)
+            _relay(team.reports, monitor)
         if stopping.requested():
-            _end_in_good_order(plan, running, crew.bell, monitor)
+            _end_in_good_order(plan, running, team.bell, monitor)
 
 
 def _end_in_good_order(
@@ -183,7 +183,7 @@ def _end_in_good_order(
 
 
 def _leave_waiting(plan: _Plan, why: str) -> None:
-    """All that is not done is left, when all is to stop; that is told once."""
+    """Abandon all unfinished tasks when the command must stop; that is reported once."""
     if plan.waiting:
         code = StoppedError(why, interrupted=why == stopping.INTERRUPTED).exit_code
         rest = Failure(plan.waiting[0], code, f"{len(plan.waiting)} of {len(plan.tasks)} tasks are left undone: {why}")
@@ -240,8 +240,8 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
             if stopping.requested():  # one that had just been started is not deaf to Ctrl-C yet
                 plan.waiting.append(task)
                 continue
-            told = f"{task.scene} {task.label}: a worker process was killed; is the memory full?"
-            raise ResourceError(told) from None
+            text = f"{task.scene} {task.label}: a worker process was killed; is the memory full?"
+            raise ResourceError(text) from None
         _note(plan, task, result)
         monitor.finish(name, failed=isinstance(result, Failure))
     plan.give_up_below_failures()
@@ -281,27 +281,27 @@ def _work(
 def attempt(
     task: Task, inputs: Mapping[str, Record], store: Store, sources: Sources, progress: Progress
 ) -> Record | Failure:
-    """The record, or the failure with what the user is told. A mistake of this program is told with
+    """The record, or the failure with what the user sees. A mistake of this program is reported with
     its traceback, since only that helps then."""
     try:
         return execute(task, inputs, store, sources, progress)
     except StoppedError as stopped:
-        code, told = stopped.exit_code, _left(task, stopped, store)
+        code, text = stopped.exit_code, _left(task, stopped, store)
     except FlexclearError as error:
-        code, told = error.exit_code, str(error)
+        code, text = error.exit_code, str(error)
     except MemoryError:
-        code, told = ResourceError.exit_code, "the memory is full"
+        code, text = ResourceError.exit_code, "the memory is full"
     except Exception:
-        code, told = 1, f"unexpected error, please report it\n{traceback.format_exc()}"
-    return Failure(task, code, f"{task.scene} {task.label}: {told}")
+        code, text = 1, f"unexpected error, please report it\n{traceback.format_exc()}"
+    return Failure(task, code, f"{task.scene} {task.label}: {text}")
 
 
 def _left(task: Task, stopped: StoppedError, store: Store) -> str:
-    """What is told of a task that was stopped: what there is of it, and that it can go on."""
-    told = f"{stopped}; run it again, and it goes on from there"
+    """Message about a task that was stopped: what there is of it, and that it can go on."""
+    text = f"{stopped}; run it again, and it continues from there"
     time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
     if time is not None:  # else it is of a part of the work, such as a member of an ensemble, and no dataset
         path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
         if path is not None:
-            told += f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)"
-    return told
+            text += f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)"
+    return text

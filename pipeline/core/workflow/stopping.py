@@ -1,6 +1,6 @@
 """Work that is asked to stop: by Ctrl-C, by a limit of time, by the process that started it.
 
-What can leave its work half done in good order heeds requests and looks for them now and then; all else is ended at
+What can leave its work half done in good order heeds requests and searches for them now and then; all else is ended at
 once.
 """
 
@@ -45,13 +45,13 @@ def check() -> None:
 
 
 def heeds() -> bool:
-    """Whether what runs now looks for requests."""
+    """Whether what runs now searches for requests."""
     return _heeded > 0
 
 
 @contextmanager
 def heeded() -> Iterator[None]:
-    """Meanwhile requests are looked for."""
+    """Meanwhile requests are searched for."""
     global _heeded
     with _counting:  # threads of one task may all integrate
         _heeded += 1
@@ -111,11 +111,11 @@ def gently(tell: Callable[[str], None]) -> Iterator[None]:
             signal.signal(signal.SIGINT, before)
 
 
-def obey(wait_until_told: Callable[[], Any], why: Callable[[], str], deaf: Callable[[], None]) -> None:
-    """In a worker: stop when the parent says so; `deaf` tells it of a task that does not heed requests."""
+def obey(wait_for_signal: Callable[[], Any], why: Callable[[], str], deaf: Callable[[], None]) -> None:
+    """In a worker: stop when the parent says so; `deaf` informs it of a task that does not heed requests."""
 
     def wait() -> None:
-        wait_until_told()
+        wait_for_signal()
         request(why())
         if _busy and not heeds():
             deaf()

@@ -37,13 +37,13 @@ class Task:
     stage: name of the stage and of its folder in the cache.
     part: the body (or figure) it is about; empty when the stage has one artifact per scene.
     run: ``"module:function"``, called as ``run(params, inputs, progress)``; see `execute`.
-    params: all that its result may depend on, as JSON, beside `inputs` and the files that it opens.
-    context: what the function is told as well, and its result must not show: where files lie, names for messages.
+    params: all that its result may depend on, as JSON, next to `inputs` and the files that it opens.
+    context: what the function is given as well, and its result must not show: where files lie, names for messages.
     inputs: tasks whose artifact ``nc`` it is given, by name.
-    modules: modules that it reaches by a name in `params`, beside those it imports.
+    modules: modules that it reaches by a name in `params`, next to those it imports.
     folder: where its files are shown, below the results folder; empty: nowhere.
     names: file of the artifact -> name shown there; a file that is not listed keeps its name.
-    exclusive: whether nothing else may run beside it (measurements of time).
+    exclusive: whether nothing else may run next to it (measurements of time).
     """
 
     stage: str
@@ -60,7 +60,7 @@ class Task:
 
     @property
     def base(self) -> Path:
-        """What the files that it opens are told relative to."""
+        """Folder to which the paths of opened files are relative."""
         return Path(self.context.get("folder", TREE))
 
     @property
@@ -71,16 +71,16 @@ class Task:
 
 def in_order(tasks: list[Task]) -> list[Task]:
     """`tasks` and all their inputs, each once, inputs first."""
-    found: dict[int, Task] = {}
+    ordered: dict[int, Task] = {}
 
     def visit(task: Task) -> None:
         for above in task.inputs.values():
             visit(above)
-        found.setdefault(id(task), task)
+        ordered.setdefault(id(task), task)
 
     for task in tasks:
         visit(task)
-    return list(found.values())
+    return list(ordered.values())
 
 
 def facts(task: Task, digests: Mapping[str, str], sources: Sources) -> dict[str, str]:
@@ -101,32 +101,32 @@ def key(task_facts: Mapping[str, str]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
-def flatten(node: Any, place: str = "") -> list[tuple[str, str]]:
-    """Dotted place -> canonical text of every leaf of a JSON tree; floats by repr.
+def flatten(node: Any, where: str = "") -> list[tuple[str, str]]:
+    """Dotted path -> canonical text of every leaf of a JSON tree; floats by repr.
 
     Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
-    date or a nan that somebody wrote into a recipe) is kept as text; the stage will refuse it.
+    date or a nan that somebody wrote into a recipe) is stored as text; the stage will refuse it.
     """
-    found: list[tuple[str, str]] = []
-    _gather(node, place, found)
-    return found
+    leaves: list[tuple[str, str]] = []
+    _gather(node, where, leaves)
+    return leaves
 
 
-def _gather(node: Any, place: str, found: list[tuple[str, str]]) -> None:
+def _gather(node: Any, where: str, leaves: list[tuple[str, str]]) -> None:
     """`flatten` into a list: a report has tens of thousands of leaves."""
     text = _plain(node)
     if text is not None:
-        found.append((place, text))
+        leaves.append((where, text))
         return
     if isinstance(node, Mapping) and node:
         items = ((str(name), value) for name, value in node.items())
     elif isinstance(node, (list, tuple)) and any(isinstance(x, (dict, list, tuple, Mapping)) for x in node):
         items = ((str(n), value) for n, value in enumerate(node))
     else:
-        found.append((place, _JSON.encode(node)))
+        leaves.append((where, _JSON.encode(node)))
         return
     for name, value in items:
-        _gather(value, f"{place}.{name}" if place else name.lstrip("."), found)
+        _gather(value, f"{where}.{name}" if where else name.lstrip("."), leaves)
 
 
 def _plain(node: Any) -> str | None:

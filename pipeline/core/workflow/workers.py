@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Bell:
-    """How workers are told to stop, and why. deaf: how many have a task that cannot leave anything in good order."""
+    """How workers are asked to stop, and why. deaf: how many have a task that cannot leave anything in good order."""
 
     rung: Any
     why: Any
@@ -75,7 +75,7 @@ def kill(workers: ProcessPoolExecutor) -> None:
 
 
 @dataclass(frozen=True)
-class Crew:
+class Team:
     """Workers, what asks them to stop, and the queue of their progress, which a process of its own keeps."""
 
     width: int
@@ -85,13 +85,13 @@ class Crew:
     reports: Any
 
     @staticmethod
-    def begun(width: int) -> Crew:
+    def begun(width: int) -> Team:
         """That many workers at most; each is started when there is something for it to do."""
         from multiprocessing.managers import SyncManager
 
         server, bell = SyncManager(ctx=_context()), Bell.made()
         server.start(follow, (os.getpid(),))
-        return Crew(width, pool(width, bell), bell, server, server.Queue())
+        return Team(width, pool(width, bell), bell, server, server.Queue())
 
     def end(self) -> None:
         """Let them go, who have nothing to do any more."""
@@ -104,14 +104,14 @@ class Crew:
         self.server.shutdown()
 
 
-#: the crew that has nothing to do at the moment, where it is kept for the next call
-_idle: list[Crew] = []
+#: the idle team, stored for the next call
+_idle: list[Team] = []
 _keeping = 0
 
 
 @contextmanager
-def kept() -> Iterator[None]:
-    """Meanwhile workers are not let go between one call of `crew` and the next: starting and importing take a second.
+def reused() -> Iterator[None]:
+    """Meanwhile workers are not let go between one call of `team` and the next: starting and importing take a second.
 
     They have the environment of when they were started, so this is for one command.
     """
@@ -126,18 +126,18 @@ def kept() -> Iterator[None]:
 
 
 def of_a_command() -> bool:
-    """Whether this process is a command's own: inside of `kept`."""
+    """Whether this process is a command's own: inside of `reused`."""
     return _keeping > 0
 
 
 @contextmanager
-def crew(width: int) -> Iterator[Crew]:
+def team(width: int) -> Iterator[Team]:
     """Workers, that many at least; killed where the block fails, or ends because all is to stop."""
     with ExitStack() as stack:
         while _idle and _idle[-1].width < width:
             _idle.pop().end()
-        # one that is kept may serve a wider call next; who is never needed is never started
-        mine = _idle.pop() if _idle else Crew.begun(max(width, cores.cores()) if _keeping else width)
+        # a reused one may serve a wider call next; who is never needed is never started
+        mine = _idle.pop() if _idle else Team.begun(max(width, cores.cores()) if _keeping else width)
         stack.callback(mine.kill)
         while not mine.reports.empty():  # of the last call
             mine.reports.get()

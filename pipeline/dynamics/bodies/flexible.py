@@ -247,12 +247,13 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
             body_modal_inertia(h, f, w, k)
 
     @kernel
-    def energies(h, f, w):
+    def energies(h, f, w, component):
         kinetic = elastic = 0.0
         for k in range(h[m.N_FLEX]):
-            moving, bent = body_energies(h, f, w, k)
-            kinetic += moving
-            elastic += bent
+            if m.LINKS.component(h, m.FLEXES.link(h, k)) == component:
+                moving, bent = body_energies(h, f, w, k)
+                kinetic += moving
+                elastic += bent
         return kinetic, elastic
 
     before = (deform, site, inboard, inertia, mass_matrix, modal_inertia)

@@ -82,7 +82,7 @@ def stiffness(h, f, w, k):
         damping = f[K + n + j] * speed
         w[bias + j] += f[K + j] * w[x + j] + damping
         w[rate + j] = speed
-        w[h[m.LEDGER_RATE] + m.MODAL_LOSS] += damping * speed
+        w[h[m.LEDGER_RATE] + m.FLEXES.book(h, k)] += damping * speed
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Calls between functions that are compiled apart, each once, through addresses in the header of h.
+"""Calls between functions that are compiled separately, each once, through addresses in the header of h.
 
 A right-hand side that is composed into its integrator is optimised again in every function between
 the two, and every mechanism needs an integrator of its own. Called by its address it is compiled
@@ -40,7 +40,8 @@ SIGNATURES = {
 
 @intrinsic
 def call(typingctx: Any, address: Any, arguments: Any) -> Any:
-    """Integer that the C function at `address` returns for a tuple; of its arrays it gets the first entries' places."""
+    """Integer that the C function at `address` returns for a tuple; of its arrays it gets the addresses of the first
+    entries."""
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         where, arrays = values
@@ -62,7 +63,7 @@ def exported(name: str) -> Callable[[Callable], int]:
     return compiles(cfunc(SIGNATURES[name], **options))
 
 
-if INTERPRETED:  # for debugging: the same calls between functions of Python, which are given arrays for places
+if INTERPRETED:  # for debugging: the same calls between functions of Python, which are given arrays for addresses
 
     def call(address, arguments):
         """What the function known by this number returns."""

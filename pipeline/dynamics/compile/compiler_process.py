@@ -1,4 +1,4 @@
-"""A second process that compiles beside this one, into the same folder.
+"""A second process that compiles next to this one, into the same folder.
 
 It is no worker: it takes files that nobody is compiling, and leaves their code on disk. Whatever becomes of it, this
 process compiles what is not there, and reports what cannot be compiled.
@@ -38,7 +38,7 @@ def second_process(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None
     """
     with ExitStack() as stack:
         process = None
-        if len(paths) > 1 and wanted():
+        if len(paths) > 1 and requested():
             alone = stack.enter_context(claimed(paths[0].with_name("compiler"), wait=False))
             process = _start(paths) if alone else None
         if process is not None:
@@ -47,7 +47,7 @@ def second_process(paths: list[Path]) -> Iterator[subprocess.Popen[bytes] | None
         yield process
 
 
-def wanted() -> bool:
+def requested() -> bool:
     """Whether a second process is of use, and can be started."""
     # a program packed into one file would start itself again
     startable = bool(sys.executable) and not getattr(sys, "frozen", False)

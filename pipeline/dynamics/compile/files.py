@@ -94,12 +94,13 @@ def of_another_build(path: Path) -> bool:
 
 def _digests(path: Path) -> dict[str, str]:
     """Of the source and of the code that was made of it, by name."""
-    there = (found for found in (path, path.with_suffix(CODE)) if found.is_file())
-    return {found.name: hashlib.sha256(found.read_bytes()).hexdigest() for found in there}
+    there = (file for file in (path, path.with_suffix(CODE)) if file.is_file())
+    return {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in there}
 
 
 def claimed(path: Path, *, wait: bool) -> AbstractContextManager[bool]:
-    """Whether this process has the lock beside a file, which ends with it; of two the second waits, or goes without."""
+    """Whether this process has the lock next to a file, which ends with it; of two the second waits, or goes
+    without."""
     return locked(path.with_suffix(".lock"), wait=wait)
 
 

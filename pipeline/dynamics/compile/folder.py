@@ -1,4 +1,4 @@
-"""The folder of compiled kernels: whose it is, for which processor, and how it is kept small.
+"""The folder of compiled kernels: whose it is, for which processor, and how its size is limited.
 
 To load a kernel is to run code, so a folder in which anybody else could write is refused.
 """
@@ -42,22 +42,22 @@ def writable(root: Path, tell: Callable[[str], None]) -> Path:
 
 def refuse_shared(folder: Path) -> None:
     """InputError when anybody but this user (and the system's) can write to a folder of kernels, or replace it."""
-    for place in (folder, *folder.parents):
-        if others_can_write(place, inside=place == folder):
+    for part in (folder, *folder.parents):
+        if others_can_write(part, inside=part == folder):
             raise InputError(
                 str(folder),
-                f"compiled kernels are not loaded from there, since others can write to {place}",
-                f"chmod go-w {place}, or name another folder with FLEXCLEAR_KERNELS",
+                f"compiled kernels are not loaded from there, since others can write to {part}",
+                f"chmod go-w {part}, or name another folder with FLEXCLEAR_KERNELS",
             )
 
 
 @cache
 def processor() -> str:
-    """A name for what code is compiled for: processor, its features and what the compiler is told of them."""
+    """A name for what code is compiled for: processor, its features and the compiler's settings for them."""
     import llvmlite.binding as llvm
 
-    told = [os.environ.get(f"NUMBA_{name}", "") for name in ("CPU_NAME", "CPU_FEATURES", "OPT")]
-    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *told)
+    settings = [os.environ.get(f"NUMBA_{name}", "") for name in ("CPU_NAME", "CPU_FEATURES", "OPT")]
+    facts = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *settings)
     return hashlib.sha256(repr(facts).encode()).hexdigest()[:12]
 
 
@@ -75,7 +75,7 @@ def prune(folder: Path, unused: float = UNUSED, largest: int = LARGEST) -> int:
 
 def size(path: Path) -> int:
     """Bytes of a generated file and of what was compiled of it."""
-    return sum(found.stat().st_size for found in (path, path.with_suffix(CODE)) if found.is_file())
+    return sum(file.stat().st_size for file in (path, path.with_suffix(CODE)) if file.is_file())
 
 
 def _used(path: Path) -> float:

@@ -2,7 +2,7 @@
 
 Each is a generated file (`sources`) whose name is a digest of the sources of all kernels it can
 reach and of the versions of the compiler. The functions call each other by address (`calls`), so
-that mechanisms share those which are alike.
+that mechanisms use common ones.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
 ORDER = ("advance", "project", "retract", "observe", "evaluate", SPECIALISED)
 #: what is called first when a run has come to its end: not waited for where the second process is at it
 LATE = "observe"
-#: where the code of kernels stands, and what they number by
+#: where the code of kernels is, and what they number by
 CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.artifacts.event_kinds")
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 _PLACE, _INTEGER, _FLOAT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
@@ -151,11 +151,11 @@ class Entry:
         return {}
 
     def _function(self, name: str) -> Callable:
-        found = self._known.get(name)
-        if found is None:
+        function = self._known.get(name)
+        if function is None:
             address = self.late.address() if name == LATE else self.addresses[name]
-            found = self._known[name] = interpreted[address] if INTERPRETED else PROTOTYPES[name](address)
-        return found
+            function = self._known[name] = interpreted[address] if INTERPRETED else PROTOTYPES[name](address)
+        return function
 
 
 def _tables(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> tuple:
@@ -179,7 +179,7 @@ class Late:
 
 
 def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
-    """The compiled functions for these parts; `tell` hears of what has to be compiled."""
+    """The compiled functions for these parts; `tell` receives what has to be compiled."""
     folder, began = writable(kernel_root(), tell), time.monotonic()
     files = {name: _file(folder, name, source) for name, source in sources.sources(parts, scheme).items()}
     with ExitStack() as helpers:
@@ -219,11 +219,11 @@ def _bring(
     helpers: gets the second process, where there is one.  late: files of which that may still be at work.
     """
     names = {path: name for name, path in files.items() if path.stem not in loaded}
-    wanted = sorted(names, key=lambda path: ORDER.index(names[path]))
+    requested = sorted(names, key=lambda path: ORDER.index(names[path]))
     with disk_limits(folder):
-        missing = [path for path in wanted if not compiled(path)]
+        missing = [path for path in requested if not compiled(path)]
         helpers.enter_context(second_process(missing[::-1]))
-        bring(wanted, lambda path: _announce(tell, WORDS[names[path]], began), late)
+        bring(requested, lambda path: _announce(tell, WORDS[names[path]], began), late)
         if missing:
             prune(folder)
 
@@ -261,12 +261,12 @@ def reached(source: str) -> dict[str, str]:
 
     Packages on the way do not count: their ``__init__`` modules hold no kernel, but reach everything.
     """
-    found: dict[str, str] = {}
+    source_texts: dict[str, str] = {}
     waiting = sorted(sources.imported(source))
     while waiting:
         name = waiting.pop()
-        module = SOURCES.module(name) if name.startswith(CODE) and name not in found else None
+        module = SOURCES.module(name) if name.startswith(CODE) and name not in source_texts else None
         if module is not None and not module.package:
-            found[name] = module.digest
+            source_texts[name] = module.digest
             waiting.extend(module.own)
-    return found
+    return source_texts

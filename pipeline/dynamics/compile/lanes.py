@@ -27,12 +27,12 @@ from flexclear.pipeline.dynamics.compile.stacks import (
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.specialise.straight import exactly
 
-#: all lanes at once take as long as this share of them does one by one
+#: all lanes at once take as long as this fraction of them does one by one
 FEW = 4
 
 
 def _pointer(kind: Any) -> Any:
-    """What makes of an address [integer] a place in an array."""
+    """What makes of an address [integer] an address in an array."""
 
     @intrinsic
     def pointer(typingctx: Any, address: Any) -> Any:
@@ -72,7 +72,7 @@ def make_lanes(laws: Callable, note: Callable, abreast: Callable, lanes: int) ->
 
     @kernel
     def one_by_one(table):
-        """All evaluations that are waited for, each alone."""
+        """All evaluations that are awaited, each alone."""
         for k in range(lanes):
             own = integers(table[HEAD + k])
             if own[STATE] == WAITING:
@@ -87,7 +87,7 @@ def make_lanes(laws: Callable, note: Callable, abreast: Callable, lanes: int) ->
 
     @kernel
     def evaluate(table, places, numbers, spare):
-        """All evaluations that are waited for; lanes without one repeat another's, to the same places."""
+        """All evaluations that are awaited; lanes without one repeat another's, to the same places."""
         for k in range(lanes):
             own = integers(table[HEAD + k])
             record = own if own[STATE] == WAITING else integers(spare)

@@ -1,9 +1,9 @@
 """Machine code of one compiled function as bytes, and as something that can be called: without the compiler.
 
-Numba's own cache needs Numba, which takes longer to import than many a run takes. What is kept here is the object file
-that it makes of a function, with the name of the function in it and those of what it refers to; LLVM alone loads that.
-Each has an engine of its own, so that names in it, which count functions of the process that compiled it, may be those
-of others.
+Numba's own cache needs Numba, which takes longer to import than many a run takes. What is stored here is the object
+file that it makes of a function, with the name of the function in it and those of what it refers to; LLVM alone loads
+that. Each has an engine of its own, so that names in it, which count functions of the process that compiled it, may be
+those of others.
 """
 
 from __future__ import annotations
@@ -37,35 +37,35 @@ class Code:
 
 
 def image(function: Any) -> bytes:
-    """The code of a C function that Numba has compiled (`numba.cfunc`), to be kept."""
+    """The code of a C function that Numba has compiled (`numba.cfunc`), for storage."""
     library = function._library
     foreign = [used.name for used in library._final_module.functions if used.is_declaration]
     foreign += [used.name for used in library._final_module.global_variables if used.is_declaration]
     binary = bytes(library._get_compiled_object())
-    told = {
+    facts = {
         "name": function.native_name,
         "foreign": sorted(name for name in foreign if not name.startswith("llvm.")),
         "sha256": hashlib.sha256(binary).hexdigest(),
     }
-    return json.dumps(told, sort_keys=True).encode() + b"\n" + binary
+    return json.dumps(facts, sort_keys=True).encode() + b"\n" + binary
 
 
-def load(kept: bytes) -> Code:
+def load(stored: bytes) -> Code:
     """The function of such an image; ValueError where it cannot be loaded."""
     import llvmlite.binding as llvm
 
-    line, _, binary = kept.partition(b"\n")
-    told = json.loads(line)
-    if told["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM does not outlive what is no object file
+    line, _, binary = stored.partition(b"\n")
+    facts = json.loads(line)
+    if facts["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM does not outlive what is no object file
         raise ValueError("names and code are not of one function")
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target().create_target_machine(jit=True))
-    for name in told["foreign"]:
+    for name in facts["foreign"]:
         _provide(llvm, name)
     engine.add_object_file(llvm.ObjectFileRef.from_data(binary))
     engine.finalize_object()
-    address = engine.get_function_address(told["name"])
+    address = engine.get_function_address(facts["name"])
     if not address:
-        raise ValueError(f"no function {told['name']}")
+        raise ValueError(f"no function {facts['name']}")
     return Code(address, engine)
 
 

@@ -39,12 +39,12 @@ Imports = list[tuple[str, str]]  #: (module, name) each
 
 def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
     """Source by name of what it compiles, in the order of which calls which."""
-    found = {"evaluate": _evaluate(parts)}
+    by_name = {"evaluate": _evaluate(parts)}
     if parts.closures:
-        found["project"] = _project(parts)
+        by_name["project"] = _project(parts)
     if integrators.INTEGRATORS[scheme.integrator].retracts:
-        found["retract"] = _retract(parts)
-    return found | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
+        by_name["retract"] = _retract(parts)
+    return by_name | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
 
 
 def modules(scene: Scene) -> tuple[str, ...]:
@@ -52,8 +52,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
     Raises InputError when a name is not listed in its family.
     """
-    found, parts = {part.module for part in named(scene)}, most_parts(scene)
-    return tuple(sorted(found.union(*(_composed(parts, scheme) for scheme in schemes(scene)))))
+    names, parts = {part.module for part in named(scene)}, most_parts(scene)
+    return tuple(sorted(names.union(*(_composed(parts, scheme) for scheme in schemes(scene)))))
 
 
 @cache
@@ -70,7 +70,7 @@ def _reached(source: str) -> frozenset[str]:
 
 
 def imported(source: str) -> set[str]:
-    """Modules and names that a generated file imports, as `fingerprint.imported` tells those of any other source."""
+    """Modules and names that a generated file imports, as `fingerprint.imported` returns those of any other source."""
     lines = re.findall(r"^from (\S+) import (\S+)", source, re.MULTILINE)
     return {name for module, part in lines for name in (module, f"{module}.{part}")}
 
@@ -164,7 +164,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
 
 
 def _events(imports: Imports, parts: Parts, scheme: Scheme) -> str:
-    """What the stepper looks for in each step; nothing for the default, which is nothing."""
+    """What the stepper searches for in each step; nothing for the default, which is nothing."""
     touching, chosen = parts.surfaces or parts.stops, not scheme.fixed
     if touching and not scheme.located:
         return _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")

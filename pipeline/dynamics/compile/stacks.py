@@ -1,12 +1,12 @@
 """Functions that run on stacks of their own, and stop in the middle to be gone on with later.
 
-A stepper that needs an evaluation is stopped there, and goes on when the evaluation has been made, beside those that
+A stepper that needs an evaluation is stopped there, and goes on when the evaluation has been made, next to those that
 other steppers wait for (`compile.lanes`). It knows nothing of that: it calls the right-hand side by its address, and at
 that address there is `wait`. To stop is to store the registers that a function must leave as they were, and to go on
 with another stack: some nanoseconds.
 
 Each stack begins with a record; a function finds its own by its stack pointer, since stacks begin at multiples of their
-size. Kernels neither recurse nor have arrays on the stack; they come nowhere near its end, and what lies between is
+size. Kernels neither recurse nor have arrays on the stack; they come nowhere close to its end, and what lies between is
 guarded: to touch it ends the process.
 
 Source: System V Application Binary Interface, AMD64 Architecture Processor Supplement, sec. 3.2 (registers, arguments).
@@ -31,12 +31,12 @@ SIZE = 1 << 20
 POINTER, BACK, STATE, GIVEN, TIME, FUNCTION, ARGUMENTS = 0, 1, 2, 3, 9, 10, 11
 #: states: it may go on, it waits for an evaluation, it has come back, there is none
 READY, WAITING, DONE, IDLE = 0, 1, 2, 3
-#: where Linux tells of this process
+#: where Linux reports on this process
 STATUS = Path("/proc/self/status")
 #: of mprotect, on every Linux
 NO_ACCESS = 0
-#: words of a crew's table: whether its thread is wanted back, the address of what evaluates one state or 0, and from
-#: where on there are the addresses of its records
+#: words of a group's table: whether its thread shall return, the address of what evaluates one state or 0, and the
+#: first of the addresses of its records
 WANTED, ALONE, HEAD = 0, 1, 2
 #: words of a record, and those that a stack holds before its function has begun
 RECORD, BEGIN = 32, 9
@@ -83,15 +83,15 @@ def supported() -> bool:
 
 
 def shadowed(status: Path) -> bool:
-    """Whether the processor keeps a second stack of return addresses, beside which no other stack may be gone on with.
+    """Whether the processor keeps a second stack of return addresses, next to which no other stack may be gone on with.
 
-    status: what the system tells of a process.
+    status: the system's text about a process.
     """
     try:
-        told = status.read_text(encoding="utf-8", errors="replace")
+        status_text = status.read_text(encoding="utf-8", errors="replace")
     except OSError:
         return False
-    return any(line.startswith("x86_Thread_features:") and "shstk" in line.split() for line in told.splitlines())
+    return any(line.startswith("x86_Thread_features:") and "shstk" in line.split() for line in status_text.splitlines())
 
 
 @cache

@@ -2,7 +2,7 @@ r"""What every law of time becomes: pieces, each a polynomial plus harmonics in 
 
 .. math:: x(t) = \sum_k c_k s^k + \sum_j A_j \sin(\omega_j s + \varphi_j), \quad s = t - t_{start}
 
-so that value, rate and second rate are exact, and every place where a derivative may jump is the
+so that value, rate and second rate are exact, and every time where a derivative may jump is the
 start of a piece, where integration stops and starts anew.
 """
 

@@ -10,7 +10,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 
 def pieces(law: Piecewise, dimension: str) -> Pieces:
     """The pieces of each law within its section; ValueError when one does not cover its section."""
-    found = []
+    collected = []
     low, high = -inf, inf
     ends = [*(s.start for s in law.sections[1:]), inf]
     for k, (section, end) in enumerate(zip(law.sections, ends, strict=True)):
@@ -18,8 +18,8 @@ def pieces(law: Piecewise, dimension: str) -> Pieces:
         if (k and inner.span[0] > start) or (end < inf and inner.span[1] < end):
             raise ValueError(f"the law from {start} s on is known between {inner.span[0]} and {inner.span[1]} s only")
         low, high = (inner.span[0] if k == 0 else low), (inner.span[1] if end == inf else high)
-        found.append(inner.at(start).moved(start))
-        found += [p for p in inner.pieces[1:] if start < p.start < end]
+        collected.append(inner.at(start).moved(start))
+        collected += [p for p in inner.pieces[1:] if start < p.start < end]
         if k == 0:
-            found = [p for p in inner.pieces if p.start < start] + found if len(inner.pieces) > 1 else found
-    return Pieces(tuple(found), (low, high))
+            collected = [p for p in inner.pieces if p.start < start] + collected if len(inner.pieces) > 1 else collected
+    return Pieces(tuple(collected), (low, high))

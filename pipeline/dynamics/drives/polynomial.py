@@ -9,5 +9,5 @@ from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 
 def pieces(law: Polynomial, dimension: str) -> Pieces:
     """One piece."""
-    found = (coefficient(c, dimension, order) for order, c in enumerate(law.coefficients))
-    return Pieces((Piece(law.origin, tuple(found)),))
+    coefficients = (coefficient(c, dimension, order) for order, c in enumerate(law.coefficients))
+    return Pieces((Piece(law.origin, tuple(coefficients)),))

@@ -19,7 +19,8 @@ from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import accumulate, at, dot
 
-#: kinetic energy, potential energy of gravity, energy stored in bodies, springs and contacts [J]
+#: of an independent mechanism: kinetic energy, potential energy of gravity, that stored in bodies, springs and contacts
+#: [J]
 ENERGY = m.layout("kinetic potential elastic")
 #: tolerance by which the loops of rows stay as they are, and nothing but frames is written
 AS_RECORDED = -1.0
@@ -41,7 +42,8 @@ class Observed:
     link_wrenches: on each link through its inboard joint; closure_wrenches: on the closures' second bodies; moment
     about the kernels' origin (WRENCH).  touch, loads, bearings: what contacts, loads and bearings with friction do
     (TOUCH, LOAD, BEARING).
-    drive_force: along the drives' coordinates in the tree [N or N m].  energy: ENERGY.
+    drive_force: along the drives' coordinates in the tree [N or N m].  energy: ENERGY, (rows, independent
+    mechanisms).
     jacobian: of the closure rows solved for, as the kernels store it.
     residual: largest violation of a closure, shape (rows,).  status: what an evaluation reports there, shape (rows,).
     """
@@ -82,7 +84,7 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
         "closure_wrenches": (m.WRENCH, size(m.N_CLOSURES)),
         **{f"body_{name}": (numbers, size(m.N_BODIES)) for name, numbers in OF_BODIES.items()},
         "frame_position": (3, size(m.N_FRAMES)),
-        "energy": (ENERGY, 1),
+        "energy": (ENERGY, size(m.N_COMPONENTS)),
         "residual": (None, 1),
         "status": (None, 1),
         **_frames(size),
@@ -142,7 +144,7 @@ def by_name(blocks: Blocks, size: Callable[[int], int]) -> Observed:
     """Views of what `observe` has written."""
     fields = {name: _named(kind, count, blocks[name]) for name, (kind, count) in _columns(size).items()}
     accelerations = np.concatenate([fields.pop("free_accelerations"), fields.pop("driven_accelerations")], axis=1)
-    single = {name: fields[name][:, 0] for name in ("energy", "residual", "status")}
+    single = {name: fields[name][:, 0] for name in ("residual", "status")}
     return Observed(**fields | single, accelerations=accelerations)
 
 
@@ -153,7 +155,7 @@ def _named(kind: Any, count: int, block: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def no_energy(h, f, w):
+def no_energy(h, f, w, component):
     """Kinetic and elastic energy where no body is flexible."""
     return 0.0, 0.0
 
@@ -171,7 +173,8 @@ def no_friction(h, w, out, column):
 @kernel
 def columns_before_state(h):
     """Columns of what is worked out, and of the frames of links and sites."""
-    worked_out = m.WRENCH.size * h[m.N_CLOSURES] + SIZE * h[m.N_BODIES] + 3 * h[m.N_FRAMES] + ENERGY.size + 2
+    worked_out = m.WRENCH.size * h[m.N_CLOSURES] + SIZE * h[m.N_BODIES] + 3 * h[m.N_FRAMES] + 2
+    worked_out += ENERGY.size * h[m.N_COMPONENTS]
     return worked_out + m.FRAME.size * (h[m.N_LINKS] + h[m.N_SITES])
 
 
@@ -193,9 +196,16 @@ def even(rows, first, last):
 
 
 @kernel
-def open_by(h, w):
+def open_by(h, f, w):
     """How far loops are open, or how fast they open, at the evaluated state [m, or m/s]."""
-    return max(widest(h, w, h[m.RESIDUAL], True), widest(h, w, h[m.RESIDUAL_RATE], True))
+    return max(widest(h, f, w, h[m.RESIDUAL], True), widest(h, f, w, h[m.RESIDUAL_RATE], True))
+
+
+@kernel
+def component_of(h, a, b):
+    """Independent mechanism to which what acts between sites belongs; a: may be -1."""
+    other = m.LINKS.component(h, m.SITES.link(h, a)) if a >= 0 else -1
+    return max(other, m.LINKS.component(h, m.SITES.link(h, b)))
 
 
 @kernel
@@ -278,17 +288,22 @@ def make_observation(
     @kernel
     def energies(h, f, w, out, o):
         """Kinetic energy, potential of gravity, energy stored in bodies and contacts, from out[o] on."""
-        kinetic, elastic = flexible_energy(h, f, w)
-        potential = 0.0
-        for i in range(1, h[m.N_LINKS]):
-            if m.LINKS.flex(h, i) < 0:
-                kinetic += rigid.kinetic_energy(h, f, w, i)
-            potential -= dot(at(f, h[m.GRAVITY.place]), at(w, m.OWN.row(h, i) + m.OWN.moment))
-        for c in range(h[m.N_CONTACTS]):
-            elastic += w[m.TOUCH.row(h, c) + m.TOUCH.stored] + w[m.TOUCH.row(h, c) + m.TOUCH.bent]
-        for k in range(h[m.N_LOADS]):
-            elastic += w[m.LOAD.row(h, k) + m.LOAD.stored]
-        out[o], out[o + 1], out[o + 2] = kinetic, potential, elastic
+        for component in range(h[m.N_COMPONENTS]):
+            kinetic, elastic = flexible_energy(h, f, w, component)
+            potential, row = 0.0, o + ENERGY.size * component
+            for i in range(1, h[m.N_LINKS]):
+                if m.LINKS.component(h, i) != component:
+                    continue
+                if m.LINKS.flex(h, i) < 0:
+                    kinetic += rigid.kinetic_energy(h, f, w, i)
+                potential -= dot(at(f, h[m.GRAVITY.place]), at(w, m.OWN.row(h, i) + m.OWN.moment))
+            for c in range(h[m.N_CONTACTS]):
+                if component_of(h, m.CONTACTS.outer(h, c), m.CONTACTS.inner(h, c)) == component:
+                    elastic += w[m.TOUCH.row(h, c) + m.TOUCH.stored] + w[m.TOUCH.row(h, c) + m.TOUCH.bent]
+            for k in range(h[m.N_LOADS]):
+                if component_of(h, m.LOADS.a(h, k), m.LOADS.b(h, k)) == component:
+                    elastic += w[m.LOAD.row(h, k) + m.LOAD.stored]
+            out[row], out[row + 1], out[row + 2] = kinetic, potential, elastic
 
     @kernel
     def place(h, f, w, n, t):
@@ -337,8 +352,8 @@ def make_observation(
         column += SIZE * h[m.N_BODIES]
         put_frames(h, f, w, out, every * column + 3 * h[m.N_FRAMES] * r)
         column += 3 * h[m.N_FRAMES]
-        energies(h, f, w, out, every * column + ENERGY.size * r)
-        column += ENERGY.size
+        energies(h, f, w, out, every * column + ENERGY.size * h[m.N_COMPONENTS] * r)
+        column += ENERGY.size * h[m.N_COMPONENTS]
         out[every * column + r], out[every * (column + 1) + r] = residual, status
         return column + 2
 
@@ -380,7 +395,7 @@ def make_observation(
                     break
                 foreseen = foreseen and foresee(h, w, rows, r, state, out, states)
                 evaluate(h, f, w, n, rows[r, 0], h[m.Y], h[m.SLOPES])
-                if not foreseen or (n[m.EVALUATION] == m.OK and open_by(h, w) <= tolerance):
+                if not foreseen or (n[m.EVALUATION] == m.OK and open_by(h, f, w) <= tolerance):
                     close(h, f, w, n, rows[r, 0], tolerance)
                     break
                 uneven, foreseen = first, False  # as where a step ends

@@ -37,16 +37,17 @@ def largest(w, first, count):
 
 
 @kernel
-def widest(h, w, values, solved):
+def widest(h, f, w, values, solved):
     """Largest of the closure rows' values from w[values] on, a turn counting with the mechanism's size [m, or m/s].
 
-    solved: whether only of the rows that are solved for.
+    solved: whether only of the rows that are solved for.  Lengths of an independent mechanism that is smaller than all
+    that there is count for more by that much.
     """
     result, arm = 0.0, w[h[m.CONTROL] + m.LENGTH]
     for c in range(h[m.N_CLOSURES]):
-        first = m.CLOSURES.row0(h, c)
+        first, weight = m.CLOSURES.row0(h, c), f[m.CLOSURE_NUMBERS.row(h, c)]
         for k in range(first, first + (m.CLOSURES.n_kept(h, c) if solved else m.CLOSURES.n_rows(h, c))):
-            size = abs(w[values + k]) * (1.0 if m.CLOSURE_ROWS.kind(h, k) == 0 else arm)
+            size = abs(w[values + k]) * (weight if m.CLOSURE_ROWS.kind(h, k) == 0 else arm)
             if not size <= result:
                 result = size if size == size else 1e300
     return result
@@ -135,9 +136,9 @@ def make_projection(
         if w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
             return 0
         for _ in range(ITERATIONS):
-            worst = max(widest(h, w, h[m.RESIDUAL], True), widest(h, w, h[m.RESIDUAL_RATE], True))
+            worst = max(widest(h, f, w, h[m.RESIDUAL], True), widest(h, f, w, h[m.RESIDUAL_RATE], True))
             if worst <= tolerance:
-                return used if widest(h, w, h[m.RESIDUAL], False) <= max(apart, tolerance) else -1
+                return used if widest(h, f, w, h[m.RESIDUAL], False) <= max(apart, tolerance) else -1
             if n[m.ABRIDGED]:
                 evaluate(h, f, w, n, t, y, dy)  # for its factors
             stiffen(h, f, w, n)
@@ -154,8 +155,8 @@ def make_projection(
             used += 1
             if n[m.EVALUATION] != m.OK:
                 return -1
-        if not widest(h, w, h[m.RESIDUAL], True) <= ROUNDING * tolerance:
+        if not widest(h, f, w, h[m.RESIDUAL], True) <= ROUNDING * tolerance:
             return -1
-        return used if widest(h, w, h[m.RESIDUAL], False) <= max(apart, ROUNDING * tolerance) else -1
+        return used if widest(h, f, w, h[m.RESIDUAL], False) <= max(apart, ROUNDING * tolerance) else -1
 
     return project

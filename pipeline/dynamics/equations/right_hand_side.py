@@ -203,10 +203,8 @@ def make_rates(
     @kernel
     def store_rates(d, dy):
         """Positions' rates, accelerations, and the ledger's powers."""
-        power = 0.0
         for k in range(d.n_drives):
-            power += d.drive_force[k] * d.u[d.nv + k]
-        d.ledger_rate[m.DRIVE_WORK] = power
+            d.ledger_rate[d.drives[k].book] += d.drive_force[k] * d.u[d.nv + k]
         for k in range(d.nq):
             d.w[dy + k] = d.position_rate[k]
         for k in range(d.nv):

@@ -367,14 +367,14 @@ def make_jacobian(evaluate: Callable, retract: Callable) -> Callable:
         for c in range(h[m.NY]):
             w[h[m.Y_STAGE] + c] = w[y + c]
         for k in range(n_rates(h)):
-            floor, value = f[m.FLOORS.row(h, m.GROUPS.group(h, nq + k))], w[y + nq + k]
+            floor, value = f[m.FLOORS.row(h, m.GROUPS.group(h, nq + k)) + m.FLOORS.natural], w[y + nq + k]
             changed = value + PERTURBATION * (floor + abs(value))
             w[h[m.Y_STAGE] + nq + k] = changed
             if not column(h, f, w, n, t, slope_there, k, changed - value, matrix(h, BY_STATE)):
                 return False
             w[h[m.Y_STAGE] + nq + k] = value
         for k in range(nv):
-            change = PERTURBATION * f[m.FLOORS.row(h, m.GROUPS.group(h, nq + k))]
+            change = PERTURBATION * f[m.FLOORS.row(h, m.GROUPS.group(h, nq + k)) + m.FLOORS.natural]
             for j in range(nv):
                 w[shift + j] = change if j == k else 0.0
             retract(h, w, y, shift, h[m.Y_STAGE], positions(h))

@@ -3,6 +3,9 @@
 Variables stand in groups, such as the components of one velocity. A group's scale is the tolerance times its floor plus
 the length of its vector; the length, not the largest component, which would depend on the axes of a scene.
 
+Independent mechanisms in one scene have floors of their own sizes, and the square of the norm is the sum of the squares
+of what their norms would be alone: each is at least as accurate as without the others.
+
 Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.4.
 """
 
@@ -24,7 +27,9 @@ def set_error_scales(h, f, w, y):
         g = scales + m.GROUPS.group(h, c)
         w[g] += 0.5 * (w[y + c] * w[y + c] + w[o + c] * w[o + c])
     for g in range(h[m.N_GROUPS]):
-        w[scales + g] = w[h[m.CONTROL] + m.RTOL] * (f[m.FLOORS.row(h, g)] + np.sqrt(w[scales + g]))
+        o = m.FLOORS.row(h, g)
+        allowed = w[h[m.CONTROL] + m.RTOL] * (f[o + m.FLOORS.magnitude] + np.sqrt(w[scales + g]))
+        w[scales + g] = allowed * f[o + m.FLOORS.share]
 
 
 @kernel

@@ -269,7 +269,9 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
                     w[jacobian_entry(h, i, k)] = 0.0
                 continue
             y = w[h[m.Y] + k]
-            w[h[m.Y_STAGE] + k] = y + PERTURBATION * (f[m.FLOORS.row(h, m.GROUPS.group(h, k))] + abs(y))
+            w[h[m.Y_STAGE] + k] = y + PERTURBATION * (
+                f[m.FLOORS.row(h, m.GROUPS.group(h, k)) + m.FLOORS.natural] + abs(y)
+            )
             change = w[h[m.Y_STAGE] + k] - y
             evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y_STAGE], near)
             n[m.EVALUATIONS] += 1

@@ -213,7 +213,7 @@ def make_along(method: Any, attempt: Callable, extend: Callable) -> tuple[Callab
         if not ready(h, w):
             return attempt(h, f, w, n, step)
         share = step / w[h[m.CONTROL] + m.COLLOCATED]
-        w[h[m.CONTROL] + m.SHARE] = share
+        w[h[m.CONTROL] + m.FRACTION] = share
         follow(h, w, share, h[m.Y_NEW])
         follow_slope(h, w, share, h[m.SLOPES] + h[m.NY] * last)
         return True
@@ -226,7 +226,7 @@ def make_along(method: Any, attempt: Callable, extend: Callable) -> tuple[Callab
     @kernel
     def interpolate_along(h, w, theta, out):
         if ready(h, w):
-            follow(h, w, theta * w[h[m.CONTROL] + m.SHARE], out)
+            follow(h, w, theta * w[h[m.CONTROL] + m.FRACTION], out)
         else:
             interpolate(h, w, theta, out)
 

@@ -30,5 +30,5 @@ CONTACTS = {
 #: joints that are always one link; others may become chains of those in CHAIN (see `model.chain`)
 WHOLE = ("fixed", "prismatic", "revolute", "spherical", "rotation-vector", "free")
 CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")
-#: the ideal joint that a clearance joint keeps beside its contact
+#: the ideal joint that a clearance joint keeps next to its contact
 HELD = {"clearance-revolute": "planar", "clearance-slot": "planar"}

@@ -27,7 +27,7 @@ def motion(w, x, u, S):
 
 @kernel
 def position_rate(w, x, u, rate):
-    """Rates of the positions x at the speeds u, all places in w."""
+    """Rates of the positions x at the speeds u, all indices in w."""
     quaternion_rate(w, x, u, rate)
 
 

@@ -25,9 +25,9 @@ from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.run import begun, driven
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT
 
-#: drives reach the wanted pose in strides of this share of the mechanism's size, or this angle
+#: drives reach the requested pose in strides of this fraction of the mechanism's size, or this angle
 STRIDE = 0.05
-#: shortest stride, as a share of the whole way, before the pose counts as out of reach
+#: shortest stride, as a fraction of the whole way, before the pose counts as out of reach
 SHORTEST = 1e-4
 
 
@@ -131,17 +131,17 @@ def set_drives(bench: Bench, drives: np.ndarray) -> None:
 
 def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Positions after the drives have gone to `target` in strides, the loops closed after each."""
-    origin, share, stride = bench.drives[:, 0], 0.0, 1.0
+    origin, fraction, stride = bench.drives[:, 0], 0.0, 1.0
     if not bench.model.closures:
-        share = 1.0
+        fraction = 1.0
     else:
         way = float(np.max(np.abs(target - origin) / bench.units, initial=0.0))
         stride = min(1.0, STRIDE / way) if way > 0.0 else 1.0
-    while share < 1.0:
-        attempt = min(1.0, share + stride)
+    while fraction < 1.0:
+        attempt = min(1.0, fraction + stride)
         try:
             set_drives(bench, np.stack([origin + attempt * (target - origin), 0.0 * target], axis=1))
-            q, share = closed(bench, q), attempt
+            q, fraction = closed(bench, q), attempt
         except SolverError:
             stride *= 0.5
             if stride < SHORTEST:
@@ -160,7 +160,7 @@ def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarra
 
 
 def rows(bench: Bench, states: np.ndarray) -> np.ndarray:
-    """Rows of the record for states; contacts act as they stand."""
+    """Rows of the record for states; contacts act as they are."""
     contacts = len(bench.model.contacts)
     made = m.empty_record(len(states), contacts, bench.model.ny)
     record = m.record(made, contacts)
@@ -178,9 +178,9 @@ def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
     seen = observe(bench, state(bench, q)[None, :])
     if seen.status[0] != m.OK:
         raise SolverError(f"at t = {bench.time:.6g} s: the loops cannot be closed in the pose of the drives")
-    for place, angle in angles(bench.model.arrays.table(m.GAUGES), seen.sites[0]).items():
-        before = bench.internal[place]
-        bench.internal[place] = angle + 2.0 * np.pi * np.round((before - angle) / (2.0 * np.pi))
+    for index, angle in angles(bench.model.arrays.table(m.GAUGES), seen.sites[0]).items():
+        before = bench.internal[index]
+        bench.internal[index] = angle + 2.0 * np.pi * np.round((before - angle) / (2.0 * np.pi))
     return seen.state[0, : len(q)].copy()
 
 

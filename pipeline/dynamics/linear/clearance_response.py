@@ -6,7 +6,7 @@ Joints and drives hold the links: a small opening e of what they demand moves th
 
 where G holds the rates of all joints' residuals. Of what is asked for, s x, only the adjoint solution
 :math:`\lambda^T = s G^{+}` is needed, which is one solve for all openings of all joints: the reactions of the joints to
-a unit load there. Clearance lets two places part by up to its radius (and the depth to
+a unit load there. Clearance lets two points separate by up to its radius (and the depth to
 which the joint's force presses them), in any direction: its bound is the largest singular value of the map from there
 to the body that is asked for. That holds where joints and drives leave the body asked for no freedom; elsewhere masses
 decide, and there is no bound (infinite). A body that bends opens the joints by what its ends move (`openings`); what
@@ -39,10 +39,10 @@ from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
 
-#: the motion is looked at so often
+#: the motion is examined so often
 LOOKS = 32
-#: squared singular values of the joints' rates far below this share of the largest are zero, and what is shown may be
-#: free by this: where a pose comes within some 3e-4 of a singular one there is no bound
+#: squared singular values of the joints' rates far below this fraction of the largest are zero, and what is shown may
+#: be free by this: where a pose comes within some 3e-4 of a singular one there is no bound
 RANK, FREE = 1e-13, 1e-6
 #: the force that presses a joint with clearance together is at least so many times the ideal one when it has been open
 KNOCK = 10.0
@@ -62,7 +62,7 @@ class Bounds:
 
 
 def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Bounds:
-    """Bounds for the clearances of a scene from the run of its ideal twin.
+    """Bounds for the clearances of a scene from the run of its ideal mechanism.
 
     Of `chosen` those that the pose decides are bounded.
     """
@@ -81,8 +81,8 @@ def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Bounds:
         for q in asked:
             adjoint = lever.adjoint(shown(model, poses, q.owner, turning=q.kind == "orientation"))
             if not whole or adjoint.free > FREE:
-                for found in clearance.values():
-                    found[q.name] = np.inf
+                for bound in clearance.values():
+                    bound[q.name] = np.inf
                 continue
             for name in loose:
                 reach = lever.clearance(name, adjoint.rows) * _play(full.contacts()[name], load[name])
@@ -97,7 +97,7 @@ def is_whole(model: Model) -> bool:
 
 
 def _play(joint: Clearance, force: float) -> float:
-    """How far the places may part [m]: the clearance, and how deep a force presses the surfaces."""
+    """How far the points may separate [m]: the clearance, and how deep a force presses the surfaces."""
     law = lookup(NORMAL_LAWS, joint.normal.law, where="[normal]")
     exponent = law.exponent if joint.normal.exponent is None else joint.normal.exponent
     stiffness = lookup(CONTACTS, joint.type, where="[joint]").stiffness(joint, exponent)
@@ -110,7 +110,7 @@ class Lever:
 
     gradient: rates of all joints' residuals, (rows, 6 (links - 1)).  normal: of the least-squares solution, factored.
     joints: of each joint, where its demands begin.  axes: wrenches of each joint's demands and driven coordinates.
-    length: by which openings are told as shares.
+    length: by which openings are reported as fractions.
     """
 
     gradient: sparse.csc_array
@@ -126,7 +126,7 @@ class Lever:
         return Adjoint(-rows.T, float(np.abs(shown - (self.gradient.T @ rows).T).max(initial=0.0)))
 
     def clearance(self, name: str, rows: np.ndarray) -> float:
-        """Largest motion of what an adjoint solution tells of, per metre that the places of a joint part."""
+        """Largest motion of what an adjoint solution describes, per metre of separation of a joint's points."""
         constraint, mine = self.joints[name]
         count = 2 if constraint.edge.kind == "revolute" else 3
         first = rows[:, mine][:, :count] / self.length
@@ -160,26 +160,26 @@ def _wrenches(joint: Constraint, poses: Sequence[Placement]) -> np.ndarray:
     from flexclear.pipeline.dynamics.model.constraints import prescribed
 
     A, B = joint.frames(poses)
-    found = demands(joint.edge.kind, A, B)[1]
-    return np.vstack([found, prescribed(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else found
+    demanded = demands(joint.edge.kind, A, B)[1]
+    return np.vstack([demanded, prescribed(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else demanded
 
 
 def shown(model: Model, poses: Sequence[Placement], body: str, *, turning: bool) -> np.ndarray:
     """Motion of a body, (3, 6 (links - 1)): of its centre of mass [m], or its turn [rad]."""
     i = model.mechanism.link_of[body]
-    found = np.zeros((3, 6 * (len(poses) - 1)))
+    matrix = np.zeros((3, 6 * (len(poses) - 1)))
     if i == 0:
-        return found
+        return matrix
     turn, shift = slice(6 * i - 6, 6 * i - 3), slice(6 * i - 3, 6 * i)
     if turning:
-        found[:, turn] = np.eye(3)
-        return found
+        matrix[:, turn] = np.eye(3)
+        return matrix
     link = model.mechanism.links[i]
     middle = poses[i].of(Placement(link.inertia.com if link.inertia is not None else np.zeros(3))).p
     arm = centre(model, poses, body) - middle
-    found[:, shift] = model.mechanism.length * np.eye(3)
-    found[:, turn] = -np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
-    return found
+    matrix[:, shift] = model.mechanism.length * np.eye(3)
+    matrix[:, turn] = -np.array([[0, -arm[2], arm[1]], [arm[2], 0, -arm[0]], [-arm[1], arm[0], 0]])
+    return matrix
 
 
 def centre(model: Model, poses: Sequence[Placement], body: str) -> np.ndarray:
@@ -230,14 +230,14 @@ def openings(
 ) -> tuple[np.ndarray, dict[str, Carried]]:
     """How the elastic coordinates of a body open the joints, shape (rows, mode), and move what is fixed to it."""
     i = model.mechanism.link_of[name]
-    place = poses[i].of(model.mechanism.links[i].places[name])
+    placement = poses[i].of(model.mechanism.links[i].places[name])
     frames = [str(frame) for frame in bundle["frame"].values]
-    found, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, Carried]()
+    matrix, carried = np.zeros((lever.gradient.shape[0], bundle.sizes["mode"])), dict[str, Carried]()
     for body, frame in _carried(model.scene, name).items():
         k = frames.index(frame)
-        u = place.R @ bundle["frame_translation_shape"].values[k]
-        theta = place.R @ bundle["frame_rotation_shape"].values[k]
-        at = place.of(Placement(bundle["frame_position"].values[k])).p
+        u = placement.R @ bundle["frame_translation_shape"].values[k]
+        theta = placement.R @ bundle["frame_rotation_shape"].values[k]
+        at = placement.of(Placement(bundle["frame_position"].values[k])).p
         carried[body] = Carried(at, theta, u)
         twist = np.vstack([theta, u - np.cross(theta, at, axisa=0, axisb=0).T])
         for joint_name, (constraint, rows) in lever.joints.items():
@@ -245,41 +245,41 @@ def openings(
             unit = np.where(np.any(wrench[:, 3:] != 0.0, axis=1), 1.0 / lever.length, 1.0)
             for end, sign in ((constraint.edge.frame_a, -1.0), (constraint.edge.frame_b, 1.0)):
                 if _held_by(end, body, name, frame):
-                    found[rows] += sign * unit[:, None] * (wrench @ twist)
-    return found, carried
+                    matrix[rows] += sign * unit[:, None] * (wrench @ twist)
+    return matrix, carried
 
 
 def _ports(scene: Scene, name: str) -> dict[str, tuple[str, float]]:
     """The joints of a body: frame of the body, and the sign of the wrench that acts on it."""
-    found = {}
+    ports = {}
     for joint, part in scene.joint.items():
         for end, sign in zip(part.between, (-1.0, 1.0), strict=True):
             body, _, frame = end.partition(".")
             if body == name:
-                found[joint] = (frame, sign)
-    return found
+                ports[joint] = (frame, sign)
+    return ports
 
 
 def _carried(scene: Scene, name: str) -> dict[str, str]:
     """Bodies fixed to a body, by its frame that carries them; the body itself by each frame with another joint."""
     fixed = [part.between for part in scene.joint.values() if part.type == "fixed"]
-    found: dict[str, str] = {}
+    carriers: dict[str, str] = {}
     open_ends = []
     for a, b in fixed:
         for here, there in ((a, b), (b, a)):
             if here.partition(".")[0] == name:
-                found[there.partition(".")[0]] = here.partition(".")[2]
+                carriers[there.partition(".")[0]] = here.partition(".")[2]
                 open_ends.append(there.partition(".")[0])
     while open_ends:
         body = open_ends.pop()
         for a, b in fixed:
             for here, there in ((a, b), (b, a)):
                 other = there.partition(".")[0]
-                if here.partition(".")[0] == body and other not in found and other != name:
-                    found[other] = found[body]
+                if here.partition(".")[0] == body and other not in carriers and other != name:
+                    carriers[other] = carriers[body]
                     open_ends.append(other)
     own = [frame for joint, (frame, _) in _ports(scene, name).items() if scene.joint[joint].type != "fixed"]
-    return found | {f"{name}.{frame}": frame for frame in own}
+    return carriers | {f"{name}.{frame}": frame for frame in own}
 
 
 def _held_by(end: str, carried: str, name: str, frame: str) -> bool:

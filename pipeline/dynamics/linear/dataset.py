@@ -26,7 +26,7 @@ def equilibrium(bench: Bench, rest: Equilibrium, moving: bool) -> xr.Dataset:
     """The pose and what holds it (schema EQUILIBRIUM)."""
     seen = observe(bench, state(bench, rest.at.q)[None, :])
     contacts, none = len(bench.model.contacts), m.named(m.EVENT, np.zeros((0, m.EVENT.size)))[:, 0]
-    once = Trajectory(rows(bench, seen.state), none, contacts, {}, ((bench.time, bench.engine.kept.copy()),))
+    once = Trajectory(rows(bench, seen.state), none, contacts, {}, ((bench.time, bench.engine.selected.copy()),))
     still = dataset(Run(bench.scene, bench.engine, once, seen)).isel(time=0, drop=True)
     kept = [n for n in EQUILIBRIUM if n in still.variables]
     names = [n for n in still.coords if set(still[n].dims) <= set().union(*(still[k].dims for k in kept))]
@@ -54,15 +54,15 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
     phase = _phase(translation, rotation, w)
     w, translation, rotation = w * phase, translation * phase[:, None, None], rotation * phase[:, None, None]
     size, parts = np.abs(value), list(energy)
-    share = np.stack([energy[name] for name in parts], axis=1)
-    most = first_largest(share, axis=1)
+    fraction = np.stack([energy[name] for name in parts], axis=1)
+    most = first_largest(fraction, axis=1)
     data: dict[str, Any] = {
         "frequency": ("vibration", np.abs(value.imag) / (2.0 * np.pi)),
         "undamped_frequency": ("vibration", size / (2.0 * np.pi)),
         "decay_rate": ("vibration", 0.0 - value.real),
         "damping_ratio": ("vibration", np.where(size > 0.0, (0.0 - value.real) / np.where(size > 0.0, size, 1.0), 0.0)),
         "dominant": ("vibration", np.array(parts, dtype=str)[most]),
-        "energy_share": (("vibration", "moving_body"), share),
+        "energy_share": (("vibration", "moving_body"), fraction),
         "frame_translation": (("vibration", "part", "frame", "axis"), _split(translation)),
         "frame_rotation": (("vibration", "part", "frame", "axis"), _split(rotation)),
     }
@@ -77,12 +77,12 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
         moving_body=parts,
         frame=list(bench.model.mechanism.frames),
     )
-    told = still.attrs | {"title": f"Vibrations of {subject(bench.scene)}"}
-    return conform(made, LINEAR, **told, motions_without_stiffness=small.free)
+    facts = still.attrs | {"title": f"Vibrations of {subject(bench.scene)}"}
+    return conform(made, LINEAR, **facts, motions_without_stiffness=small.free, growth=small.growth)
 
 
 def _motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
-    """Motion of every named frame in each vibration, and the share of every body in its kinetic energy.
+    """Motion of every named frame in each vibration, and the fraction of every body in its kinetic energy.
 
     Translations and rotations: world axes, complex, shape (n, frame, 3).
     """

@@ -20,28 +20,22 @@ import xarray as xr
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, closed, hold, set_drives
+from flexclear.pipeline.dynamics.linear.bench import Bench, closed, hold
 from flexclear.pipeline.dynamics.linear.tangent import Tangent, magnitude, stiffness, tangent
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.run.singular import built_rows
 
 #: iterations before giving up
 MOST = 200
-#: longest step, as a share of the mechanism's size or of a radian
+#: longest step, as a fraction of the mechanism's size or of a radian
 LONGEST = 0.2
-#: balanced: unbalanced force below this share of those in balance (or of the weight), or a step too short to matter
+#: balanced: unbalanced force below this fraction of those in balance (or of the weight), or a step too short to matter
 BALANCED, SHORT = 1e-12, 1e-14
 #: what rounding may leave when iterations no longer gain
 ROUNDING = 1e-8
-#: eigenvalues of the stiffness below this share of the largest hold nothing
+#: eigenvalues of the stiffness below this fraction of the largest hold nothing
 LIMP = 1e-12
-#: a step may end with this share of the starting power turned against it
+#: a step may end with this fraction of the starting power turned against it
 OVERSHOOT = 0.5
-#: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
-STEADY = 1e-9
-#: how far the drives are moved to see whether the forces stay the same, in radians or shares of the mechanism's size
-PROBE = 0.1
 
 
 @dataclass(frozen=True)
@@ -59,19 +53,15 @@ def equilibrium(
     progress: Progress,
     time: float | None,
     drives: Mapping[str, float] | None,
-    moving: bool,
 ) -> tuple[Bench, Equilibrium]:
-    """The bench of a scene and its equilibrium; see `pipeline.dynamics.equilibrium`."""
-    bench, q = hold(scene, bundles, progress, time, drives, moving)
-    progress(None, "looking for the equilibrium")
-    rest = find_equilibrium(bench, q)
-    if moving:
-        _require_steady(bench, rest.at)
-    return bench, rest
+    """The bench of a scene and its equilibrium, drives held; see `pipeline.dynamics.equilibrium`."""
+    bench, q = hold(scene, bundles, progress, time, drives, False)
+    progress(None, "Computing the equilibrium")
+    return bench, descend(bench, q)
 
 
-def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
-    """The equilibrium near positions q (loops closed); SolverError when there is none or none is found."""
+def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
+    """The equilibrium close to positions q (loops closed); SolverError when there is none, or the search fails."""
     at = tangent(bench, q)
     best, since = np.inf, 0
     for iteration in range(MOST):
@@ -87,8 +77,9 @@ def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
         at = _search(bench, at, step)
     loose = _leading(bench.model, at.Z @ at.unbalanced, at.mass)
     raise SolverError(
-        f"no static equilibrium was found near this pose in {MOST} iterations: a force of {residual(bench, at):.3g} N "
-        f"stays unbalanced, most of it at {loose}; hold that motion by a joint, a drive or a spring"
+        f"the search for a static equilibrium close to this pose failed in {MOST} iterations: "
+        f"a force of {residual(bench, at):.3g} N stays unbalanced, most of it at {loose}; "
+        "hold that motion by a joint, a drive or a spring"
     )
 
 
@@ -121,51 +112,17 @@ def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
 def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
     """The pose after the step or a part of it."""
     direction = at.Z @ step
-    share, power = 1.0, -float(step @ at.unbalanced)
+    fraction, power = 1.0, -float(step @ at.unbalanced)
     for _ in range(80):
         try:
-            new = tangent(bench, closed(bench, at.q + share * (at.moves @ direction)))
+            new = tangent(bench, closed(bench, at.q + fraction * (at.moves @ direction)))
         except SolverError:
-            share *= 0.5
+            fraction *= 0.5
             continue
         if -float((new.Z.T @ (at.mass @ direction)) @ new.unbalanced) >= -OVERSHOOT * power:
             return new
-        share *= 0.5
+        fraction *= 0.5
     raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium can be made from this pose")
-
-
-def _require_steady(bench: Bench, at: Tangent) -> None:
-    """SolverError unless the pose stays in balance, and the loops closed, while the drives move on."""
-    fastest = float(np.max(np.abs(bench.drives[:, 1]) / bench.units, initial=0.0))
-    if fastest == 0.0:
-        return
-    model, before, forces = bench.model, balance(bench, at.q), _forces(bench)
-    along = built_rows(model, bench.engine.h) == 0
-    loops = float(np.max(np.abs(before.slip) / np.where(along, model.length, 1.0), initial=0.0))
-    if loops <= STEADY * fastest:
-        onward = bench.drives + np.stack([PROBE * bench.drives[:, 1] / fastest, np.zeros(len(bench.drives))], axis=1)
-        set_drives(bench, onward)
-        after = balance(bench, at.q)
-        forces = max(forces, _forces(bench))
-        set_drives(bench, bench.drives)
-        change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))
-        if change <= STEADY * forces:
-            return
-    raise SolverError(
-        f"at t = {bench.time:.6g} s: the drives' motion is not steady: the forces on the free coordinates change "
-        "as they go on; hold the drives instead"
-    )
-
-
-def _forces(bench: Bench) -> float:
-    """Size of the forces that balance each other in the state evaluated last, as moments [N m].
-
-    Those of inertia, gravity, loads and contacts on each link and what it carries, and those of each load and contact
-    alone.  What is left of them along the free coordinates says nothing: in balance that is rounding.
-    """
-    wrenches, loads, touch = (bench.engine.table(table) for table in (m.WRENCH, m.LOAD, m.TOUCH))
-    forces = [bench.model.length * rows["force"] for rows in (wrenches, loads, touch)]
-    return max(float(np.max(np.abs(v), initial=0.0)) for v in [*forces, wrenches["moment"], loads["moment"]])
 
 
 def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
@@ -173,12 +130,12 @@ def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
 
     motion: speeds, shape (nv,).
     """
-    energy, shares = motion * (mass @ motion), dict[str, float]()
+    energy, fractions = motion * (mass @ motion), dict[str, float]()
     for i, link in enumerate(model.links[1:], start=1):
         edge, mine = link.branch.edge, model.numbering.coordinates[i]
         name = f"joint {edge.name}" if edge is not None else f"body {link.group.host}"
         if not link.drives:
-            shares[name] = shares.get(name, 0.0) + float(energy[mine].sum())
+            fractions[name] = fractions.get(name, 0.0) + float(energy[mine].sum())
         if link.flexible:
-            shares[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
-    return max(shares, key=lambda name: shares[name])
+            fractions[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
+    return max(fractions, key=lambda name: fractions[name])

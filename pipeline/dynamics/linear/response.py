@@ -1,4 +1,4 @@
-r"""What bending of bodies does to first order along the ideal motion: to places, rates and the forces of joints.
+r"""What bending of bodies does to first order along the ideal motion: to positions, rates and the forces of joints.
 
 Small motions are those of the links, x, and of the bodies' elastic coordinates, q, that open no joint
 (`clearance_response`):
@@ -10,7 +10,7 @@ along. Its vibrations are the assembled mechanism's; from rest each coordinate o
 vibration about it, whose amplitude is the spectrum of the ideal motion's loads at that frequency (Duhamel's integral,
 undamped). Rates are the vibrations' own; forces of joints hold the accelerations, by the adjoint solution of the joint.
 
-The pose is held where it is, so that several of the motion are looked at. What is told is the sum of all amplitudes,
+The pose is held where it is, so that several of the motion are examined. The result is the sum of all amplitudes,
 which is at least what the vibrations do.
 
 Source: Craig and Kurdila, *Fundamentals of Structural Dynamics*, ch. 5 and 11.
@@ -35,15 +35,16 @@ from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
 
-#: poses at which the vibrations are looked at
+#: poses at which the vibrations are examined
 LOOKS = 8
 #: kinds of quantities by what of the elastic coordinates makes them
 PLACES, RATES, FORCES = ("position", "orientation"), ("velocity", "angular_velocity"), ("force",)
 TURNS = ("orientation", "angular_velocity")
-#: singular values below this share of the largest are none; squared frequencies below this share are of free motions
+#: singular values below this fraction of the largest are none; squared frequencies below this fraction are of free
+#: motions
 FOLLOWED, LIMP = 1e-9, 1e-12
-#: share of the largest force that loads of their size could have on a vibration, from which on they excite it; of loads
-#: along a rod 2e-14 are left across it
+#: fraction of the largest force that loads of their size could have on a vibration, from which on they excite it; of
+#: loads along a rod 2e-14 are left across it
 FELT = 1e-10
 
 
@@ -52,7 +53,7 @@ class Response:
     """Of all flexible bodies together. first: lowest frequency of the assembled mechanism [Hz].
 
     excited: lowest frequency of a vibration that the motion's loads excite [Hz], nan where they excite none.
-    amplification: largest share of its quasi-static value that the coordinate of this vibration reaches.
+    amplification: largest fraction of its quasi-static value that the coordinate of this vibration reaches.
     influence: of each quantity, at most [SI]; infinite where it is not known.
     """
 
@@ -67,7 +68,7 @@ def response(
     bundles: Mapping[str, xr.Dataset],
     chosen: Sequence[Quantity],
 ) -> Response:
-    """The response of flexible bodies to the ideal motion of their mechanism, the run of its rigid twin.
+    """The response of flexible bodies to the ideal motion of their mechanism, the run of its rigid version.
 
     bundles: the reduced bodies.
     """
@@ -85,17 +86,19 @@ def response(
     forces = np.hstack(
         [clearance_response.modal_forces(model, motions, n, b, loads, every)[once] for n, b in bundles.items()]
     )
-    joints, found = constraints(model.mechanism), list[Response]()
+    joints, responses = constraints(model.mechanism), list[Response]()
     for row in np.unique(np.linspace(0, len(once) - 1, LOOKS).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
         assembled = _assembled(model, clearance_response.lever_of(model, joints, poses), poses, bundles)
         if assembled is None:
             return unknown
-        found.append(_at(assembled, forces, time, chosen))
-    worst = {q.name: max(r.influence[q.name] for r in found) for q in chosen}
-    felt = [r for r in found if np.isfinite(r.excited)]
+        responses.append(_at(assembled, forces, time, chosen))
+    worst = {q.name: max(r.influence[q.name] for r in responses) for q in chosen}
+    felt = [r for r in responses if np.isfinite(r.excited)]
     excited = min((r.excited for r in felt), default=np.nan)
-    return Response(min(r.first for r in found), excited, max((r.amplification for r in felt), default=np.nan), worst)
+    return Response(
+        min(r.first for r in responses), excited, max((r.amplification for r in felt), default=np.nan), worst
+    )
 
 
 @dataclass(frozen=True)
@@ -103,8 +106,8 @@ class _Assembled:
     """The elastic mechanism in a pose, its small motions in motions of the links and elastic coordinates, (x, q).
 
     omega: frequencies, ascending [rad/s].  modes: (x, q) of each, M-orthonormal, shape (6 (links - 1) + n, modes).
-    free: motions without stiffness, likewise.  own: what bodies move beside their link, per q.  momenta: of all bodies,
-    as wrenches on the links, per (x, q).
+    free: motions without stiffness, likewise.  own: what bodies move next to their link, per q.  momenta: of all
+    bodies, as wrenches on the links, per (x, q).
     """
 
     model: Model
@@ -163,10 +166,10 @@ def _mass(
     for name, body in model.scene.body.items():
         if not isinstance(body, RigidBody):
             continue
-        place = poses[model.mechanism.link_of[name]].of(
+        placement = poses[model.mechanism.link_of[name]].of(
             model.mechanism.links[model.mechanism.link_of[name]].places[name]
         )
-        inertia = place.R @ np.array(body.inertia) @ place.R.T
+        inertia = placement.R @ np.array(body.inertia) @ placement.R.T
         rigid = [clearance_response.shown(model, poses, name, turning=turning) for turning in (True, False)]
         turn, shift = (np.hstack(parts) for parts in zip(rigid, own[name], strict=True))
         spin, push = inertia @ turn, body.mass * shift
@@ -174,7 +177,7 @@ def _mass(
         if name in bundles:
             k = list(bundles).index(name)
             mine = slice(m + first[k], m + first[k + 1])
-            push_q, spin_q = _momenta(bundles[name], place, clearance_response.centre(model, poses, name))
+            push_q, spin_q = _momenta(bundles[name], placement, clearance_response.centre(model, poses, name))
             across = turn.T @ spin_q + shift.T @ push_q
             M[:, mine] += across
             M[mine, :] += across.T
@@ -185,12 +188,12 @@ def _mass(
     return 0.5 * (M + M.T), momenta
 
 
-def _momenta(bundle: xr.Dataset, place: Placement, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _momenta(bundle: xr.Dataset, placement: Placement, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Linear momentum of a body's deformation, and its moment about a point, per rate of q, world axes, (3, mode)."""
-    push = place.R @ bundle["modal_first_moment"].values
+    push = placement.R @ bundle["modal_first_moment"].values
     P = bundle["position_mode_moment"].values
-    about_frame = place.R @ np.stack([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]])
-    return push, about_frame + np.cross(place.p - centre, push, axisa=0, axisb=0).T
+    about_frame = placement.R @ np.stack([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]])
+    return push, about_frame + np.cross(placement.p - centre, push, axisa=0, axisb=0).T
 
 
 def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Sequence[Quantity]) -> Response:
@@ -210,20 +213,20 @@ def _at(assembled: _Assembled, forces: np.ndarray, time: np.ndarray, chosen: Seq
             shown = moved @ assembled.modes
             size = np.linalg.norm(shown, axis=0)
             if q.kind in PLACES:
-                told = np.linalg.norm(still @ shown.T, axis=1) + amplitude @ size
+                sizes = np.linalg.norm(still @ shown.T, axis=1) + amplitude @ size
             else:
-                told = np.linalg.norm(rate @ shown.T, axis=1) + amplitude @ (size * omega)
-            influence[q.name] = float(told.max())
+                sizes = np.linalg.norm(rate @ shown.T, axis=1) + amplitude @ (size * omega)
+            influence[q.name] = float(sizes.max())
         elif q.kind in FORCES and q.owner in assembled.lever.joints:
             size = np.linalg.norm(_reaction(assembled, q.owner), axis=0)
             influence[q.name] = float((amplitude @ (size * omega**2)).max())
         else:
             influence[q.name] = np.inf
-    found = first_excited(forces, assembled.modes[-forces.shape[1] :])
-    if found is None:
+    excitation = first_excited(forces, assembled.modes[-forces.shape[1] :])
+    if excitation is None:
         return Response(float(omega[0] / (2.0 * np.pi)), np.nan, np.nan, influence)
-    reached = (np.abs(still) + amplitude)[:, found].max() / np.abs(still[:, found]).max()
-    first, excited = (float(omega[k] / (2.0 * np.pi)) for k in (0, found))
+    reached = (np.abs(still) + amplitude)[:, excitation].max() / np.abs(still[:, excitation]).max()
+    first, excited = (float(omega[k] / (2.0 * np.pi)) for k in (0, excitation))
     return Response(first, excited, float(reached), influence)
 
 
@@ -232,8 +235,8 @@ def first_excited(forces: np.ndarray, shapes: np.ndarray) -> int | None:
 
     forces: (rows, n).  shapes: (n, vibrations).  A vibration's force is a sum of n products; of one at right angles to
     all forces, as bending across the plane of a planar mechanism is, their rounding is left, and that of the loads: no
-    share of it tells anything.  By Schwarz' inequality the sum is at most the product of both lengths, so that what is
-    below `FELT` of that, over all rows, is nothing.
+    fraction of it has any meaning.  By Schwarz' inequality the sum is at most the product of both lengths, so that what
+    is below `FELT` of that, over all rows, is nothing.
     """
     size = float(np.linalg.norm(forces, axis=1).max(initial=0.0))
     most = np.abs(forces @ shapes).max(axis=0, initial=0.0)
@@ -251,14 +254,14 @@ def vibration(f: np.ndarray, omega: np.ndarray, time: np.ndarray) -> np.ndarray:
     steps = np.diff(time)
     slope = np.diff(still, axis=0) / steps[:, None]
     z = -still[0] + 1j * slope[0] / omega  # d + i times minus its rate over omega, in the turning frame
-    found = np.empty(still.shape)
-    found[0] = np.abs(z)
+    amplitude = np.empty(still.shape)
+    amplitude[0] = np.abs(z)
     for k, step in enumerate(steps):
         z = z * np.exp(1j * omega * step)
         if k + 1 < len(slope):
             z = z + 1j * (slope[k + 1] - slope[k]) / omega
-        found[k + 1] = np.abs(z)
-    return found
+        amplitude[k + 1] = np.abs(z)
+    return amplitude
 
 
 def _reaction(assembled: _Assembled, joint: str) -> np.ndarray:

@@ -115,7 +115,7 @@ class Bushing:
     apply = staticmethod(apply)
 
     @staticmethod
-    def row(load: Declared, place: str) -> Row:
+    def row(load: Declared, path: str) -> Row:
         """Stiffness, then damping, row by row [SI]."""
         numbers = [entry for matrix in (load.stiffness, load.damping) for row in matrix for entry in row]
         return Row(frames=load.between, numbers=tuple(numbers))

@@ -1,4 +1,4 @@
-"""Where loads stand in the tables, and what the kernels of all loads share: measuring and pushing.
+"""Positions of loads in the tables, and the common kernels of loads: measuring and pushing.
 
 A load between two sites acts on both by one wrench, with opposite signs: it leaves no force and no moment over.
 """
@@ -40,7 +40,7 @@ def act(h, w, k, moment, force, value, rate, stored, power, loss):
     put(w, o + m.LOAD.moment, moment)
     w[o + m.LOAD.value], w[o + m.LOAD.rate], w[o + m.LOAD.stored] = value, rate, stored
     w[o + m.LOAD.power], w[o + m.LOAD.loss] = power, loss
-    ledger = h[m.LEDGER_RATE] + h[m.LOAD_SLOT]
+    ledger = h[m.LEDGER_RATE] + m.LOADS.book(h, k)
     w[ledger] += power
     w[ledger + 1] += loss
     apply_wrench(h, w, m.LOADS.b(h, k), moment, force)

@@ -24,6 +24,6 @@ class JointForce:
     apply = staticmethod(apply)
 
     @staticmethod
-    def row(load: Declared, place: str, coordinate: Coordinate) -> Row:
+    def row(load: Declared, path: str, coordinate: Coordinate) -> Row:
         """One law [N or N m]."""
-        return Row(joint=load.joint, laws=((load.force, coordinate.force, f"{place[:-1]}.force]"),))
+        return Row(joint=load.joint, laws=((load.force, coordinate.force, f"{path[:-1]}.force]"),))

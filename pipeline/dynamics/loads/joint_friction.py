@@ -34,7 +34,7 @@ class JointFriction:
     apply = staticmethod(apply)
 
     @staticmethod
-    def row(load: Declared, place: str, coordinate: Coordinate) -> Row:
+    def row(load: Declared, path: str, coordinate: Coordinate) -> Row:
         """Viscous coefficient [N s/m or N m s/rad], static and dynamic friction [N or N m], their speeds."""
         viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
         if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):

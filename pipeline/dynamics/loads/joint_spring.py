@@ -27,7 +27,7 @@ class JointSpring:
     apply = staticmethod(apply)
 
     @staticmethod
-    def row(load: Declared, place: str, coordinate: Coordinate) -> Row:
+    def row(load: Declared, path: str, coordinate: Coordinate) -> Row:
         """Stiffness [N/m or N m/rad], damping [N s/m or N m s/rad], rest value [m or rad]."""
         kind = "torsional " if coordinate.turning else ""
         stiffness, damping = quantity(load.stiffness, f"{kind}stiffness"), quantity(load.damping, f"{kind}damping")

@@ -21,7 +21,7 @@ from flexclear.pipeline.dynamics.loads.fields import act, law, law_rate, measure
 from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.vectors import scale
 
-#: stands for a limit that is not there
+#: represents a limit that is not there
 UNLIMITED = 1e300
 #: what gains multiply: (whether the force is a torque, whether the measured coordinate is an angle) -> dimensions of
 #: proportional, integral and derivative gain
@@ -72,7 +72,7 @@ class Pid:
     apply = staticmethod(apply)
 
     @staticmethod
-    def row(load: Declared, place: str, coordinate: Coordinate, measured: Coordinate) -> Row:
+    def row(load: Declared, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
         """Six numbers (`numbers`), the reference, and the integral part as state."""
-        reference = (load.reference, measured.dimension, f"{place[:-1]}.reference]")
+        reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
         return Row(joint=load.joint, laws=(reference,), numbers=numbers(load, coordinate, measured), states=1)

@@ -27,7 +27,7 @@ class PointForce:
     apply = staticmethod(apply)
 
     @staticmethod
-    def row(load: Declared, place: str) -> Row:
+    def row(load: Declared, path: str) -> Row:
         """Three laws [N]."""
-        laws = tuple((c, "force", f"{place[:-1]}.force]") for c in load.force)
+        laws = tuple((c, "force", f"{path[:-1]}.force]") for c in load.force)
         return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")

@@ -26,7 +26,7 @@ class PointTorque:
     apply = staticmethod(apply)
 
     @staticmethod
-    def row(load: Declared, place: str) -> Row:
+    def row(load: Declared, path: str) -> Row:
         """Three laws [N m]."""
-        laws = tuple((c, "torque", f"{place[:-1]}.torque]") for c in load.torque)
+        laws = tuple((c, "torque", f"{path[:-1]}.torque]") for c in load.torque)
         return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")

@@ -10,7 +10,7 @@ from typing import Any
 class Row:
     """frames: the frame acted on, or the two between which it acts; or `joint`: that joint's frames.
 
-    laws: law, dimension and place of each.  numbers: as many as it needs.  follows: whether it turns with
+    laws: law, dimension and path of each.  numbers: as many as it needs.  follows: whether it turns with
     its frame.  counts_turns: whether it needs its angle beyond half a turn.  states: number of internal states.
     kinks: speeds along its joint coordinate at which its slope or curvature jumps, or 0; its kernel keeps the speed in
     LOAD_SPEEDS, and its parameters say by `bends` that steps end there.

@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.loads.pid import numbers
 from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.vectors import scale
 
-#: places of the internal states
+#: indices of the internal states
 FORCE, INTEGRAL, ERROR = range(3)
 
 
@@ -41,9 +41,9 @@ class SampledPid:
     apply = staticmethod(apply)
 
     @staticmethod
-    def row(load: Declared, place: str, coordinate: Coordinate, measured: Coordinate) -> Row:
+    def row(load: Declared, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
         """Six numbers (`pid.numbers`) and the period [s], the reference, three states."""
-        reference = (load.reference, measured.dimension, f"{place[:-1]}.reference]")
+        reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
         gains = (*numbers(load, coordinate, measured), load.period)
         return Row(joint=load.joint, laws=(reference,), numbers=gains, states=3)
 

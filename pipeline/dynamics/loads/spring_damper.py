@@ -39,6 +39,6 @@ class SpringDamper:
     apply = staticmethod(apply)
 
     @staticmethod
-    def row(load: Declared, place: str) -> Row:
+    def row(load: Declared, path: str) -> Row:
         """Stiffness [N/m], damping [N s/m], free length [m]."""
         return Row(frames=load.between, numbers=(load.stiffness, load.damping, load.free_length or 0.0))

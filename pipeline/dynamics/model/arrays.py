@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics import memory as m
 class WorkSpace(NamedTuple):
     """What kernels of one run may change. h: wiring that knows where w keeps what; w, n: floats and integers.
 
-    lengths: of the stretches of w, by their places in the header.
+    lengths: of the stretches of w, by their indices in the header.
     """
 
     h: np.ndarray
@@ -32,9 +32,9 @@ class Arrays:
     f: np.ndarray
     columns: int
 
-    def size(self, place: int) -> int:
+    def size(self, index: int) -> int:
         """A size in the header."""
-        return int(self.h[place])
+        return int(self.h[index])
 
     def table(self, table: Any, h: np.ndarray | None = None) -> np.ndarray:
         """A view of a wiring or number table with named fields, shape (rows,); of the wiring in another h if given."""
@@ -49,14 +49,14 @@ class Arrays:
         return stretch.view(np.int64 if _neighbours()[table.place][0] else np.float64).reshape(-1, table.size)
 
     def work_space(self, room: Callable[[np.ndarray], m.Room]) -> WorkSpace:
-        """A work space with a copy of h, the ground in place and all else zero.
+        """A work space with a copy of h, the ground set and all else zero.
 
         room: what the integration method needs, from the header.
         """
         h, end = self.h.copy(), 0
         lengths = _work_lengths(h, room, self.columns)
-        for place, length in lengths.items():
-            h[place] = end
+        for index, length in lengths.items():
+            h[index] = end
             end += length
         laws, contacts = self.size(m.N_LAWS), self.size(m.N_CONTACTS)
         w, n = np.zeros(end), np.zeros(m.INTEGERS + laws + contacts, dtype=np.int64)
@@ -68,12 +68,12 @@ class Arrays:
 
 @cache
 def _neighbours() -> dict[int, tuple[bool, int | None]]:
-    """Of each wiring or number table, by its place: whether it is wiring, and the place of the one after it."""
-    found: dict[int, tuple[bool, int | None]] = {}
+    """Of each wiring or number table, by its index: whether it is wiring, and the index of the one after it."""
+    neighbours: dict[int, tuple[bool, int | None]] = {}
     for array in ("h", "f"):
         places = [table.place for table in m.TABLES[array]]
-        found |= {place: (array == "h", after) for place, after in zip(places, [*places[1:], None], strict=True)}
-    return found
+        neighbours |= {index: (array == "h", after) for index, after in zip(places, [*places[1:], None], strict=True)}
+    return neighbours
 
 
 def rows(table: Any, entries: Any) -> np.ndarray:
@@ -101,8 +101,8 @@ def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> A
             counts[table], h[table.place] = len(filled), start
             start += filled.size
             arrays[array].append(filled.ravel())
-    for place, size in (_sizes(counts, tables) | dict(sizes)).items():
-        h[place] = size
+    for index, size in (_sizes(counts, tables) | dict(sizes)).items():
+        h[index] = size
     return Arrays(np.concatenate(arrays["h"]), np.concatenate(arrays["f"]), columns)
 
 
@@ -131,6 +131,7 @@ def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int
         m.N_WORN: count[m.WORN],
         m.N_BODIES: count[m.BODIES],
         m.N_FRAMES: count[m.FRAMES],
+        m.N_COMPONENTS: count[m.BOOKS],
         m.MASS_SIZE: envelope_size(named(m.ENVELOPE, tables[m.ENVELOPE])),
         m.SCHUR_SIZE: envelope_size(named(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
         m.JACOBIAN_SIZE: int(np.sum(3 * closures["threes"] * closures["n_support"])),
@@ -146,10 +147,10 @@ def envelope_size(envelope: np.ndarray) -> int:
 
 
 def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: int) -> dict[int, int]:
-    known, contacts, ny, nv = (int(h[place]) for place in (m.N_DRIVES, m.N_CONTACTS, m.NY, m.NV))
+    known, contacts, ny, nv = (int(h[index]) for index in (m.N_DRIVES, m.N_CONTACTS, m.NY, m.NV))
     closure_rows, links, nq = int(h[m.N_CLOSURE_ROWS]), int(h[m.N_LINKS]), int(h[m.NQ])
     coordinates, positions = nv + known, nq + known
-    wanted, bearings = room(h), int(h[m.N_BEARINGS])
+    requested, bearings = room(h), int(h[m.N_BEARINGS])
     tables = {
         m.LINK_FRAMES: links,
         m.SITE_FRAMES: int(h[m.N_SITES]),
@@ -203,9 +204,9 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
         m.Y: ny,
         m.Y_NEW: ny,
         m.Y_STAGE: ny,
-        m.SLOPES: wanted.slopes * ny,
-        m.DENSE: wanted.dense * ny,
-        m.MEMORY: wanted.memory,
+        m.SLOPES: requested.slopes * ny,
+        m.DENSE: requested.dense * ny,
+        m.MEMORY: requested.memory,
         m.MAGNITUDE: int(h[m.N_GROUPS]),
         m.CORRECTION: nv,
         m.LATCHED: contacts,

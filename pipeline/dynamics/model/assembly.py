@@ -12,7 +12,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.model import given_start
 from flexclear.pipeline.dynamics.model.chain import path_positions
-from flexclear.pipeline.dynamics.model.closing import EXACT, apart, close, misfit, opposite
+from flexclear.pipeline.dynamics.model.closing import EXACT, close, far_apart, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands
 from flexclear.pipeline.dynamics.model.deformation import start_place
 from flexclear.pipeline.dynamics.model.driving import joint_class
@@ -22,15 +22,16 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.placing import assemblies, chosen
 from flexclear.pipeline.dynamics.model.start_table import Given, given_coordinates
 
-#: joints that miss each other by less than this share of the mechanism's size are meant to fit
+#: joints that miss each other by less than this fraction of the mechanism's size are meant to fit
 SLIGHT = 1e-4
 
 
 def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
-    """The mechanism with links placed so that all joints fit and driven ones stand where their drives say.
+    """The mechanism with links placed so that all joints fit and driven ones are where their drives prescribe.
 
-    Raises InputError for joints whose frames start far apart or face each other the wrong way, for poses given that
-    contradict a drive, and for a mechanism that cannot be assembled, with the residual of every joint.  One with
+    Raises InputError for joints whose frames start at a large distance or face each other the wrong way, for poses
+    given that contradict a drive, and for a mechanism that cannot be assembled, with the residual of every joint.  One
+    with
     flexible bodies or paths is only checked: deformation and prescribed poses are part of its closing, which the
     engine does.
     given: laws that replace the scene's.
@@ -41,10 +42,10 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     placed = given_start.given_links(mechanism)
     between = [joint for joint in joints if {joint.link_a, joint.link_b} <= placed]
     free = len(placed) + sum(link.massless for link in mechanism.links[1:]) < len(mechanism.links)
-    wrong = apart(mechanism, joints, poses) or opposite(joints, poses)
+    wrong = far_apart(mechanism, joints, poses) or opposite(joints, poses)
     search = free and not mechanism.has_paths and (wrong is not None or bool(starts))
     judged = between if search else joints
-    wrong = apart(mechanism, judged, poses) or opposite(judged, poses)
+    wrong = far_apart(mechanism, judged, poses) or opposite(judged, poses)
     if wrong is not None:
         raise wrong
     missed = given_start.misses(mechanism, joints, poses, given)
@@ -65,18 +66,18 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
 
 def _searched(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> Mechanism:
     """The mechanism with links without poses put where the joints allow it; InputError where they do not."""
-    found = assemblies(mechanism, joints, placed, starts)
-    if not found:
+    candidates = assemblies(mechanism, joints, placed, starts)
+    if not candidates:
         _refuse_starts(mechanism, joints, placed, starts)
         driven = any(joint.values for joint in joints)
         if driven and assemblies(mechanism, [replace(joint, values={}) for joint in joints], placed, starts):
             raise _out_of_reach(mechanism, joints)
         raise _impossible(mechanism, joints, [link.start for link in mechanism.links])
-    return replace(settled(mechanism, found[0].poses), choice=chosen(mechanism, joints, found, starts))
+    return replace(settled(mechanism, candidates[0].poses), choice=chosen(mechanism, joints, candidates, starts))
 
 
 def settled(mechanism: Mechanism, poses: Sequence[Placement]) -> Mechanism:
-    """The mechanism with these starts; massless links within joints stand where the joints' coordinates put them."""
+    """The mechanism with these starts; massless links within joints are where the joints' coordinates put them."""
     links, settled_poses = [], list(poses)
     for i, link in enumerate(mechanism.links):
         if link.massless and i:
@@ -131,18 +132,18 @@ def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str,
 
 def _refuse_starts(mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]) -> None:
     """InputError when the mechanism could be assembled, but for the positions that the scene gives."""
-    wanted = [start for start in starts if start.position is not None]
-    driven = {(start.joint, start.number) for start in wanted}
+    requested = [start for start in starts if start.position is not None]
+    driven = {(start.joint, start.number) for start in requested}
     loose = [
         replace(joint, values={k: v for k, v in joint.values.items() if (joint.name, k) not in driven})
         for joint in joints
     ]
-    others = assemblies(mechanism, loose, placed, starts) if wanted else []
+    others = assemblies(mechanism, loose, placed, starts) if requested else []
     if others:
         there = others[0].coordinates
-        reached = ", ".join(f"{s.name} {there[s.joint, s.number]:.6g} {s.coordinate.unit}" for s in wanted)
+        reached = ", ".join(f"{s.name} {there[s.joint, s.number]:.6g} {s.coordinate.unit}" for s in requested)
         raise InputError(
-            f"{wanted[0].place[:-1]}.position]",
+            f"{requested[0].place[:-1]}.position]",
             f"the joints fit together, but not at the positions given; they do, for example, at {reached}",
             "correct the position, or say with near about where the coordinate starts",
         )
@@ -176,7 +177,7 @@ def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Plac
     slight = misfit(mechanism, joints, poses).worst < SLIGHT
     return InputError(
         f"[joint.{worst}.between]",
-        f"the mechanism cannot be assembled near the poses given; residuals there (m, or sines of angles): {listed}"
+        f"the mechanism cannot be assembled close to the poses given; residuals there (m, or sines of angles): {listed}"
         + ("; several joints ask for nearly, but not exactly, the same" if slight else ""),
         "write lengths, frames and poses with more digits, or replace a joint by one that leaves more motion"
         if slight

@@ -22,7 +22,7 @@ TURNS = tuple(Coordinate(axis, True, axis=k) for k, axis in enumerate("xyz"))
 
 @dataclass(frozen=True)
 class InboardJoint:
-    """The joint between a link and its parent: a joint of the scene, or one step of the chain that stands for it.
+    """The joint between a link and its parent: a joint of the scene, or one step of the chain that represents it.
 
     kind: joint type.  axes: of its frames, in the frames of the scene's joint (columns).
     positions: which of that joint's positions are its own.

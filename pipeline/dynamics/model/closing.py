@@ -18,18 +18,18 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-#: a start further from closed than this share of the mechanism's size is a mistake, not rounding
+#: a start further from closed than this fraction of the mechanism's size is a mistake, not rounding
 WORST_GUESS = 0.05
 #: residuals, in units of the mechanism's size, below which nothing is moved, and with which a closing may end; where
-#: coordinates are large beside the mechanism, so many roundings of them if that is more
+#: coordinates are large next to the mechanism, so many roundings of them if that is more
 EXACT, CLOSED = 1e-13, 1e-11
 EXACT_ROUNDINGS, CLOSED_ROUNDINGS = 4.0, 100.0
 ITERATIONS = 60
-#: least damping, as a share of the mean of the normal matrix: without any, that of redundant joints has no inverse
+#: least damping, as a fraction of the mean of the normal matrix: without any, that of redundant joints has no inverse
 ROUNDING = 1e-15
 #: least cosine between axes that a joint keeps parallel
 SAME_WAY = 0.5
-#: radius of gyration, as share of the mechanism's size, below which a link resists turning no less
+#: radius of gyration, as fraction of the mechanism's size, below which a link resists turning no less
 LEAST_GYRATION = 0.01
 
 
@@ -99,7 +99,7 @@ def close(
 
 
 def _rounding(mechanism: Mechanism) -> float:
-    """Rounding of the largest coordinates of the scene, as a share of the mechanism's size."""
+    """Rounding of the largest coordinates of the scene, as a fraction of the mechanism's size."""
     reach = [mechanism.origin, *(link.start.p for link in mechanism.links)]
     reach += [frame.place.p for frame in mechanism.frames.values()]
     return float(np.finfo(float).eps * np.max(np.abs(reach)) / mechanism.length)
@@ -158,7 +158,7 @@ def _moved(mechanism: Mechanism, poses: list[Placement], step: np.ndarray) -> li
     return moved
 
 
-def apart(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputError | None:
+def far_apart(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputError | None:
     """What is wrong about joints whose frames are far from fitting, if some are."""
     for joint in joints:
         A, B = joint.frames(poses)

@@ -1,9 +1,11 @@
-"""The tables of the contacts: wiring, numbers of their laws, and their share of the state."""
+"""The tables of the contacts: wiring, numbers of their laws, and their fraction of the state."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import lookup
@@ -13,11 +15,16 @@ from flexclear.pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_
 from flexclear.pipeline.dynamics.model.gauges import Gauges
 from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
-from flexclear.pipeline.dynamics.model.stops import End
+from flexclear.pipeline.dynamics.model.stops import End, ends_an_angle
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
 
+#: a number of each independent mechanism
+Floors = Sequence[float] | np.ndarray
+#: least impact rates where the scene gives none: far below the approach speeds of common machines [m/s or rad/s], and
+#: the share of the size of a mechanism of 10 cm that this is [1/s]; in one of micrometres 1 um/s would be fast
+LEAST_RATE, SLOW = 1e-6, 1e-5
 #: wiring of a contact but for the kinds of its laws
 Touching = Sequence[tuple[int, int]]
 
@@ -34,9 +41,11 @@ def fill(
 
     gauges: take those of the stops.
     """
-    contacts = numbering.mechanism.contacts
-    rows, reals = [], []
-    for (name, joint, *_), law, sites, place in zip(contacts, laws, touching, bristle_places(numbering), strict=True):
+    mechanism, rows, reals = numbering.mechanism, [], []
+    given = zip(mechanism.contacts, laws, touching, bristle_places(numbering), strict=True)
+    for contact, law, sites, first in given:
+        name, joint, *_ = contact
+        length = mechanism.components.lengths[part_of(mechanism, contact)]
         friction_kind, numbers, stick, kinks = -1, (0.0,) * 6, 0.0, (0.0, 0.0)
         if joint.friction is not None:
             friction = _friction(name, joint)
@@ -48,9 +57,15 @@ def fill(
         else:
             surfaces, shape = parts.surfaces.index(joint.type), joint.shape
         kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
-        rows.append((*sites, *kinds_of, place))
-        reals.append([joint.clearance, joint.radius, joint.floor, stick, *kinks, *law.numbers, *numbers, *shape])
+        rows.append((*sites, *kinds_of, first))
+        sizes = (joint.clearance, joint.radius, _floor(joint, length))
+        reals.append([*sizes, stick, *kinks, *law.numbers, *numbers, *shape, length])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
+
+
+def of_worn(mechanism: Mechanism) -> list[int]:
+    """The independent mechanism of every contact that wears."""
+    return [part_of(mechanism, mechanism.contacts[k]) for (k,) in worn(mechanism)]
 
 
 def worn(mechanism: Mechanism) -> list[tuple[int]]:
@@ -60,25 +75,37 @@ def worn(mechanism: Mechanism) -> list[tuple[int]]:
     return [(names.index(name),) for name in wearing]
 
 
-def ledger_groups(mechanism: Mechanism, energy: float) -> list[tuple[float, int]]:
-    """(floor, number of variables) of every error group after positions and speeds: ledger, then bristles."""
-    contact = [(energy, 1), (energy, 1), (energy / mechanism.length, 1)]  # losses [J], impulse [N s]
-    ledger = [(energy, 1)] * m.CONTACT_SLOTS + contact * len(mechanism.contacts)
-    return ledger + [(size, 3) for size in _bristles(mechanism) if size is not None]
+def part_of(mechanism: Mechanism, contact: Contact) -> int:
+    """The independent mechanism that a contact belongs to."""
+    return mechanism.components.of(contact.outer.link, contact.inner.link)
+
+
+def ledger_groups(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[tuple[float, int, int]]:
+    """(floor, number of variables, independent mechanism) of every error group after positions and speeds.
+
+    First the ledger, then bristles.  energies, lengths: floors of each independent mechanism.
+    """
+    parts = [part_of(mechanism, contact) for contact in mechanism.contacts]
+    ledger = [(energies[0], 1, 0)] * m.CONTACT_SLOTS
+    for part in parts:
+        ledger += [(energies[part], 1, part)] * 2 + [(energies[part] / lengths[part], 1, part)]  # losses, impulse [N s]
+    bristles = zip(_bristles(mechanism), parts, strict=True)
+    return ledger + [(size, 3, part) for size, part in bristles if size is not None]
 
 
 def ledger_size(mechanism: Mechanism) -> int:
     """Variables of the ledger up to the contacts' and their bristles, where those of the loads begin."""
-    return sum(count for _, count in ledger_groups(mechanism, 0.0))
+    ones = np.ones(len(mechanism.components.lengths))
+    return sum(count for _, count, _ in ledger_groups(mechanism, ones, ones))
 
 
 def bristle_places(numbering: Numbering) -> list[int]:
     """Where in the state each contact's deflection of bristles starts, or -1."""
-    place = numbering.nq + numbering.nv + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(numbering.mechanism.contacts)
+    first = numbering.nq + numbering.nv + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(numbering.mechanism.contacts)
     places = []
     for size in _bristles(numbering.mechanism):
-        places.append(-1 if size is None else place)
-        place += 0 if size is None else 3
+        places.append(-1 if size is None else first)
+        first += 0 if size is None else 3
     return places
 
 
@@ -89,31 +116,38 @@ def _bristles(mechanism: Mechanism) -> list[float | None]:
     ]
 
 
+def _floor(joint: Clearance | End, length: float) -> float:
+    """Least impact rate of a contact of a mechanism of that size [m/s or rad/s]."""
+    if joint.floor is not None:
+        return joint.floor
+    return LEAST_RATE if ends_an_angle(joint) else min(LEAST_RATE, SLOW * length)
+
+
 def _friction(name: str, joint: Clearance | End) -> Any:
     assert joint.friction is not None
     return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
 
 
 def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
-    joint, place = contact.joint, f"[{contact.place}.normal]"
+    joint, path = contact.joint, f"[{contact.place}.normal]"
     masses = [mechanism.links[site.link].mass for site in (contact.outer, contact.inner)]
-    normal = lookup(NORMAL_LAWS, joint.normal.law, where=place)
+    normal = lookup(NORMAL_LAWS, joint.normal.law, where=path)
     if isinstance(joint, End):
-        return _resolved(normal, joint, joint.normal.stiffness, None, place)
-    surfaces = lookup(CONTACTS, joint.type, where=place)
+        return _resolved(normal, joint, joint.normal.stiffness, None, path)
+    surfaces = lookup(CONTACTS, joint.type, where=path)
     exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
     try:
         stiffness = surfaces.stiffness(joint, exponent)
     except ValueError as error:
-        raise InputError(place, str(error)) from None
-    return _resolved(normal, joint, stiffness, _reduced_mass(masses), place)
+        raise InputError(path, str(error)) from None
+    return _resolved(normal, joint, stiffness, _reduced_mass(masses), path)
 
 
-def _resolved(normal: Any, joint: Clearance | End, stiffness: float | None, mass: float | None, place: str) -> Resolved:
+def _resolved(normal: Any, joint: Clearance | End, stiffness: float | None, mass: float | None, path: str) -> Resolved:
     try:
         law: Resolved = normal.resolve(joint.normal, stiffness, mass)
     except ValueError as error:
-        raise InputError(place, str(error)) from None
+        raise InputError(path, str(error)) from None
     return law
 
 

@@ -76,7 +76,7 @@ def couplings(mechanism: Mechanism) -> list[Coupling]:
 
 
 def _coupling(mechanism: Mechanism, name: str) -> Coupling:
-    gear, place = mechanism.scene.gear[name], f"[gear.{name}]"
+    gear, path = mechanism.scene.gear[name], f"[gear.{name}]"
     first, second = (_side(mechanism, getattr(gear, side), f"[gear.{name}.{side}]") for side in ("first", "second"))
     dimensions = {(True, True): "number", (False, False): "number", (True, False): "length per angle"}
     try:
@@ -85,18 +85,18 @@ def _coupling(mechanism: Mechanism, name: str) -> Coupling:
     except ValueError as error:
         raise InputError(f"[gear.{name}.ratio]", str(error)) from None
     if ratio == 0.0:
-        raise InputError(place, "its ratio is 0: the second coordinate would be held", "give a ratio, or drive it")
+        raise InputError(path, "its ratio is 0: the second coordinate would be held", "give a ratio, or drive it")
     return Coupling(name, ratio, second, first)
 
 
-def _side(mechanism: Mechanism, text: str, place: str) -> Side:
+def _side(mechanism: Mechanism, text: str, path: str) -> Side:
     scene = mechanism.scene
-    joint, found = named_coordinate(scene, text, place)
+    joint, coordinate = named_coordinate(scene, text, path)
     frames = scene.joint[joint].between
     sites = [mechanism.site(frame) for frame in frames]
     if sites[0].link == sites[1].link:
-        raise InputError(place, f"the bodies of joint '{joint}' move as one", "name another joint")
-    return Side(joint, found, *sites)
+        raise InputError(path, f"the bodies of joint '{joint}' move as one", "name another joint")
+    return Side(joint, coordinate, *sites)
 
 
 def tables(

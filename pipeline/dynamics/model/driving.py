@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 
 @dataclass(frozen=True)
 class Prescribed:
-    """A prescribed coordinate: its name in records, its law, what the law's values measure, where it stands."""
+    """A prescribed coordinate: its name in records, its law, what the law's values measure, where it is."""
 
     name: str
     law: Any
@@ -46,45 +46,45 @@ def prescribed(scene: Scene) -> list[Prescribed]:
     return coordinates
 
 
-def coordinate_of(scene: Scene, joint: str, name: str | None, place: str) -> tuple[str, int, Coordinate]:
+def coordinate_of(scene: Scene, joint: str, name: str | None, path: str) -> tuple[str, int, Coordinate]:
     """The joint's name, and number and declaration of the coordinate that something names."""
     if joint not in scene.joint:
-        raise InputError(f"{place[:-1]}.joint]", f"there is no joint '{joint}'", suggestion(joint, scene.joint))
+        raise InputError(f"{path[:-1]}.joint]", f"there is no joint '{joint}'", suggestion(joint, scene.joint))
     kind = scene.joint[joint].type
     if isinstance(scene.joint[joint], CONTACTS) or kind == "fixed":
         raise InputError(
-            f"{place[:-1]}.joint]", f"the {kind} joint '{joint}' has no coordinate", "name a joint with a free motion"
+            f"{path[:-1]}.joint]", f"the {kind} joint '{joint}' has no coordinate", "name a joint with a free motion"
         )
     known = joint_class(kind).COORDINATES
     names = [c.name for c in known]
     if not names:
         raise InputError(
-            f"{place[:-1]}.joint]",
+            f"{path[:-1]}.joint]",
             f"the {kind} joint '{joint}' has no single coordinate",
             "prescribe a frame's pose instead, or build the joint from a universal and a revolute one",
         )
     if name is None:
         if len(known) > 1:
             raise InputError(
-                f"{place[:-1]}.coordinate]",
+                f"{path[:-1]}.coordinate]",
                 f"the {kind} joint '{joint}' has {len(known)} coordinates, and none is named",
                 f"name one: {', '.join(names)}",
             )
         return joint, 0, known[0]
     if name not in names:
         raise InputError(
-            f"{place[:-1]}.coordinate]", f"the {kind} joint '{joint}' has no '{name}'", suggestion(name, names)
+            f"{path[:-1]}.coordinate]", f"the {kind} joint '{joint}' has no '{name}'", suggestion(name, names)
         )
     return joint, names.index(name), known[names.index(name)]
 
 
-def named_coordinate(scene: Scene, text: str, place: str) -> tuple[str, Coordinate]:
+def named_coordinate(scene: Scene, text: str, path: str) -> tuple[str, Coordinate]:
     """The joint and coordinate that ``A`` or ``A.rotation`` names; InputError when there is none."""
     joint, _, coordinate = text.partition(".")
     try:
-        return joint, coordinate_of(scene, joint, coordinate or None, place)[2]
-    except InputError as error:  # the joint and its coordinate stand in one text here
-        raise InputError(place, error.problem, error.remedy) from None
+        return joint, coordinate_of(scene, joint, coordinate or None, path)[2]
+    except InputError as error:  # the joint and its coordinate are in one text here
+        raise InputError(path, error.problem, error.remedy) from None
 
 
 def turns(scene: Scene, quantity: Quantity) -> bool:
@@ -100,7 +100,7 @@ def turns(scene: Scene, quantity: Quantity) -> bool:
 
 
 def unit_of(scene: Scene, quantity: Quantity) -> str:
-    """The SI unit of a quantity, forces along angles being torques; `core.quantities.unit` tells it of a run."""
+    """The SI unit of a quantity, forces along angles being torques; `core.quantities.unit` returns it for a run."""
     force = "N m" if turns(scene, quantity) else "N"
     return {"drive_force": force, "peak_force": force, "impulse": f"{force} s"}.get(quantity.kind, quantity.unit)
 

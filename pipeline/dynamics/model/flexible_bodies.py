@@ -22,8 +22,11 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def fill(numbering: Numbering) -> dict[Any, Any]:
-    """The tables FLEXES .. PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies."""
+def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
+    """The tables FLEXES .. PORTS and FLEX_NUMBERS .. PORT_DATA of the flexible bodies.
+
+    losses: place in the ledger of what damping loses in each independent mechanism.
+    """
     flex, flex_real, data, index, value = [], [], [], [], []
     entry, entry_value, interface = list[tuple[int, int]](), list[float](), list[np.ndarray]()
     row_end = list[int]()
@@ -41,7 +44,7 @@ def fill(numbering: Numbering) -> dict[Any, Any]:
         entries, places = basis.entries(), (i, len(q), q.start, c.start, data0, moment0, len(row_end))
         held = sum(j < basis.held for _, j in entries)
         of_basis = (basis.held, len(entry), len(entries), len(entry) + held, interface0)
-        flex.append((*places, moves, int(coupled(mechanism, i)), *of_basis))
+        flex.append((*places, moves, int(coupled(mechanism, i)), *of_basis, losses[mechanism.components.of(i)]))
         entry += entries
         entry_value += [basis.matrix[where_] for where_ in entries]
         interface.append(_interface_data(bundle, basis))
@@ -107,13 +110,13 @@ def shift(
     shape: S, (3, mode).  bow: B, (mode, mode), the shortening of a bent beam; None where the scene leaves it out.
     q, u, du: modal coordinates, rates and second rates, (time, mode).
     """
-    place, rate, second = q @ shape.T, u @ shape.T, du @ shape.T
+    displacement, rate, second = q @ shape.T, u @ shape.T, du @ shape.T
     if bow is not None:
         bent, turning = q @ bow, u @ bow
-        place[:, 0] += 0.5 * np.sum(bent * q, axis=1)
+        displacement[:, 0] += 0.5 * np.sum(bent * q, axis=1)
         rate[:, 0] += np.sum(bent * u, axis=1)
         second[:, 0] += np.sum(bent * du, axis=1) + np.sum(turning * u, axis=1)
-    return place, rate, second
+    return displacement, rate, second
 
 
 def _damping(name: str, body: FlexibleBody, bundle: xr.Dataset) -> np.ndarray:

@@ -14,22 +14,29 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 class Gauges:
     """Gauges and internal states given out so far.
 
-    rows: of the table GAUGES.  internal: number of internal states; they stand at the end of the state.
+    rows: of the table GAUGES.  owners: sites, or -1, between which the part of each internal state acts; these states
+    stand at the end of the state.
     """
 
     rows: list[tuple[int, ...]] = field(default_factory=list)
-    internal: int = 0
+    owners: list[tuple[int, int]] = field(default_factory=list)
+
+    @property
+    def internal(self) -> int:
+        """Number of internal states."""
+        return len(self.owners)
 
     def add(self, a: int, b: int, coordinate: Coordinate, *, counts: bool) -> int:
         """Number of a new gauge of a joint coordinate between sites; `counts`: whether full turns of an angle count."""
-        turns = self.states(1) if counts and coordinate.turning else -1
+        turns = self.states(1, a, b) if counts and coordinate.turning else -1
         how = (coordinate.side, coordinate.axis, *coordinate.sine, *coordinate.cosine)
         self.rows.append((a, b, turns, int(coordinate.turning), *how))
         return len(self.rows) - 1
 
-    def states(self, number: int) -> int:
-        """First of so many new internal states."""
-        first, self.internal = self.internal, self.internal + number
+    def states(self, number: int, a: int, b: int) -> int:
+        """First of so many new internal states of a part between sites."""
+        first = self.internal
+        self.owners += [(a, b)] * number
         return first
 
 
@@ -45,7 +52,7 @@ def angles(gauges: np.ndarray, sites: np.ndarray) -> dict[int, float]:
 
 def values(gauges: np.ndarray, sites: np.ndarray, internal: np.ndarray) -> list[float]:
     """Coordinates [rad, or m] that gauges measure, full turns counted as the internal states say; as of `angles`."""
-    found = []
+    entries = []
     for row in gauges:
         a, b = sites[row["a"]], sites[row["b"]]
         if row["turning"]:
@@ -53,8 +60,8 @@ def values(gauges: np.ndarray, sites: np.ndarray, internal: np.ndarray) -> list[
             cosine = float(a["axes"][:, row["cosine_f"]] @ b["axes"][:, row["cosine_g"]])
             angle = atan2(sine, cosine)
             turns = round((internal[row["turns"]] - angle) / (2.0 * np.pi)) if row["turns"] >= 0 else 0
-            found.append(angle + 2.0 * np.pi * turns)
+            entries.append(angle + 2.0 * np.pi * turns)
         else:
             along = (b if row["side"] else a)["axes"][:, row["axis"]]
-            found.append(float(along @ (b["origin"] - a["origin"])))
-    return found
+            entries.append(float(along @ (b["origin"] - a["origin"])))
+    return entries

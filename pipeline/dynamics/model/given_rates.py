@@ -16,14 +16,14 @@ from flexclear.pipeline.dynamics.model.start_table import given_coordinates, giv
 
 @dataclass(frozen=True)
 class Rate:
-    """A rate that is given: `wanted` [m/s or rad/s], where the scene says so, and what counts as much.
+    """A rate that is given: `requested` [m/s or rad/s], where the scene says so, and what counts as much.
 
     speed, sign: of which free coordinate it is the speed, times the sign; of a joint that closes a loop none.
     sites: of the two frames of such a joint, `coordinate` which of its motions.
     """
 
     place: str
-    wanted: float
+    requested: float
     size: float
     speed: int | None = None
     sign: float = 1.0
@@ -53,17 +53,17 @@ def _of_joints(model: Model) -> Iterator[Rate]:
     for start in given_coordinates(model.scene):
         if start.velocity is None:
             continue
-        place, size = f"{start.place[:-1]}.velocity]", 1.0 if start.coordinate.turning else model.length
+        path, size = f"{start.place[:-1]}.velocity]", 1.0 if start.coordinate.turning else model.length
         for i, link in enumerate(model.links):
             edge = link.branch.edge
             if edge is not None and edge.name == start.joint and not link.drives:
                 numbers = dict(zip(link.joint.positions, model.numbering.coordinates[i], strict=True))
                 if start.number in numbers:
-                    yield Rate(place, start.velocity, size, numbers[start.number], link.joint.sign)
+                    yield Rate(path, start.velocity, size, numbers[start.number], link.joint.sign)
         for row, closure in zip(closures, model.closures, strict=True):
             if not isinstance(closure, Coupling) and closure.edge.name == start.joint:
                 sites = int(row["site_a"]), int(row["site_b"])
-                yield Rate(place, start.velocity, size, sites=sites, coordinate=start.coordinate)
+                yield Rate(path, start.velocity, size, sites=sites, coordinate=start.coordinate)
 
 
 def _of_modes(model: Model) -> Iterator[Rate]:

@@ -1,4 +1,4 @@
-"""What a scene says of its start, against what its drives and joints make of it: refused, or mended and told."""
+"""What a scene says of its start, against what its drives and joints make of it: refused, or mended and reported."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
 from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
-#: a start further from its drive's law than this, as share of the mechanism's size or in rad, is a contradiction
+#: a start further from its drive's law than this, as fraction of the mechanism's size or in rad, is a contradiction
 FAR, FAR_ANGLE = 0.05, 0.1
-#: what is moved by less than this, as share of the mechanism's size or in rad, was given as well as it was written
+#: what is moved by less than this, as fraction of the mechanism's size or in rad, was given as well as it was written
 WRITTEN = 1e-6
-#: most bodies of which a mend is told one by one
+#: most bodies of which a mend is reported one by one
 MOST = 8
 
 
@@ -48,20 +48,21 @@ class Miss:
 
     @property
     def size(self) -> float:
-        """How far apart the two are; angles that differ by whole turns are one."""
-        apart = self.now - self.value
-        return abs((apart + np.pi) % (2.0 * np.pi) - np.pi) if self.turning else abs(apart)
+        """Difference of the two; angles that differ by whole turns are one."""
+        difference = self.now - self.value
+        return abs((difference + np.pi) % (2.0 * np.pi) - np.pi) if self.turning else abs(difference)
 
     def text(self) -> str:
         """What is given, and what the law says."""
         unit = "rad" if self.turning else "m"
         return (
-            f"{self.what} starts at {_told(self.now)} {unit} in the poses given, and at {_told(self.value)} {unit} by "
+            f"{self.what} starts at {_written(self.now)} {unit} in the poses given, and at "
+            f"{_written(self.value)} {unit} by "
             f"{self.rule}: {self.size:.3g} {unit} apart"
         )
 
 
-def _told(value: float) -> str:
+def _written(value: float) -> str:
     """A coordinate [m or rad] in words; rounding of poses is nought."""
     return f"{0.0 if abs(value) < 1e-12 else value:.6g}"
 
@@ -75,15 +76,15 @@ def misses(
     """
     placed = given_links(mechanism)
     driven = [joint for joint in joints if joint.values and {joint.link_a, joint.link_b} <= placed]
-    found = [miss for joint in driven for miss in _of_joint(joint, poses)]
+    collected = [miss for joint in driven for miss in _of_joint(joint, poses)]
     for link in mechanism.links:
         edge = link.branch.edge
         if edge is None or edge.kind != PATH or link.massless:
             continue
         site = mechanism.site(edge.frame_b)
         if site.link in placed:
-            found += _of_path(mechanism, edge, poses[site.link].of(start_place(mechanism, site)), given)
-    return [miss for miss in found if miss.drive not in given]
+            collected += _of_path(mechanism, edge, poses[site.link].of(start_place(mechanism, site)), given)
+    return [miss for miss in collected if miss.drive not in given]
 
 
 def given_links(mechanism: Mechanism) -> set[int]:
@@ -100,41 +101,43 @@ def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Miss]:
     A, B = joint.frames(poses)
     relative, declared = A.inverse().of(B), joint_class(joint.edge.kind)
     now = declared.coordinates(relative.R, relative.p)
-    for (k, value), apart in zip(joint.values.items(), prescribed(joint.edge.kind, A, B, joint.values)[0], strict=True):
+    for (k, value), difference in zip(
+        joint.values.items(), prescribed(joint.edge.kind, A, B, joint.values)[0], strict=True
+    ):
         coordinate, drive = declared.COORDINATES[k], joint.edge.drives[k] if joint.edge.drives else None
         what = f"joint '{joint.name}'" if len(declared.COORDINATES) == 1 else f"'{joint.name}.{coordinate.name}'"
         # the angle nearest to the law's, where turns are counted
-        start = value + float(apart) if coordinate.turning else float(now[k])
+        start = value + float(difference) if coordinate.turning else float(now[k])
         named = joint.name if len(declared.COORDINATES) == 1 else f"{joint.name}.{coordinate.name}"
-        place = f"[drive.{drive}.law]" if drive else f"[start.joint.{named}.position]"
+        path = f"[drive.{drive}.law]" if drive else f"[start.joint.{named}.position]"
         rule = f"the law of drive '{drive}'" if drive else "its own start"
-        yield Miss(drive, place, rule, what, start, value, coordinate.turning)
+        yield Miss(drive, path, rule, what, start, value, coordinate.turning)
 
 
 def _of_path(mechanism: Mechanism, edge: Edge, G: Placement, given: Mapping[str, Pieces]) -> Iterator[Miss]:
     t = mechanism.scene.time.start
     laws = dict(zip(mechanism.drives, drive_laws(mechanism.scene, given), strict=True))
     now = path_positions(edge, G.R, G.p + mechanism.origin)
-    wanted = [None if name is None else laws[name].value(t) for name in edge.drives]
+    requested = [None if name is None else laws[name].value(t) for name in edge.drives]
     if edge.vector:
-        turn = rotation_vector_to_matrix(np.array(wanted[3:6], dtype=float))
-        apart = float(rotation_between(matrix_to_quaternion(turn), matrix_to_quaternion(G.R)))
+        turn = rotation_vector_to_matrix(np.array(requested[3:6], dtype=float))
+        angle = float(rotation_between(matrix_to_quaternion(turn), matrix_to_quaternion(G.R)))
         drive, what = str(edge.drives[3]), f"the turn of '{edge.frame_b}'"
-        place = f"[drive.{drive.partition('.')[0]}.rotation]"
-        yield Miss(drive, place, f"the law of drive '{drive}'", what, apart, 0.0, True, True)
-    for k, (name, value) in enumerate(zip(edge.drives, wanted, strict=True)):
+        path = f"[drive.{drive.partition('.')[0]}.rotation]"
+        yield Miss(drive, path, f"the law of drive '{drive}'", what, angle, 0.0, True, True)
+    for k, (name, value) in enumerate(zip(edge.drives, requested, strict=True)):
         if name is None or value is None or (edge.vector and k >= 3):
             continue
         rule, what = f"the law of drive '{name}'", f"'{edge.frame_b}'"
         yield Miss(name, f"[drive.{name}]", rule, what, float(now[k]), value, k >= 3, True)
 
 
-def refuse_far(mechanism: Mechanism, found: Sequence[Miss]) -> None:
+def refuse_far(mechanism: Mechanism, far: Sequence[Miss]) -> None:
     """InputError for poses given that contradict a joint's drive by more than a mend may move them.
 
-    What a path leads is put where the path begins, however far that is, and told: the path says where the body is.
+    What a path leads is put where the path begins, however far that is, and reported: the path says where the body is.
     """
-    for miss in found:
+    for miss in far:
         if miss.of_path:
             continue
         limit = FAR_ANGLE if miss.turning else FAR * mechanism.length
@@ -143,7 +146,7 @@ def refuse_far(mechanism: Mechanism, found: Sequence[Miss]) -> None:
             raise InputError(
                 miss.place,
                 f"{miss.text()} (more than {limit:.3g} {unit})",
-                "correct the poses or where the law starts, or leave out the poses of the bodies that the drive places"
+                "correct the poses or the start of the law, or leave out the poses of the bodies that the drive moves"
                 if miss.drive
                 else "correct the poses or the position, or leave out the poses of the bodies that follow from it",
             )
@@ -160,13 +163,13 @@ def refuse_driven(mechanism: Mechanism, starts: Sequence[Given], given: Mapping[
             continue
         joint, number, coordinate = coordinate_of(mechanism.scene, drive.joint, drive.coordinate, f"[drive.{name}]")
         for start in (s for s in starts if (s.joint, s.number) == (joint, number)):
-            for key, order, wanted in (("position", 0, start.position), ("velocity", 1, start.velocity)):
+            for key, order, requested in (("position", 0, start.position), ("velocity", 1, start.velocity)):
                 law, unit = laws[name].value(t, order), coordinate.unit + "/s" * order
                 size = 1.0 if coordinate.turning else mechanism.length
-                if wanted is not None and abs(law - wanted) > WRITTEN * max(size, abs(law)):
+                if requested is not None and abs(law - requested) > WRITTEN * max(size, abs(law)):
                     raise InputError(
                         f"{start.place[:-1]}.{key}]",
-                        f"is {wanted:.6g} {unit}, and by the law of drive '{name}' {law:.6g} {unit}",
+                        f"is {requested:.6g} {unit}, and by the law of drive '{name}' {law:.6g} {unit}",
                         "leave it out; what is driven starts as its law does",
                     )
 
@@ -176,17 +179,19 @@ def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
 
     now: frames of all links at the start.
     """
-    found = []
+    corrections = []
     for i in sorted(given_links(mechanism) - {0}):
         before, after = mechanism.placed[i], now[i]
-        apart = float(np.linalg.norm(after.p - before.p)) / mechanism.length
+        distance = float(np.linalg.norm(after.p - before.p)) / mechanism.length
         turned = float(rotation_between(matrix_to_quaternion(before.R), matrix_to_quaternion(after.R)))
-        amounts = [f"moved by {apart * mechanism.length:.3g} m"] if apart > WRITTEN else []
+        amounts = [f"moved by {distance * mechanism.length:.3g} m"] if distance > WRITTEN else []
         amounts += [f"turned by {turned:.3g} rad ({np.degrees(turned):.3g} deg)"] if turned > WRITTEN else []
         if amounts:
-            found.append((apart + turned, f"{', '.join(mechanism.links[i].group.places)} {' and '.join(amounts)}"))
-    if not found:
+            corrections.append(
+                (distance + turned, f"{', '.join(mechanism.links[i].group.places)} {' and '.join(amounts)}")
+            )
+    if not corrections:
         return []
-    told = [text for _, text in sorted(found, reverse=True)]
-    more = [f"and {len(told) - MOST} more bodies"] if len(told) > MOST else []
-    return [f"the start was mended so that joints and drives fit: {'; '.join([*told[:MOST], *more])}"]
+    texts = [text for _, text in sorted(corrections, reverse=True)]
+    more = [f"and {len(texts) - MOST} more bodies"] if len(texts) > MOST else []
+    return [f"the start was mended so that joints and drives fit: {'; '.join([*texts[:MOST], *more])}"]

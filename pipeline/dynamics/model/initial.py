@@ -25,15 +25,15 @@ from flexclear.pipeline.dynamics.model.model import Model
 #: open, (closure rows,)
 Motions = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
-#: misses below this share of the speeds asked for are rounding
+#: misses below this fraction of the speeds asked for are rounding
 RIGID = 1e-9
-#: given velocities that are missed by less than this share of the speeds were given as well as they were written
+#: given velocities that are missed by less than this fraction of the speeds were given as well as they were written
 WRITTEN = 1e-6
-#: given velocities that are missed by more than this share of the largest one are a mistake, not a rough start
+#: given velocities that are missed by more than this fraction of the largest one are a mistake, not a rough start
 WRONG = 0.05
-#: combinations of speeds that change rates by less than this share of the largest change nothing: redundant closures
+#: combinations of speeds that change rates by less than this fraction of the largest change nothing: redundant closures
 REDUNDANT = 1e-9
-#: a spring shorter than this share of the mechanism's size has no direction
+#: a spring shorter than this fraction of the mechanism's size has no direction
 SHORTEST = 1e-9
 
 
@@ -63,29 +63,29 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
 class Velocities:
     """Linear equations matrix @ speeds = target of the speeds at the start, all in natural units; (rows, nv), (rows,).
 
-    asked: velocities that the target stands for, before those of the drives are taken off, (rows,).
-    given: places of the velocities that the first `told` rows ask for; the other rows keep the loops closed.
+    asked: velocities that the target represents, before those of the drives are taken off, (rows,).
+    given: paths of the velocities that the first `n_given` rows set; the other rows keep the loops closed.
     fastest: size of all these velocities, those of a slow motion at least.
     """
 
     matrix: np.ndarray
     asked: np.ndarray
     target: np.ndarray
-    told: int
+    n_given: int
     given: tuple[str, ...]
     fastest: float
 
 
 def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velocities:
     """What bodies, joints, modes and loops ask of the speeds in a state."""
-    wanted, others = with_velocities(model), given_rates(model)
+    requested, others = with_velocities(model), given_rates(model)
     y = y.copy()
     y[model.speeds] = 0.0
-    given, centres = _given(wanted).ravel(), [centre_of(model, name) for name in wanted]
-    told = ~np.isnan(given)
+    given, centres = _given(requested).ravel(), [centre_of(model, name) for name in requested]
+    known = ~np.isnan(given)
 
     unit, L = model.speed_scales, model.length
-    lengths = np.tile(_units(model), len(wanted))[told]
+    lengths = np.tile(_units(model), len(requested))[known]
     opening_lengths = np.where(model.arrays.table(m.CLOSURE_ROWS)["kind"] == 0, L, 1.0)
 
     def rates(state: np.ndarray) -> np.ndarray:
@@ -93,7 +93,7 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
         q, u = state[: model.nq], state[model.speeds]
         moving = np.array([centre.motion(frames, q, u) for centre in centres])
         coordinates = [rate.of(sites, u) / rate.size for rate in others]
-        return np.concatenate([moving.ravel()[told] / lengths, coordinates, opening / opening_lengths])
+        return np.concatenate([moving.ravel()[known] / lengths, coordinates, opening / opening_lengths])
 
     base = rates(y)
     columns = []
@@ -101,22 +101,22 @@ def velocity_equations(model: Model, motion: Motions, y: np.ndarray) -> Velociti
         moved = y.copy()
         moved[model.nq + k] = unit[k]
         columns.append(rates(moved) - base)
-    asked = np.concatenate([given[told] / lengths, [rate.wanted / rate.size for rate in others]])
+    asked = np.concatenate([given[known] / lengths, [rate.requested / rate.size for rate in others]])
     count = len(asked)
     asked = np.concatenate([asked, np.zeros(len(base) - count)])
     fastest = _slow(model) + max(float(np.max(np.abs(values), initial=0.0)) for values in (asked, base))
     matrix = np.array(columns).T.reshape(len(base), model.nv)
-    places = [*(f"[body.{name}.velocity]" for name in wanted), *dict.fromkeys(rate.place for rate in others)]
+    places = [*(f"[body.{name}.velocity]" for name in requested), *dict.fromkeys(rate.place for rate in others)]
     return Velocities(matrix, asked, asked - base, count, tuple(places), fastest)
 
 
-def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float = WRONG) -> np.ndarray:
+def given_velocities(model: Model, motion: Motions, y: np.ndarray, fraction: float = WRONG) -> np.ndarray:
     """Y with speeds that give bodies, joints and modes their velocities and keep the loops closed; otherwise the least.
 
     Velocities of bodies are those of centres of mass, flexible or rigid.  Flexible bodies start without speeds of
     deformation if joints, drives and given velocities allow that.
-    share: of the largest velocity given, by which joints and drives may miss them; what is nearest is taken then.
-    Raises InputError when joints and drives do not allow the velocities.
+    fraction: of the largest velocity given, by which joints and drives may miss them; the nearest velocities are taken
+    then. Raises InputError when joints and drives do not allow the velocities.
     """
     elastic = np.zeros(model.nv, dtype=bool)
     for modes in model.numbering.modal_coordinates.values():
@@ -130,12 +130,12 @@ def given_velocities(model: Model, motion: Motions, y: np.ndarray, share: float 
     if miss > RIGID * equations.fastest:
         speeds, miss = _least(equations.matrix, equations.target)
     largest = float(np.max(np.abs(equations.asked), initial=0.0))
-    if equations.given and miss > max(WRITTEN * equations.fastest, share * largest):
-        names = ", ".join(place.removeprefix("[body.").removesuffix(".velocity]") for place in equations.given)
+    if equations.given and miss > max(WRITTEN * equations.fastest, fraction * largest):
+        names = ", ".join(path.removeprefix("[body.").removesuffix(".velocity]") for path in equations.given)
         raise InputError(
             equations.given[0],
             f"joints and drives do not allow the velocities given for {names} (they miss by "
-            f"{miss:.3g} of the mechanism's size, or radians, per second, where up to {100.0 * share:g} % of the "
+            f"{miss:.3g} of the mechanism's size, or radians, per second, where up to {100.0 * fraction:g} % of the "
             "largest one are mended)",
             "give velocities that agree with each other, or fewer of them",
         )
@@ -159,24 +159,24 @@ def changed_velocities(model: Model, frames: np.ndarray, sites: np.ndarray, y: n
 
     y: state at the start.  frames, sites: of all links and sites there, named fields of LINK_FRAMES and SITE_FRAMES.
     """
-    wanted, found, unit = with_velocities(model), [], _units(model)
-    given = _given(wanted)
+    requested, changes, unit = with_velocities(model), [], _units(model)
+    given = _given(requested)
     limit = WRITTEN * (_slow(model) + float(np.nanmax(np.abs(given / unit), initial=0.0)))
-    for name, row in zip(wanted, given, strict=True):
-        apart = np.abs(centre_of(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
-        if np.nanmax(apart / unit) > limit:
-            turning, moving = np.fmax.reduce(apart.reshape(2, 3), axis=1, initial=0.0)
-            found.append(
+    for name, row in zip(requested, given, strict=True):
+        change = np.abs(centre_of(model, name).motion(frames, y[: model.nq], y[model.speeds]) - row)
+        if np.nanmax(change / unit) > limit:
+            turning, moving = np.fmax.reduce(change.reshape(2, 3), axis=1, initial=0.0)
+            changes.append(
                 f"the start velocities given for {name} were mended so that joints and drives allow them: by up to "
                 f"{moving:.3g} m/s and {turning:.3g} rad/s"
             )
     for rate in given_rates(model):
-        apart = abs(rate.of(sites, y[model.speeds]) - rate.wanted)
-        if apart > WRITTEN * (_slow(model) * rate.size + abs(rate.wanted)):
-            found.append(
-                f"the start velocity {rate.place} was mended so that joints and drives allow it: by {apart:.3g}"
+        change = abs(rate.of(sites, y[model.speeds]) - rate.requested)
+        if change > WRITTEN * (_slow(model) * rate.size + abs(rate.requested)):
+            changes.append(
+                f"the start velocity {rate.place} was mended so that joints and drives allow it: by {change:.3g}"
             )
-    return found
+    return changes
 
 
 def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
@@ -184,28 +184,28 @@ def changed_positions(model: Model, y: np.ndarray, z: np.ndarray) -> list[str]:
 
     Raises InputError where they are far from that.
     """
-    found = []
+    changes = []
     for i, q in model.mechanism.deformation.items():
         mine, name = model.numbering.modal_positions[i], model.links[i].flexible
-        apart, largest = float(np.max(np.abs(z[mine] - y[mine]))), float(np.max(np.abs(q), initial=0.0))
+        change, largest = float(np.max(np.abs(z[mine] - y[mine]))), float(np.max(np.abs(q), initial=0.0))
         unit = model.length * model.links[i].mass ** 0.5
-        if apart > max(WRITTEN * unit, WRONG * largest):
+        if change > max(WRITTEN * unit, WRONG * largest):
             raise InputError(
                 f"[start.modal.{name}.coordinate]",
-                f"joints and drives do not allow this deformation: they change it by {apart:.3g} m",
+                f"joints and drives do not allow this deformation: they change it by {change:.3g} m",
                 "give another one, or replace a joint by one that leaves more motion",
             )
-        if apart > WRITTEN * max(largest, WRITTEN * unit):
-            found.append(
-                f"the deformation given for {name} was mended so that joints and drives allow it: by up to {apart:.3g} "
-                "m"
+        if change > WRITTEN * max(largest, WRITTEN * unit):
+            changes.append(
+                f"the deformation given for {name} was mended so that joints and drives allow it: "
+                f"by up to {change:.3g} m"
             )
-    return found
+    return changes
 
 
-def _given(wanted: dict[str, RigidBody | FlexibleBody]) -> np.ndarray:
+def _given(requested: dict[str, RigidBody | FlexibleBody]) -> np.ndarray:
     """Angular velocity and velocity given for each body, shape (bodies, 6); nan where none is."""
-    given = [_components(b.angular_velocity) + _components(b.velocity) for b in wanted.values()]
+    given = [_components(b.angular_velocity) + _components(b.velocity) for b in requested.values()]
     return np.array(given).reshape(-1, 6)
 
 
@@ -231,7 +231,7 @@ def _components(given: tuple[float, float, float] | None) -> list[float]:
 
 @dataclass(frozen=True)
 class Centre:
-    """Centre of mass of a body: its place in the frame of its link, undeformed.
+    """Centre of mass of a body: its position in the frame of its link, undeformed.
 
     shape, bow: its shift with the modal coordinates, as in `flexible_bodies.shift`; these are at `positions` and
     `speeds` among the free ones.
@@ -258,8 +258,8 @@ def centre_of(model: Model, name: str) -> Centre:
     i, body = model.mechanism.link_of[name], model.scene.body[name]
     link = model.links[i]
     if isinstance(body, RigidBody):
-        place = link.places[name]
-        return Centre(i, place.p + place.R @ np.array(body.com), np.zeros((3, 0)))
+        placement = link.places[name]
+        return Centre(i, placement.p + placement.R @ np.array(body.com), np.zeros((3, 0)))
     assert link.bundle is not None
     first, shape = (link.bundle[key].values / link.mass for key in ("first_moment", "modal_first_moment"))
     bent, numbering = bow(model.mechanism, i), model.numbering
@@ -270,8 +270,8 @@ def centre_of(model: Model, name: str) -> Centre:
 def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray:
     """Y with the internal states of parts as they start; `sites`: their frames at y, rows of SITE_FRAMES."""
     y, first = y.copy(), model.ny - model.arrays.size(m.N_INTERNAL)
-    for place, angle in angles(model.arrays.table(m.GAUGES), sites).items():
-        y[first + place] = angle
+    for index, angle in angles(model.arrays.table(m.GAUGES), sites).items():
+        y[first + index] = angle
     return y
 
 
@@ -283,6 +283,6 @@ def check_loads(model: Model, loads: np.ndarray) -> None:
         if has_direction and value <= SHORTEST * model.length:
             raise InputError(
                 f"[load.{name}.between]",
-                "its two ends start in one place, so that it pulls in no direction",
+                "its two ends coincide at the start, so that it pulls in no direction",
                 "move an end; only a spring of no free length and no damping may start so",
             )

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.dynamics.model.arrays import Arrays
 
-#: a shape or moment below this share of the largest of its kind is rounding, not coupling
+#: a shape or moment below this fraction of the largest of its kind is rounding, not coupling
 NEGLIGIBLE = 1e-13
 #: so is a product of inertia of two modes, of unit modal mass, below this: it is a sum over all elements
 UNCOUPLED = 1e-11
-#: singular values of the frames' shapes below this share of the largest move nothing
+#: singular values of the frames' shapes below this fraction of the largest move nothing
 RANK = 1e-12
 #: modes are mixed where for each moving shape at least so many are held: fewer save less than mixing takes
 WORTH = 0.5
@@ -61,7 +61,7 @@ def interface_basis(mechanism: Mechanism, link: int) -> InterfaceBasis:
 
 
 def mass_coupled(bundle: xr.Dataset) -> bool:
-    """Whether modes share entries of the modal mass."""
+    """Whether modes have common entries of the modal mass."""
     mass = bundle["modal_mass"].values
     return bool(np.any(np.abs(mass - np.diag(np.diag(mass))) > UNCOUPLED))
 

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.dynamics import memory as m
@@ -19,10 +21,23 @@ from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 Rows = list[tuple[int, ...]]
 
 
-def ledger_groups(mechanism: Mechanism, energy: float) -> list[tuple[float, int]]:
-    """(floor, number of variables) of the error groups: loss of each joint [J], then bristles [m] of each bearing."""
-    losses = [(energy, 1)] * len(mechanism.scene.rubbing())
-    return losses + [(size, 3) for size in _bristles(mechanism) if size is not None]
+def parts(mechanism: Mechanism) -> list[int]:
+    """The independent mechanism of each joint with friction."""
+    joints = mechanism.scene.rubbing().values()
+    return [mechanism.components.of(*(mechanism.site(frame).link for frame in joint.between)) for joint in joints]
+
+
+def ledger_groups(mechanism: Mechanism, energies: np.ndarray) -> list[tuple[float, int, int]]:
+    """(floor, number of variables, independent mechanism) of the error groups.
+
+    First the loss of each joint [J], then the bristles [m] of each bearing.  energies: of each independent mechanism.
+    """
+    known = parts(mechanism)
+    joints = zip(mechanism.scene.rubbing().values(), known, strict=True)
+    bearings = [part for joint, part in joints for _ in BEARINGS[joint.type]]
+    bristles = zip(_bristles(mechanism), bearings, strict=True)
+    losses = [(energies[part], 1, part) for part in known]
+    return losses + [(size, 3, part) for size, part in bristles if size is not None]
 
 
 def _bristles(mechanism: Mechanism) -> list[float | None]:
@@ -124,12 +139,12 @@ def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
 
 def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
     """The link whose inboard joint this is (of a chain its last one), and whether it is on the first frame's side."""
-    found = [
+    bearings = [
         (i, link.branch.reverse)
         for i, link in enumerate(mechanism.links)
         if link.branch.edge is not None and link.branch.edge.name == name
     ]
-    return found[-1] if found else (-1, False)
+    return bearings[-1] if bearings else (-1, False)
 
 
 def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]]) -> _Reaction:

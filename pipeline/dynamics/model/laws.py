@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, covers, jump, pieces_of
 from flexclear.pipeline.dynamics.model.driving import prescribed
 
-#: no laws in the place of the scene's
+#: no laws instead of the scene's
 NONE: Mapping[str, Pieces] = MappingProxyType({})
 
 
@@ -38,17 +38,17 @@ def drive_laws(scene: Scene, given: Mapping[str, Pieces]) -> list[Pieces]:
     return laws
 
 
-def checked_law(scene: Scene, law: Any, dimension: str, place: str) -> Pieces:
+def checked_law(scene: Scene, law: Any, dimension: str, path: str) -> Pieces:
     """The pieces of a law; InputError for the wrong dimension, or when it does not cover the run."""
     try:
         made = pieces_of(law, dimension)
     except ValueError as error:
-        raise InputError(place, str(error)) from None
+        raise InputError(path, str(error)) from None
     start, end = scene.time.start, scene.time.end
     if not covers(made, start, end):
         low, high = made.span
         raise InputError(
-            place,
+            path,
             f"its points reach from {low:.6g} s to {high:.6g} s, the run from {start:.6g} s to {end:.6g} s",
             "add points, or shorten the run",
         )
@@ -58,14 +58,14 @@ def checked_law(scene: Scene, law: Any, dimension: str, place: str) -> Pieces:
 def fill(laws: Sequence[Pieces]) -> dict[Any, Any]:
     """The tables LAWS, PIECES, PIECE_HARMONICS and HARMONICS."""
     rows: list[tuple[int, int]] = []
-    shares: list[tuple[int, int]] = []
+    fractions: list[tuple[int, int]] = []
     pieces = [np.zeros((0, m.PIECES.size))]
     harmonics: list[tuple[float, float, float]] = []
     for law in laws:
         table, terms = law.table()
-        rows.append((len(shares), len(table)))
+        rows.append((len(fractions), len(table)))
         pieces.append(table)
         for piece in terms:
-            shares.append((len(harmonics), len(piece)))
+            fractions.append((len(harmonics), len(piece)))
             harmonics += piece
-    return {m.LAWS: rows, m.PIECES: np.concatenate(pieces), m.PIECE_HARMONICS: shares, m.HARMONICS: harmonics}
+    return {m.LAWS: rows, m.PIECES: np.concatenate(pieces), m.PIECE_HARMONICS: fractions, m.HARMONICS: harmonics}

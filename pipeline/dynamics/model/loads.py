@@ -76,12 +76,12 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
                 numbering.site(mechanism.site(frame)) for frame in scene.joint[measured[0]].between
             )
             look = gauges.add(first_end, second_end, measured[1], counts=True)
-        internal = gauges.states(row.states) if row.states else -1
+        internal = gauges.states(row.states, a, b) if row.states else -1
         first = numbering.known + len(laws)
         if f"load.{name}" in given:
             laws.append(given[f"load.{name}"])
         else:
-            laws += [checked_law(scene, law, dimension, place) for law, dimension, place in row.laws]
+            laws += [checked_law(scene, law, dimension, path) for law, dimension, path in row.laws]
         rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows)))
         numbers += row.numbers
         kinks.append(row.kinks)
@@ -102,31 +102,31 @@ def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None, tuple[st
     Raises InputError for what cannot be.
     """
     load: Any = scene.load[name]
-    place = f"[load.{name}]"
-    part = lookup(LOADS, load.type, where=place)
+    path = f"[load.{name}]"
+    part = lookup(LOADS, load.type, where=path)
     coordinate: Coordinate | None = None
     measured: tuple[str, Coordinate] | None = None
     if hasattr(load, "joint"):
-        coordinate = coordinate_of(scene, load.joint, load.coordinate, place)[2]
+        coordinate = coordinate_of(scene, load.joint, load.coordinate, path)[2]
     if hasattr(load, "measured") and coordinate is not None:
         measured = load.joint, coordinate
         if load.measured is not None:
             measured = named_coordinate(scene, load.measured, f"[load.{name}.measured]")
     given = [*([coordinate] if coordinate else []), *([measured[1]] if measured else [])]
     try:
-        row: Row = part.row(load, place, *given)
+        row: Row = part.row(load, path, *given)
     except ValueError as error:
-        raise InputError(place, str(error)) from None
+        raise InputError(path, str(error)) from None
     return row, coordinate, measured
 
 
 def _sites(mechanism: Mechanism, numbering: Numbering, load: Load) -> tuple[int, int]:
     """Numbers of its sites a and b; a is -1 where the world holds against it."""
-    place, frames = f"[load.{load.name}]", load.frames
-    links = [mechanism.link_of[find_frame(mechanism.frames, frame, place).body] for frame in frames]
+    path, frames = f"[load.{load.name}]", load.frames
+    links = [mechanism.link_of[find_frame(mechanism.frames, frame, path).body] for frame in frames]
     if len(links) == 2 and links[0] == links[1]:
-        raise InputError(place, f"{frames[0]} and {frames[1]} belong to bodies that move as one", "name other frames")
+        raise InputError(path, f"{frames[0]} and {frames[1]} belong to bodies that move as one", "name other frames")
     if links == [0]:
-        raise InputError(place, f"{frames[0]} does not move: a load there does nothing", "name a frame that moves")
+        raise InputError(path, f"{frames[0]} does not move: a load there does nothing", "name a frame that moves")
     sites = [numbering.site(mechanism.site(frame)) for frame in frames]
     return (sites[0], sites[1]) if len(sites) == 2 else (-1, sites[0])

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.model.chain import InboardJoint, chain
+from flexclear.pipeline.dynamics.model.components import Components, components
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.merge import (
     Frame,
@@ -33,7 +34,7 @@ from flexclear.pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, sp
 if TYPE_CHECKING:
     import xarray as xr
 
-#: share of the largest radius of gyration below which the distances of a scene are no size of it
+#: fraction of the largest radius of gyration below which the distances of a scene are no size of it
 NOTHING = 1e-9
 
 
@@ -135,12 +136,12 @@ class Link:
 
     @property
     def massless(self) -> bool:
-        """Whether it only stands between two freedoms of a joint, or is the ground."""
+        """Whether it only connects two freedoms of a joint, or is the ground."""
         return self.inertia is None and self.bundle is None
 
     @property
     def on_path(self) -> bool:
-        """Whether a prescribed pose in the world takes the place of its joint."""
+        """Whether a prescribed pose in the world replaces its joint."""
         return self.branch.edge is not None and self.branch.edge.kind == PATH
 
 
@@ -148,7 +149,9 @@ class Link:
 class Mechanism:
     """Links in tree order, closures and contacts of a scene; lengths in the world's axes.
 
-    origin: point of the world that the kernels use as theirs, near the mechanism.  length: size of the mechanism [m].
+    origin: point of the world that the kernels use as theirs, close to the mechanism.  length: size of the mechanism
+    [m].
+    components: its parts that fraction no force.
     start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
     placed: frames of all links as the scene gives them, before joints and drives are made to fit.
     choice: which of several ways it was assembled in, in words; empty where there is one, or the scene chooses.
@@ -163,6 +166,7 @@ class Mechanism:
     contacts: list[Contact]
     origin: np.ndarray
     length: float
+    components: Components
     start_residual: float = 0.0
     placed: tuple[Placement, ...] = ()
     deformation: Mapping[int, np.ndarray] = field(default_factory=dict)
@@ -204,8 +208,8 @@ class Mechanism:
 def _site(frames: Mapping[str, Frame], links: list[Link], link_of: Mapping[str, int], name: str) -> Site:
     frame = find_frame(frames, name, "frame")
     i = link_of[frame.body]
-    place = links[i].places[frame.body].of(frame.place)
-    return Site(i, place, name if links[i].flexible else None)
+    placement = links[i].places[frame.body].of(frame.place)
+    return Site(i, placement, name if links[i].flexible else None)
 
 
 def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
@@ -237,15 +241,19 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
         return _site(frames, links, link_of, frame)
 
     closures = [Closure(e, at(e.frame_a), at(e.frame_b)) for e in closing]
-    length = size_of(scene, links, frames)
-    touching: list[tuple[str, Clearance | End]] = [*scene.contacts().items(), *ends(scene, length)]
+    length, parts = sizes(scene, links, link_of, frames)
+    far = {
+        name: parts.lengths[parts.of(*_links_of(scene.joint[name], link_of))]
+        for name in {stop.joint for stop in scene.stop.values()} & scene.joint.keys()
+    }
+    touching: list[tuple[str, Clearance | End]] = [*scene.contacts().items(), *ends(scene, far)]
     contacts = [Contact(n, j, at(j.between[0]), at(j.between[1])) for n, j in touching]
     deformation = {link_of[name]: q for name, q in given_modes(scene, bundles).items()}
-    return Mechanism(scene, frames, links, link_of, closures, contacts, origin, length, deformation=deformation)
+    return Mechanism(scene, frames, links, link_of, closures, contacts, origin, length, parts, deformation=deformation)
 
 
 def _centre(starts: list[Placement]) -> np.ndarray:
-    """A point near the mechanism: moments about it lose no digits, wherever the scene stands."""
+    """A point close to the mechanism: moments about it lose no digits, wherever the scene is."""
     moving = [s.p for s in starts[1:]]
     return np.mean(moving, axis=0) if moving else np.zeros(3)
 
@@ -310,25 +318,50 @@ def _joined(
     return [*between, body.link(placed, own, site, joint)]
 
 
-def size_of(scene: Scene, links: list[Link], frames: Mapping[str, Frame]) -> float:
-    """Size of the mechanism [m], or of the clearance it moves in: what a length tolerance is relative to."""
+def sizes(
+    scene: Scene, links: list[Link], link_of: Mapping[str, int], frames: Mapping[str, Frame]
+) -> tuple[float, Components]:
+    """Size of all that there is [m], and independent mechanisms with theirs: what length tolerances are relative to.
+
+    What an independent mechanism does not use of the ground is none of its size.
+    """
+    result = components(scene, [link.branch.parent for link in links], link_of)
+    contacts = scene.contacts().values()
+
+    def size(number: int) -> float:
+        mine = [link for link, of in zip(links, result.of_link, strict=True) if of in (number, -1)]
+        known = {n: f for n, f in frames.items() if link_of.get(f.body) != 0 or n in result.frames[number]}
+        loose = [j.clearance for j in contacts if result.of(*_links_of(j, link_of)) == number]
+        return _size(mine, known, loose)
+
+    whole = _size(links, frames, [joint.clearance for joint in contacts])
+    return whole, replace(result, lengths=tuple(size(k) for k in range(len(result.frames))))
+
+
+def _links_of(joint: Any, link_of: Mapping[str, int]) -> list[int]:
+    """Links that a joint is between."""
+    return [link_of[frame.partition(".")[0]] for frame in joint.between]
+
+
+def _size(links: Sequence[Link], frames: Mapping[str, Frame], clearances: Sequence[float]) -> float:
+    """Size of some links [m], or of the clearance they move in."""
     points, of_body = list[np.ndarray](), dict[str, list[np.ndarray]]()
     for frame in frames.values():
         of_body.setdefault(frame.body, []).append(frame.place.p)
     for link in links:
-        for name, place in link.places.items():
-            points += [link.start.point(place.point(p)) for p in of_body.get(name, [])]
+        for name, path in link.places.items():
+            points += [link.start.point(path.point(p)) for p in of_body.get(name, [])]
             if link.inertia is not None:
                 points.append(link.start.point(link.inertia.com))
     cloud = np.array(points) if points else np.zeros((1, 3))
     size = float(np.max(np.linalg.norm(cloud - cloud.mean(axis=0), axis=1)))
-    size = max(size, *(joint.clearance for joint in scene.contacts().values()), 0.0)
-    # of a body held at its centre of mass, only rounding of its place is left
+    size = max(size, *clearances, 0.0)
+    # of a body held at its centre of mass, only rounding of its position is left
     gyration = max((np.sqrt(np.trace(J) / (2.0 * mass)) for mass, _, J in _inertias(links)), default=0.0)
     return size if size > NOTHING * gyration else float(gyration) or 1.0
 
 
-def _inertias(links: list[Link]) -> list[tuple[float, np.ndarray, np.ndarray]]:
+def _inertias(links: Sequence[Link]) -> list[tuple[float, np.ndarray, np.ndarray]]:
     return [link.inertia for link in links if link.inertia is not None]
 
 

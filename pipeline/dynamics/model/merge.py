@@ -1,4 +1,4 @@
-"""Rigidly joined bodies become one link; every body and frame keeps its place in it."""
+"""Rigidly joined bodies become one link; every body and frame is fixed in it."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class Frame:
-    """A named frame: its body and its undeformed place in it."""
+    """A named frame: its body and its undeformed placement in it."""
 
     body: str
     place: Placement
@@ -72,8 +72,8 @@ def frames_of(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, Fram
         if isinstance(body, FlexibleBody):
             bundle = bundles[name]
             for k, frame in enumerate(bundle["frame"].values):
-                place = Placement(bundle["frame_position"].values[k], bundle["frame_rotation"].values[k])
-                frames[f"{name}.{frame}"] = Frame(name, place)
+                placement = Placement(bundle["frame_position"].values[k], bundle["frame_rotation"].values[k])
+                frames[f"{name}.{frame}"] = Frame(name, placement)
         elif isinstance(body, MeshedRigidBody):
             raise InputError(f"[body.{name}.mesh]", "its mass and frames have not been read from the recipe")
         else:
@@ -83,10 +83,10 @@ def frames_of(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, Fram
     return frames
 
 
-def find_frame(frames: Mapping[str, Frame], name: str, place: str) -> Frame:
+def find_frame(frames: Mapping[str, Frame], name: str, path: str) -> Frame:
     """The frame called `name`; InputError with the nearest name when there is none."""
     if name not in frames:
-        raise InputError(place, f"there is no frame '{name}'", suggestion(name, list(frames)))
+        raise InputError(path, f"there is no frame '{name}'", suggestion(name, list(frames)))
     return frames[name]
 
 
@@ -160,7 +160,7 @@ def _flexible(scene: Scene, body: str) -> bool:
 
 
 def rigid_inertia(scene: Scene, places: Mapping[str, Placement]) -> RigidInertia:
-    """Of rigid bodies that move as one, at these places in the frame in which it is wanted."""
+    """Of rigid bodies that move as one, with these placements in the requested frame."""
     mass, first = 0.0, np.zeros(3)
     parts = []
     for name, here in places.items():
@@ -185,17 +185,19 @@ def start_places(
     """Start pose of every group's host frame in the world.
 
     A group whose bodies give no pose follows from a joint with a group that has one, the two
-    frames coinciding.  Raises InputError for a group that nothing places, and for a pose that
+    frames coinciding.  Raises InputError for a group without any pose, and for a pose that
     contradicts the fixed joints.
     """
     known: dict[int, Placement] = {0: Placement()}
     same = _same_place(scene, frames)
     for i, group in enumerate(groups[1:], start=1):
-        for name, place in group.places.items():
+        for name, placement in group.places.items():
             pose = scene.body[name].pose  # type: ignore[union-attr]
             if pose is None:
                 continue
-            here = Placement(np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())).of(place.inverse())
+            here = Placement(np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())).of(
+                placement.inverse()
+            )
             if i in known and not _close(known[i], here, same):
                 raise InputError(
                     f"[body.{name}.pose]",
@@ -213,7 +215,8 @@ def start_places(
 
 
 def _same_place(scene: Scene, frames: Mapping[str, Frame]) -> float:
-    """Distance within which two places are one [m]: nine digits of a metre, but six to nine of what the scene spans."""
+    """Distance within which two points coincide [m]: nine digits of a metre, but six to nine of what the scene
+    spans."""
     poses = [pose.position for body in scene.body.values() if (pose := getattr(body, "pose", None)) is not None]
     origins = np.array([(0.0, 0.0, 0.0), *poses])
     span = max([*np.ptp(origins, axis=0), *(float(np.linalg.norm(f.place.p)) for f in frames.values())])
@@ -221,7 +224,7 @@ def _same_place(scene: Scene, frames: Mapping[str, Frame]) -> float:
 
 
 def _close(a: Placement, b: Placement, same: float) -> bool:
-    """Whether two places are one; `same`: distance that makes no difference [m]."""
+    """Whether two placements coincide; `same`: distance that makes no difference [m]."""
     return bool(np.allclose(a.p, b.p, rtol=0, atol=same) and np.allclose(a.R, b.R, rtol=0, atol=1e-9))
 
 
@@ -232,7 +235,7 @@ def _propagate(
     groups: list[Group],
     known: dict[int, Placement],
 ) -> None:
-    # fixed joints place exactly; any other joint only when nothing better does
+    # fixed joints determine the pose exactly; any other joint only when nothing better does
     joints = sorted(scene.joint.items(), key=lambda item: item[1].type != "fixed")
     changed = True
     while changed:

@@ -24,18 +24,19 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, row_unit, sites, unit_wrench
 
-#: displacements, in radians and shares of the mechanism's size, of the poses nearby; how many are looked for, and
-#: how many are enough; share of the displacement that such a pose must keep when its loops are closed
+#: displacements, in radians and fractions of the mechanism's size, of the poses nearby; how many are searched for, and
+#: how many are enough; fraction of the displacement that such a pose must keep when its loops are closed
 NEARBY, TRIES, ENOUGH, LEFT = (0.03, 0.01), 24, 2, 0.1
-#: share of a self-stress that a joint must carry for its reaction to count as undetermined
+#: fraction of a self-stress that a joint must carry for its reaction to count as undetermined
 CARRIES = 1e-6
-#: condition numbers are not told apart from infinity above this
+#: condition numbers are not distinguished from infinity above this
 INFINITE = 1e15
 #: rows of a locked mechanism that are smaller than this may be no more than misaligned joints
 SLIGHT = 1e-3
-#: a motion has no mass when it has this share of what it would have if every body resisted turning about all axes alike
+#: a motion has no mass when it has this fraction of what it would have if every body resisted turning about all axes
+#: alike
 WEIGHTLESS = 1e-14
-#: share of the largest by which a link takes part in such a motion
+#: fraction of the largest by which a link takes part in such a motion
 TAKES_PART = 1e-3
 
 
@@ -103,16 +104,16 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
     """Poses nearby in which the closures have a higher rank than at the start, if there are any.
 
     Of a redundant mechanism all poses nearby have the rank of the start.  From a singular pose a random way need not
-    lead onto a branch of the motion: it may not close, or close back to where it began, which tells nothing.
+    lead onto a branch of the motion: it may not close, or close back to where it began, which says nothing.
     """
     if here.rank == model.nv or model.mechanism.has_paths or not model.mechanism.all_rigid:
         return None
     joints, start = constraints(model.mechanism), [link.start for link in model.links]
     random = np.random.default_rng(0)
-    left, stayed, told = [(here.rank, start)], [(here.rank, start)], 0
+    left, stayed, evidence = [(here.rank, start)], [(here.rank, start)], 0
     for k in range(TRIES):
-        share = random.normal(size=here.free.shape[1])
-        motion = here.free @ (share / np.linalg.norm(share))
+        fraction = random.normal(size=here.free.shape[1])
+        motion = here.free @ (fraction / np.linalg.norm(fraction))
         motion *= NEARBY[k % 2] / max(1.0, float(np.linalg.norm(motion)))
         closed = close(model.mechanism, joints, _displaced(model, start, motion))
         if closed is None:
@@ -120,15 +121,15 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
         there = [link.start for link in settled(model.mechanism, closed).links]
         away = _distance(start, there, model.length) > LEFT * NEARBY[k % 2]
         (left if away else stayed).append((rates(model, there).rank, there))
-        told += away
-        if told == ENOUGH:
+        evidence += away
+        if evidence == ENOUGH:
             break
-    rank, poses = max(left if told else stayed, key=lambda pose: pose[0])
+    rank, poses = max(left if evidence else stayed, key=lambda pose: pose[0])
     return poses if rank > here.rank else None
 
 
 def _distance(one: Sequence[Placement], other: Sequence[Placement], length: float) -> float:
-    """How far the farthest link has gone, in shares of the mechanism's size, or turned [rad]."""
+    """How far the farthest link has gone, in fractions of the mechanism's size, or turned [rad]."""
     ways = [np.linalg.norm(a.p - b.p) / length + np.linalg.norm(a.R - b.R) for a, b in zip(one, other, strict=True)]
     return float(max(ways))
 
@@ -165,9 +166,9 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
     joints, row = set[str](), 0
     for closure in model.closures:
         if isinstance(closure, Coupling):
-            share = stresses[:, row]
+            fraction = stresses[:, row]
             for side, factor in closure.parts:
-                wrench = np.outer(unit_wrench(side, poses, L) * factor * L / row_unit(closure, L), share)
+                wrench = np.outer(unit_wrench(side, poses, L) * factor * L / row_unit(closure, L), fraction)
                 carried[side.a.link] -= wrench
                 carried[side.b.link] += wrench
             row += 1
@@ -178,11 +179,11 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
         wrenches = np.where(
             force[:, None], np.hstack([np.cross(point, along) / L, along]), np.hstack([about, 0 * along])
         )
-        share = stresses[:, row : row + len(wrenches)]
-        wrench = wrenches.T @ share.T
+        fraction = stresses[:, row : row + len(wrenches)]
+        wrench = wrenches.T @ fraction.T
         carried[a.link] -= wrench
         carried[b.link] += wrench
-        if np.max(np.abs(share), initial=0.0) > CARRIES:
+        if np.max(np.abs(fraction), initial=0.0) > CARRIES:
             joints.add(edge.name)
         row += len(wrenches)
     for i in range(len(mechanism.links) - 1, 0, -1):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,12 @@ from flexclear.pipeline.dynamics.model.stops import STOP
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
+
+#: places in the ledger of an independent mechanism that is not the first one: work of drives, loss of modal damping,
+#: work and loss of loads
+OTHER_BOOKS = 4
+#: four roundings of a length, as a share of it
+ROUNDED = 8.9e-16
 
 
 @dataclass(frozen=True)
@@ -61,13 +67,13 @@ class Model:
 
     @property
     def speeds(self) -> slice:
-        """Speeds of the free coordinates in the state; the positions stand before, the ledger after them."""
+        """Speeds of the free coordinates in the state; the positions come before, the ledger after them."""
         return slice(self.nq, self.nq + self.nv)
 
     @property
     def state_scales(self) -> np.ndarray:
         """Natural unit of each state variable: the mechanism's size or a radian, both per second, ...; shape (NY,)."""
-        return np.asarray(self.arrays.table(m.FLOORS)["magnitude"][self.arrays.table(m.GROUPS)["group"]])
+        return np.asarray(self.arrays.table(m.FLOORS)["natural"][self.arrays.table(m.GROUPS)["group"]])
 
     @property
     def speed_scales(self) -> np.ndarray:
@@ -115,7 +121,9 @@ def filled(
     coupling_tables = tables(coupled, numbering, gauges, [link.start for link in mechanism.links])
     wear_ledger = m.WEAR_LEDGER.size * len(mechanism.scene.worn())
     rubbing = _rubbing(numbering, parts, ordered, contact_ledger + ledger)
-    groups, floors = _error_groups(numbering, ledger, gauges.internal)
+    groups, floors = _error_groups(numbering, ledger, gauges)
+    wear_slot = len(groups) - numbering.nq - numbering.nv - gauges.internal - wear_ledger
+    books = _books(mechanism, contact_ledger, wear_slot)
     arrays = pack(
         {
             m.NQ: numbering.nq,
@@ -126,15 +134,16 @@ def filled(
             m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
             m.LOAD_SLOT: contact_ledger,
             m.RUBBING_SLOT: contact_ledger + ledger,
-            m.WEAR_SLOT: len(groups) - numbering.nq - numbering.nv - gauges.internal - wear_ledger,
+            m.WEAR_SLOT: wear_slot,
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
         {
             m.LINK_NUMBERS: [_link_numbers(link) for link in mechanism.links],
-            **(_wired(numbering, parts) | looped if like is None else {t: like.arrays.rows(t) for t in WIRED}),
+            **(_wired(numbering, parts, books) | looped if like is None else {t: like.arrays.rows(t) for t in WIRED}),
             **contacts,
             **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
+            m.LOADS: _booked(mechanism, loaded, books),
             **coupling_tables,
             **rubbing,
             m.WORN: contacting.worn(mechanism),
@@ -143,6 +152,9 @@ def filled(
             m.GRAVITY: gravity,
             m.GROUPS: groups,
             m.FLOORS: floors,
+            m.BOOKS: books,
+            m.DRIVES: _drives(mechanism, books),
+            m.CLOSURE_NUMBERS: _closure_weights(mechanism, ordered),
         },
         numbering.columns,
     )
@@ -215,13 +227,13 @@ WIRED = (
 )
 
 
-def _wired(numbering: Numbering, parts: Parts) -> dict[Any, Any]:
+def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
     """Those of the tables `WIRED` that are not of the closures."""
     return {
         m.LINKS: _links(numbering, parts),
         m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
         m.SITE_NUMBERS: [_pose_row(s.place) for s in numbering.sites],
-        **flexible_bodies.fill(numbering),
+        **flexible_bodies.fill(numbering, [book.loss for book in books]),
         **wiring.mass_entries(numbering),
     }
 
@@ -262,8 +274,8 @@ def _rubbing(numbering: Numbering, parts: Parts, closures: tuple[Closure | Coupl
     return joint_friction.fill(numbering, parts.joint_frictions, closures, slot)
 
 
-def _pose_row(place: Placement) -> np.ndarray:
-    return np.concatenate([place.p, place.R.ravel()])
+def _pose_row(placement: Placement) -> np.ndarray:
+    return np.concatenate([placement.p, placement.R.ravel()])
 
 
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
@@ -275,7 +287,8 @@ def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
         inboard = numbering.port_of_inboard(i) if link.flexible else -1
         port = numbering.port_of(i - 1) if i else -1
         q, c = numbering.positions[i], numbering.coordinates[i]
-        rows.append((link.branch.parent, joint, q.start, c.start, len(c), flex, inboard, port))
+        part = numbering.mechanism.components.of_link[i]
+        rows.append((link.branch.parent, joint, q.start, c.start, len(c), flex, inboard, port, part))
     return rows
 
 
@@ -287,42 +300,111 @@ def _link_numbers(link: Link) -> np.ndarray:
     return np.array([mass, *com, *_symmetric(J)])
 
 
-def _error_groups(numbering: Numbering, loads: int, internal: int) -> tuple[np.ndarray, np.ndarray]:
-    """Group of every state variable, and the floor below which a group is resolved absolutely.
+class Book(NamedTuple):
+    """Places in the ledger of what an independent mechanism as a whole has there: see BOOKS."""
 
-    A vector is one group, so that turning the scene hardly changes a step.  Floors: the mechanism's
-    size, one radian, both per second, and the energy of moving its mass by its size in a second.
-    loads: number of the loads' energies; internal: number of internal states of parts after them.
+    work: int
+    loss: int
+    load: int
+
+
+Books = list[Book]
+
+
+def _books(mechanism: Mechanism, loads: int, end: int) -> Books:
+    """Where each independent mechanism keeps its books; loads: place of the first one's, end: after the last one's."""
+    first = end - OTHER_BOOKS * (len(mechanism.components.lengths) - 1)
+    others = range(first, end, OTHER_BOOKS)
+    return [Book(m.DRIVE_WORK, m.MODAL_LOSS, loads), *(Book(place, place + 1, place + 2) for place in others)]
+
+
+def _booked(mechanism: Mechanism, loaded: loading.Loaded, books: Books) -> list[tuple[int, ...]]:
+    """Rows of the table LOADS with the places of their books."""
+    links = [[mechanism.link_of[frame.partition(".")[0]] for frame in load.frames] for load in loaded.loads]
+    parts = [mechanism.components.of(*both) for both in links]
+    return [(*row, books[part].load) for row, part in zip(loaded.tables[m.LOADS], parts, strict=True)]
+
+
+def _drives(mechanism: Mechanism, books: Books) -> list[int]:
+    """Rows of the table DRIVES."""
+    parts = {name: mechanism.components.of(i) for i, link in enumerate(mechanism.links) for name in link.drives}
+    return [books[parts[name]].work for name in mechanism.drives]
+
+
+def _closure_weights(mechanism: Mechanism, closures: Sequence[Closure | Coupling]) -> list[float]:
+    """Rows of the table CLOSURE_NUMBERS.
+
+    What is small in large surroundings closes no tighter than these round its places.
     """
-    mechanism, floors = numbering.mechanism, list[float]()
-    L = mechanism.length
+    L, weights = mechanism.length, list[float]()
+    rounding = ROUNDED * L / mechanism.scene.solver.rtol
+    for one in closures:
+        sites = (one.a, one.b) if isinstance(one, Closure) else (one.first.a, one.first.b, one.second.a, one.second.b)
+        part = mechanism.components.of(*(site.link for site in sites))
+        weights.append(max(L / max(mechanism.components.lengths[part], rounding), 1.0))
+    return weights
+
+
+def _error_groups(numbering: Numbering, loads: int, gauges: Gauges) -> tuple[np.ndarray, np.ndarray]:
+    """Group of every state variable, and rows of FLOORS.
+
+    loads: number of the loads' energies.  gauges: have the internal states of parts, which come last.
+    """
+    mechanism, of_link = numbering.mechanism, numbering.mechanism.components.of_link
+    lengths, masses = np.array(mechanism.components.lengths), np.zeros(len(mechanism.components.lengths))
+    for link, part in zip(mechanism.links[1:], of_link[1:], strict=True):
+        masses[part] += link.mass
+    whole = np.full(len(lengths), mechanism.length)
+    groups, magnitudes, parts = _floors(numbering, loads, gauges, lengths, masses * lengths**2)
+    natural = _floors(numbering, loads, gauges, whole, np.full(len(lengths), np.sum(masses)) * whole**2)[1]
+    counts = np.bincount(parts[groups], minlength=len(lengths))
+    return groups, np.stack([magnitudes, natural, np.sqrt(counts / len(groups))[parts]], axis=1)
+
+
+def _floors(
+    numbering: Numbering, loads: int, gauges: Gauges, lengths: np.ndarray, energies: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Group of every state variable; of each group the floor below which it is resolved absolutely, and its component.
+
+    A vector is one group, so that turning the scene hardly changes a step.  Floors: the independent mechanism's
+    size, one radian, both per second, and the energy of moving its mass by its size in a second.
+    lengths, energies: of each independent mechanism.
+    """
+    mechanism, of_link, rows = numbering.mechanism, numbering.mechanism.components.of_link, list[tuple[float, int]]()
     q_group, v_group = np.zeros(numbering.nq, dtype=np.int64), np.zeros(numbering.nv, dtype=np.int64)
 
-    def fill(target: np.ndarray, places: range, letters: str) -> None:
+    def fill(target: np.ndarray, places: range, letters: str, part: int) -> None:
         for k, letter in enumerate(letters):
             if k == 0 or letters[k - 1] != letter:
-                floors.append(L if letter == "t" else 1.0)
-            target[places[k]] = len(floors) - 1
+                rows.append((lengths[part] if letter == "t" else 1.0, part))
+            target[places[k]] = len(rows) - 1
 
     for i, link in enumerate(mechanism.links[1:], start=1):
         declared = joint_class(link.kind)
         if not link.drives:
-            fill(q_group, numbering.positions[i], declared.POSITIONS)
-            fill(v_group, numbering.coordinates[i], declared.SPEEDS)
+            fill(q_group, numbering.positions[i], declared.POSITIONS, of_link[i])
+            fill(v_group, numbering.coordinates[i], declared.SPEEDS, of_link[i])
         if link.flexible:
             for target, mine in ((q_group, numbering.modal_positions[i]), (v_group, numbering.modal_coordinates[i])):
-                floors.append(L * link.mass**0.5)
-                target[mine] = len(floors) - 1
+                rows.append((lengths[of_link[i]] * link.mass**0.5, of_link[i]))
+                target[mine] = len(rows) - 1
     groups = [*q_group, *v_group]
-    energy = sum(link.mass for link in mechanism.links) * L**2
-    tail = [*contacting.ledger_groups(mechanism, energy), *[(energy, 1)] * loads]
+    tail = [*contacting.ledger_groups(mechanism, energies, lengths), *[(energies[0], 1, 0)] * loads]
     if mechanism.scene.rubbing():
         from flexclear.pipeline.dynamics.model import joint_friction
 
-        tail += joint_friction.ledger_groups(mechanism, energy)
-    tail += [(L, 1), (energy, 1)] * len(mechanism.scene.worn())  # sliding distance, load path
-    tail += [(1.0, 1)] * internal
-    for floor, count in tail:
-        floors.append(floor)
-        groups += [len(floors) - 1] * count
-    return np.array(groups, dtype=np.int64), np.array(floors)
+        tail += joint_friction.ledger_groups(mechanism, energies)
+    tail += [(energy, OTHER_BOOKS, part) for part, energy in enumerate(energies) if part]
+    for part in contacting.of_worn(mechanism):
+        tail += [(lengths[part], 1, part), (energies[part], 1, part)]  # sliding distance, load path
+    tail += [(1.0, 1, _part_of_sites(numbering, *sites)) for sites in gauges.owners]
+    for floor, count, part in tail:
+        rows.append((floor, part))
+        groups += [len(rows) - 1] * count
+    floors, parts = zip(*rows, strict=True)
+    return np.array(groups, dtype=np.int64), np.array(floors), np.array(parts)
+
+
+def _part_of_sites(numbering: Numbering, *sites: int) -> int:
+    """The independent mechanism of what acts between sites; -1 is the world."""
+    return numbering.mechanism.components.of(*(numbering.sites[site].link for site in sites if site >= 0))

@@ -54,7 +54,7 @@ class Numbering:
         return list(self.modal_positions)
 
     def site(self, site: Site) -> int:
-        """Number of a site; of one that is there already when the place is the same."""
+        """Number of a site; of an existing one for the same placement."""
         for k, other in enumerate(self.sites):
             same = other.link == site.link and other.frame == site.frame
             if same and np.array_equal(other.place.p, site.place.p) and np.array_equal(other.place.R, site.place.R):

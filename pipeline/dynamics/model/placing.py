@@ -1,8 +1,8 @@
 """Assembly from joints alone: where links without poses go, of several ways the one nearest to what the scene hints.
 
-The joints place what has no pose one link after the other, their coordinates at the values that drives, starts and
-hints give, else at zero or, to find other assemblies, anywhere. Loops are then closed (`closing.close`), with the links
-that have a pose held still as long as that is possible.
+The joints determine the poses that are missing, one link after the other, their coordinates at the values that drives,
+starts and hints give, else at zero or, to find other assemblies, anywhere. Loops are then closed (`closing.close`),
+with the links that have a pose held still as long as that is possible.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
 
-#: guesses from which assemblies are looked for; the first has nothing at random
+#: guesses from which assemblies are searched for; the first has nothing at random
 GUESSES = 16
-#: size of random slides, as a share of the mechanism's size
+#: size of random slides, as a fraction of the mechanism's size
 SLIDE = 0.3
-#: assemblies are one if no coordinate differs by more than this, in radians or shares of the mechanism's size
+#: assemblies are one if no coordinate differs by more than this, in radians or fractions of the mechanism's size
 SAME = 1e-4
-#: a mechanism that can move, and is so near to all hints, is looked for no further
+#: a mechanism that can move, and is so close to all hints, is searched for no further
 NEAR = 0.5
-#: singular values of naturally sized rows below this share of the largest leave a motion free
+#: singular values of naturally sized rows below this fraction of the largest leave a motion free
 LOOSE = 1e-6
 
 Hints = Mapping[tuple[str, int], float]
@@ -60,7 +60,7 @@ def assemblies(
     """
     hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
     known = {(j.name, k): value for j in joints for k, value in j.values.items()}
-    random, found, aim = np.random.default_rng(0), list[Assembly](), dict[tuple[str, int], float]()
+    random, distinct, aim = np.random.default_rng(0), list[Assembly](), dict[tuple[str, int], float]()
     for k in range(GUESSES):
         guess = _guess(mechanism, joints, placed, hints | known, random if k else None, k / GUESSES)
         if k == 0:
@@ -71,12 +71,12 @@ def assemblies(
         if poses is None or opposite(joints, poses) is not None:
             continue
         made = Assembly(poses, _coordinates(joints, poses))
-        if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME for other in found):
-            found.append(made)
+        if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME for other in distinct):
+            distinct.append(made)
         if not _isolated(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < NEAR:
-            break  # a mechanism that can move is assembled where it was first looked for
+            break  # a mechanism that can move is assembled where it was first searched for
     return sorted(
-        found,
+        distinct,
         key=lambda one: (
             _distance(mechanism, joints, one.coordinates, hints),
             _distance(mechanism, joints, one.coordinates, aim),
@@ -85,26 +85,26 @@ def assemblies(
 
 
 def chosen(
-    mechanism: Mechanism, joints: Sequence[Constraint], found: Sequence[Assembly], starts: Sequence[Given]
+    mechanism: Mechanism, joints: Sequence[Constraint], candidates: Sequence[Assembly], starts: Sequence[Given]
 ) -> str:
     """What is said of several assemblies of which the scene chooses none; else nothing."""
-    first = found[0]
-    if len(found) < 2 or not _isolated(mechanism, list(joints), first.poses):
+    first = candidates[0]
+    if len(candidates) < 2 or not _isolated(mechanism, list(joints), first.poses):
         return ""
     hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
-    told = [_distance(mechanism, joints, one.coordinates, hints) for one in found]
-    if hints and told[1] - told[0] > SAME:
+    distances = [_distance(mechanism, joints, one.coordinates, hints) for one in candidates]
+    if hints and distances[1] - distances[0] > SAME:
         return ""
     units = {(j.name, k): c for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
-    apart = {key: abs(first.coordinates[key] - found[1].coordinates[key]) for key in first.coordinates}
-    name, k = max(apart, key=lambda key: apart[key])
+    differences = {key: abs(first.coordinates[key] - candidates[1].coordinates[key]) for key in first.coordinates}
+    name, k = max(differences, key=lambda key: differences[key])
     coordinate, several = units[name, k], len([key for key in units if key[0] == name]) > 1
     label = f"{name}.{coordinate.name}" if several else name
-    values = ", ".join(f"{one.coordinates[name, k]:.4g}" for one in found[1:])
+    values = ", ".join(f"{one.coordinates[name, k]:.4g}" for one in candidates[1:])
     return (
-        f"the joints can be assembled in {len(found)} ways, and the scene does not say in which: it starts with "
+        f"the joints can be assembled in {len(candidates)} ways, and the scene does not say in which: it starts with "
         f"{label} at {first.coordinates[name, k]:.4g} {coordinate.unit}, elsewhere it is at {values}; "
-        f"[start.joint.{label}] near = ... chooses"
+        f"[start.joint.{label}] near = ... selects one"
     )
 
 
@@ -118,7 +118,7 @@ def _guess(
 ) -> list[Placement]:
     """Poses of all links, those not placed each put where a joint to a known one has it."""
     poses, known = [link.start for link in mechanism.links], set(placed)
-    # joints with little freedom place best
+    # joints with few degrees of freedom are best
     order = sorted(joints, key=lambda joint: len(joint_class(joint.edge.kind).SPEEDS) - len(joint.values))
     while True:
         joint = next((j for j in order if (j.link_a in known) != (j.link_b in known)), None)
@@ -152,23 +152,23 @@ def _motion(
 
 
 def _coordinates(joints: Sequence[Constraint], poses: Sequence[Placement]) -> dict[tuple[str, int], float]:
-    found = dict[tuple[str, int], float]()
+    coordinates = dict[tuple[str, int], float]()
     for joint in joints:
         A, B = joint.frames(poses)
         declared, relative = joint_class(joint.edge.kind), A.inverse().of(B)
         now = declared.coordinates(relative.R, relative.p)
-        found |= {(joint.name, k): float(now[k]) for k in range(len(declared.COORDINATES))}
-    return found
+        coordinates |= {(joint.name, k): float(now[k]) for k in range(len(declared.COORDINATES))}
+    return coordinates
 
 
 def _distance(mechanism: Mechanism, joints: Sequence[Constraint], one: Hints, other: Hints) -> float:
-    """Largest difference of coordinates that both have, in radians or shares of the mechanism's size."""
+    """Largest difference of coordinates that both have, in radians or fractions of the mechanism's size."""
     turning = {(j.name, k): c.turning for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
-    apart = [0.0]
+    differences = [0.0]
     for key in one.keys() & other.keys():
         way = one[key] - other[key]
-        apart.append(abs((way + np.pi) % (2.0 * np.pi) - np.pi) if turning[key] else abs(way) / mechanism.length)
-    return max(apart)
+        differences.append(abs((way + np.pi) % (2.0 * np.pi) - np.pi) if turning[key] else abs(way) / mechanism.length)
+    return max(differences)
 
 
 def _isolated(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> bool:

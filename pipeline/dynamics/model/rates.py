@@ -1,4 +1,4 @@
-r"""Rates at which closures open when the tree moves, each beside the size that such a rate may have.
+r"""Rates at which closures open when the tree moves, each next to the size that such a rate may have.
 
 Which rows of the closures' Jacobian are independent is a question of size: an entry is zero when it is nothing but
 rounding. Rounding is proportional to the terms whose sum an entry is, not to the sum: a hinge's axis that
@@ -31,12 +31,13 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
-#: a turn counts as having at least this arm, in units of the mechanism's size: places are no more exact for being near
+#: a turn counts as having at least this arm, in units of the mechanism's size: positions are not more exact at smaller
+#: distances
 LEAST_ARM = 1e-3
-#: singular values of naturally sized rows below this are zero.  It stands above what is left of a zero: an entry is a
+#: singular values of naturally sized rows below this are zero.  It is above what is left of a zero: an entry is a
 #: sum of some ten products whose factors, frames along a chain, are right to some ten roundings of 1e-16, in all
 #: 1e-14; poses are closed to 1e-13, at worst 1e-11, of the mechanism's size, which is 1e-8 of the least arm.  And it
-#: stands below the root of `closures.SINGULAR_PIVOT`, 3e-7, where the kernels no longer solve for a row.
+#: is below the root of `closures.SINGULAR_PIVOT`, 3e-7, where the kernels no longer solve for a row.
 ZERO = 1e-7
 #: rounds of scaling; each halves the exponents by which rows and columns differ
 ROUNDS = 12
@@ -136,11 +137,11 @@ def _coupling_row(
     numbering, L = model.numbering, model.length
     row, size = np.zeros((2, model.nv + len(model.drives)))
     for side, factor in coupling.parts:
-        place, along = poses[side.b.link].of(side.b.place).p, side.along(poses)
+        origin, along = poses[side.b.link].of(side.b.place).p, side.along(poses)
         unit = abs(factor) / row_unit(coupling, L)
         route = uncommon(closure_route(numbering, numbering.site(side.a), numbering.site(side.b)))
         for coordinate, column, sign in route:
-            turn, arm = motion.turn[column], place - motion.at[column]
+            turn, arm = motion.turn[column], origin - motion.at[column]
             shift = motion.shift[column] + np.cross(turn, arm)
             angle = float(np.linalg.norm(turn))
             way = float(np.linalg.norm(motion.shift[column])) + angle * (float(np.linalg.norm(arm)) + L * LEAST_ARM)
@@ -195,8 +196,8 @@ def motions(model: Model, poses: Sequence[Placement]) -> Motions:
     for site, frame, first in numbering.ports:
         on = numbering.sites[site].link
         mine, moving = slice(first, first + len(numbering.moving(on))), numbering.bases[on].moving
-        turns, slides, place = _shape_motions(model, on, frame, poses[on])
-        turn[mine], shift[mine], at[mine] = moving.T @ turns, moving.T @ slides, place
+        turns, slides, moved = _shape_motions(model, on, frame, poses[on])
+        turn[mine], shift[mine], at[mine] = moving.T @ turns, moving.T @ slides, moved
     return Motions(turn, shift, at)
 
 
@@ -205,8 +206,8 @@ def _shape_motions(model: Model, link: int, frame: str, pose: Placement) -> tupl
     own, unit = model.links[link].branch.frame, model.length * model.links[link].mass ** 0.5
     turn, shift, at = _frame_motions(model, link, frame, pose)
     if own is not None:
-        held, moved_by, place = _frame_motions(model, link, own, pose)
-        turn, shift = turn - held, shift - moved_by - np.cross(held, at - place)
+        held, moved_by, origin = _frame_motions(model, link, own, pose)
+        turn, shift = turn - held, shift - moved_by - np.cross(held, at - origin)
     return unit * turn, unit * shift, at
 
 

@@ -20,11 +20,11 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import pieces_of
 from flexclear.pipeline.dynamics.model.closing import EXACT
 from flexclear.pipeline.dynamics.model.driving import Prescribed, prescribed
-from flexclear.pipeline.dynamics.model.mechanism import Mechanism, size_of
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism, sizes
 from flexclear.pipeline.dynamics.model.merge import rigid_inertia
 from flexclear.pipeline.dynamics.model.model import Model, filled
 
-#: least principal moment as share of the largest with which no motion of a link can be without inertia
+#: least principal moment as fraction of the largest with which no motion of a link can be without inertia
 SLENDER = 1e-6
 
 
@@ -63,7 +63,8 @@ def _same_structure(model: Model, scene: Scene) -> bool:
     if contacts.keys() != old.contacts().keys():
         return False
     # the mechanism's size is that of its points, unless a clearance is larger
-    if any(c >= model.length for c in [*clearances, *(joint.clearance for joint in contacts.values())]):
+    least = min(model.mechanism.components.lengths)
+    if any(c >= least for c in [*clearances, *(joint.clearance for joint in contacts.values())]):
         return False
     pairs = zip(scene.joint.items(), old.joint.values(), strict=True)
     if any(new is not was and (name not in contacts or _held(new) != _held(was)) for (name, new), was in pairs):
@@ -110,16 +111,16 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
     if not np.all(principal[:, 0] > SLENDER * principal[:, -1]):
         return None
     placed = [replace(link, start=start) for link, start in zip(links, mechanism.placed, strict=True)]
-    length = size_of(scene, placed, mechanism.frames)
+    length, parts = sizes(scene, placed, mechanism.link_of, mechanism.frames)
     if not mechanism.start_residual < 0.5 * EXACT * min(1.0, length) or mechanism.choice or mechanism.has_paths:
         return None
-    if any(joint.clearance >= length for joint in scene.contacts().values()) or not mechanism.all_rigid:
+    if any(joint.clearance >= min(parts.lengths) for joint in scene.contacts().values()) or not mechanism.all_rigid:
         return None
-    return replace(mechanism, links=links, length=length)
+    return replace(mechanism, links=links, length=length, components=parts)
 
 
 def _held(joint: Any) -> tuple[str, tuple[str, str]]:
-    """What a clearance joint holds beside its contact."""
+    """What a clearance joint holds next to its contact."""
     return joint.type, tuple(joint.between)
 
 
@@ -142,13 +143,13 @@ def _drives_alike(new: Any, was: Any) -> bool:
 
 
 def _same_start(model: Model, scene: Scene) -> bool:
-    """Whether the drives stand at the start where they stood: then the links stand there, too."""
+    """Whether the drives start where they started before: then the links do, too."""
     pairs = zip(prescribed(model.scene), prescribed(scene), strict=True)
     changed = [(was, new) for was, new in pairs if was.law is not new.law]
     try:
         return all(_at_start(was, scene) == _at_start(new, scene) for was, new in changed)
     except ValueError:
-        return False  # a law that cannot be had, as is told when the model is made from scratch
+        return False  # a law that cannot be had, as is reported when the model is made from scratch
 
 
 def _at_start(one: Prescribed, scene: Scene) -> float:

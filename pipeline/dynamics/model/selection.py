@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics.model.arrays import envelope_size
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.wiring import closure_envelope, threes
 
-#: a row below this share of its natural length is rounding: the square root of what rounding leaves of a cancelling
+#: a row below this fraction of its natural length is rounding: the square root of what rounding leaves of a cancelling
 #: sum, 1e-13 at worst, with some digits to spare
 NOTHING = 1e-6
 
@@ -27,27 +27,27 @@ def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray
     spread: J L^-T, shape (rows, nv), a row each in the metric of the mass, M = L L^T.  scale: what a row's
     length is compared with, so that one that has shrunk to nothing is not mistaken for a good one; a row of the scale 0
     moves nothing.  QR decomposition with column pivoting (Golub & Van Loan, *Matrix Computations*, sec. 5.4.2): each
-    row kept is the one that stands out most from those before.  Of rows that are no numbers the first ones are kept,
-    with the pivot 0.
+    row selected is the one that is most independent from those before.  Of rows that are no numbers the first ones are
+    selected, with the pivot 0.
     """
     from scipy.linalg import qr  # slow to import, and most mechanisms have nothing to choose
 
-    kept, count = np.zeros(len(spread), dtype=bool), min(rank, *spread.shape)
+    selected, count = np.zeros(len(spread), dtype=bool), min(rank, *spread.shape)
     if not count:
-        return kept, 1.0
+        return selected, 1.0
     compared = spread / np.where(scale > 0.0, scale, 1.0)[:, None]
     if not np.isfinite(compared).all():
-        kept[:count] = True
-        return kept, 0.0
+        selected[:count] = True
+        return selected, 0.0
     R, order = qr(compared.T, mode="r", pivoting=True)
-    kept[order[:count]] = True
-    return kept, float(R[count - 1, count - 1] ** 2)
+    selected[order[:count]] = True
+    return selected, float(R[count - 1, count - 1] ** 2)
 
 
 def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndarray:
     """Length of the longest row of the same closure and kind (along, turning), per row of all; shape (rows,).
 
-    Not less than a small share of the row's natural length: rows that are nothing but rounding must stay small.
+    Not less than a small fraction of the row's natural length: rows that are nothing but rounding must stay small.
     """
     kinds, scales = model.arrays.table(m.CLOSURE_ROWS)["kind"], np.ones(len(spread))
     lengths = np.linalg.norm(spread, axis=1)
@@ -83,9 +83,9 @@ def natural_lengths(model: Model, columns: np.ndarray, points: np.ndarray, facto
         turn, shift = columns["angular"][mine["column"]], columns["linear"][mine["column"]]
         angle = np.linalg.norm(turn, axis=1)
         way = np.linalg.norm(shift + np.cross(turn, points[c["site_b"]]), axis=1) + model.length * angle
-        share = mobility[support[c["support0"] + mine["slot"]]]
+        fraction = mobility[support[c["support0"] + mine["slot"]]]
         rows = slice(c["row0"], c["row0"] + c["n_rows"])
-        along, about = (np.sqrt(np.sum(size**2 * share)) for size in (way, angle))
+        along, about = (np.sqrt(np.sum(size**2 * fraction)) for size in (way, angle))
         lengths[rows] = np.where(kinds[rows] == 0, along, about)
     return lengths
 
@@ -107,10 +107,10 @@ def _coupling_length(
     return total**0.5
 
 
-def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
-    """Write into h, a copy of the model's wiring, that the `kept` rows are solved for.
+def write(model: Model, h: np.ndarray, selected: np.ndarray) -> None:
+    """Write into h, a copy of the model's wiring, that the `selected` rows are solved for.
 
-    kept: per row of the closure table.  No size and no offset changes except the number of rows solved for.
+    selected: per row of the closure table.  No size and no offset changes except the number of rows solved for.
     """
     all_rows = model.arrays.table(m.CLOSURES)
     closures, rows = model.arrays.table(m.CLOSURES, h), model.arrays.table(m.CLOSURE_ROWS, h)
@@ -118,9 +118,9 @@ def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
     start = 0
     for closure, was in zip(closures, all_rows, strict=True):
         span = slice(was["row0"], was["row0"] + was["n_rows"])
-        order = np.argsort(~kept[span], kind="stable")
+        order = np.argsort(~selected[span], kind="stable")
         rows[span] = declared[span][order]
-        closure["kept0"], closure["n_kept"] = start, np.sum(kept[span])
+        closure["kept0"], closure["n_kept"] = start, np.sum(selected[span])
         closure["threes"] = threes(closure["n_kept"])
         start += int(closure["n_kept"])
     envelope = model.arrays.table(m.CLOSURE_ENVELOPE, h)
@@ -131,7 +131,7 @@ def write(model: Model, h: np.ndarray, kept: np.ndarray) -> None:
 
 
 def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
-    """Kept rows against free coordinates, shape (..., kept, nv), from what the kernels store on the supports.
+    """Selected rows against free coordinates, shape (..., kept, nv), from what the kernels store on the supports.
 
     stored: JACOBIAN or SPREAD of the work space, shape (..., size).
     """
@@ -148,24 +148,24 @@ def dense(model: Model, h: np.ndarray, stored: np.ndarray) -> np.ndarray:
 
 
 def kept_places(model: Model, h: np.ndarray) -> np.ndarray:
-    """Place of each kept row among all, as residuals and their rates are stored."""
+    """Place of each selected row among all, as residuals and their rates are stored."""
     spans = (range(c["row0"], c["row0"] + c["n_kept"]) for c in model.arrays.table(m.CLOSURES, h))
     return np.array([k for span in spans for k in span], dtype=np.int64)
 
 
 def coordinates_of_rows(model: Model, h: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Which free coordinates the closures of the chosen kept rows depend on; masks (kept rows,) -> (nv,)."""
-    support, found = model.arrays.table(m.SUPPORT)["coordinate"], np.zeros(model.nv, dtype=bool)
+    """Which free coordinates the closures of the selected rows depend on; masks (selected rows,) -> (nv,)."""
+    support, mask = model.arrays.table(m.SUPPORT)["coordinate"], np.zeros(model.nv, dtype=bool)
     for c in model.arrays.table(m.CLOSURES, h):
         if np.any(chosen[c["kept0"] : c["kept0"] + c["n_kept"]]):
-            found[support[c["support0"] : c["support0"] + c["n_support"]]] = True
+            mask[support[c["support0"] : c["support0"] + c["n_support"]]] = True
     for body in model.arrays.table(m.FLEXES):  # of which a closure may depend on some shapes
         modes = slice(body["c0"], body["c0"] + body["n_modes"])
-        found[modes] = np.any(found[modes])
-    return found
+        mask[modes] = np.any(mask[modes])
+    return mask
 
 
 def joints_of_rows(model: Model, h: np.ndarray) -> list[str]:
-    """Name of the joint to which each kept row belongs."""
+    """Name of the joint to which each selected row belongs."""
     counts = model.arrays.table(m.CLOSURES, h)["n_kept"]
     return [closure.name for closure, count in zip(model.closures, counts, strict=True) for _ in range(count)]

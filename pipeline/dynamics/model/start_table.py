@@ -45,29 +45,29 @@ def given_coordinates(scene: Scene) -> list[Given]:
 
     Raises InputError for joints and coordinates that are not there, and for units that do not fit.
     """
-    found = []
+    rows = []
     for joint, coordinates in (scene.start.joint if scene.start is not None else {}).items():
         for name, start in coordinates.items():
-            place = f"[start.joint.{joint}.{name}]" if name else f"[start.joint.{joint}]"
-            _, number, coordinate = coordinate_of(scene, joint, name or None, place)
+            path = f"[start.joint.{joint}.{name}]" if name else f"[start.joint.{joint}]"
+            _, number, coordinate = coordinate_of(scene, joint, name or None, path)
             rate = "angular velocity" if coordinate.turning else "velocity"
             values = [
-                _measure(getattr(start, key), dimension, f"{place[:-1]}.{key}]")
+                _measure(getattr(start, key), dimension, f"{path[:-1]}.{key}]")
                 for key, dimension in (
                     ("position", coordinate.dimension),
                     ("near", coordinate.dimension),
                     ("velocity", rate),
                 )
             ]
-            found.append(Given(joint, number, coordinate, place, *values))
-    return found
+            rows.append(Given(joint, number, coordinate, path, *values))
+    return rows
 
 
-def _measure(value: float | str | None, dimension: str, place: str) -> float | None:
+def _measure(value: float | str | None, dimension: str, path: str) -> float | None:
     try:
         return None if value is None else quantity(value, dimension)
     except ValueError as error:
-        raise InputError(place, str(error)) from None
+        raise InputError(path, str(error)) from None
 
 
 def given_modes(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flexclear.pipeline.core.errors import InputError
@@ -31,7 +32,7 @@ class End:
     sense: float
     clearance: float
     normal: NormalLaw
-    floor: float
+    floor: float | None
     initial_approach_speed: float | None
     radius: float = 0.0
     friction: None = None
@@ -43,20 +44,20 @@ def ends_an_angle(joint: object) -> bool:
     return isinstance(joint, End) and joint.coordinate.turning
 
 
-def ends(scene: Scene, length: float) -> list[tuple[str, End]]:
+def ends(scene: Scene, lengths: Mapping[str, float]) -> list[tuple[str, End]]:
     """The ends of all stops by name, ``stop.lower`` and ``stop.upper``; InputError for what cannot be.
 
-    length: size of the mechanism [m].
+    lengths: size of the mechanism that each stopped joint belongs to [m].
     """
-    found = []
+    listed = []
     for name, stop in scene.stop.items():
-        found += [(f"{name}.{side}", end) for side, end in _both(scene, name, stop, length).items()]
-    return found
+        listed += [(f"{name}.{side}", end) for side, end in _both(scene, name, stop, lengths).items()]
+    return listed
 
 
-def _both(scene: Scene, name: str, stop: Stop, length: float) -> dict[str, End]:
-    place = f"[stop.{name}]"
-    joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, place)
+def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> dict[str, End]:
+    path = f"[stop.{name}]"
+    joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, path)
 
     def read(key: str, dimension: str) -> float:
         try:
@@ -67,11 +68,11 @@ def _both(scene: Scene, name: str, stop: Stop, length: float) -> dict[str, End]:
     limits = {end: read(end, coordinate.dimension) for end in stop.ends}
     if len(limits) == 2 and not limits["lower"] < limits["upper"]:
         raise InputError(
-            place,
+            path,
             f"its lower end must lie below its upper one; lower = {limits['lower']:.6g}, upper = {limits['upper']:.6g}",
             "exchange them, or leave one out",
         )
-    far = limits["upper"] - limits["lower"] if len(limits) == 2 else (1.0 if coordinate.turning else length)
+    far = limits["upper"] - limits["lower"] if len(limits) == 2 else (1.0 if coordinate.turning else lengths[joint])
     speed = "angular velocity" if coordinate.turning else "velocity"
     speeds: dict[str, float] = {
         key: read(key, speed) for key in ("floor", "initial_approach_speed") if getattr(stop, key) is not None
@@ -80,8 +81,8 @@ def _both(scene: Scene, name: str, stop: Stop, length: float) -> dict[str, End]:
         if not value > 0.0:
             raise InputError(f"[stop.{name}.{key}]", f"must be positive, not {value:.6g}")
     between, sides = scene.joint[joint].between, {"lower": -1.0, "upper": 1.0}
-    told = speeds.get("initial_approach_speed")
+    approach = speeds.get("initial_approach_speed")
     return {
-        end: End(name, between, coordinate, limit, sides[end], far, stop.normal, speeds["floor"], told)
+        end: End(name, between, coordinate, limit, sides[end], far, stop.normal, speeds.get("floor"), approach)
         for end, limit in limits.items()
     }

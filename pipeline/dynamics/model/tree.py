@@ -58,7 +58,7 @@ class Branch:
 
 
 def edges(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int]) -> list[Edge]:
-    """Joints between different groups, and paths. Of a clearance joint, what it holds beside its contact."""
+    """Joints between different groups, and paths. Of a clearance joint, what it holds next to its contact."""
     driven = joint_drives(scene)
     result = []
     contacts = scene.contacts()
@@ -86,12 +86,12 @@ def _paths(scene: Scene, frames: Mapping[str, Frame], group_of: Mapping[str, int
     for name, drive in scene.drive.items():
         if not isinstance(drive, PathDrive):
             continue
-        place = f"[drive.{name}.frame]"
-        group = group_of[find_frame(frames, drive.frame, place).body]
+        path = f"[drive.{name}.frame]"
+        group = group_of[find_frame(frames, drive.frame, path).body]
         if group == 0:
-            raise InputError(place, f"'{drive.frame}' belongs to the ground, which does not move", "name another frame")
+            raise InputError(path, f"'{drive.frame}' belongs to the ground, which does not move", "name another frame")
         if group in (e.b for e in result):
-            raise InputError(place, f"the body of '{drive.frame}' has a path already", "remove one of the two")
+            raise InputError(path, f"the body of '{drive.frame}' has a path already", "remove one of the two")
         laws = dict(drive.components())
         parts = [f"{kind}.{axis}" for kind in ("position", "rotation") for axis in "xyz"]
         drives = tuple(f"{name}.{part}" if part in laws else None for part in parts)

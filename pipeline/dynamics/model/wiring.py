@@ -159,7 +159,7 @@ def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[Any, Any]
 
 
 def closure_envelope(closures: np.ndarray, pairs: np.ndarray) -> np.ndarray:
-    """First column and origin of each kept row of J M^-1 J^T, shape (rows, 2); pairs: rows of CLOSURE_PAIRS."""
+    """First column and origin of each selected row of J M^-1 J^T, shape (rows, 2); pairs: rows of CLOSURE_PAIRS."""
     first = closures["kept0"].copy()
     for a, b in zip(pairs["a"], pairs["b"], strict=True):
         first[b] = min(first[b], closures["kept0"][a])

@@ -1,1 +1,2 @@
-"""Which effects of a scene its wanted accuracy calls for: bounds first, then short runs, then what is left is kept."""
+"""Which effects of a scene its requested accuracy calls for: bounds first, then short runs, then what is left is
+kept."""

@@ -1,4 +1,4 @@
-"""The budget of a plan: the error that is wanted, what dropped effects have spent of it, and what was decided."""
+"""The budget of a plan: the error that is requested, what dropped effects have spent of it, and what was decided."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE
 from flexclear.pipeline.dynamics.plan.screening_runs import Pilots
 
-#: share of what is wanted that dropped effects may use up together; the rest is for what is not estimated
+#: fraction of the requested accuracy that dropped effects may use up together; the rest is for what is not estimated
 BUDGET = 0.75
-#: what flexible bodies may change of what impacts of rigid ones do to rates and forces, as a share of that
+#: what flexible bodies may change of what impacts of rigid ones do to rates and forces, as a fraction of that
 OF_IMPACTS = 0.5
-#: what an influence measured with pilots' tolerance may be wrong by, as a share of it
+#: what an influence measured with pilots' tolerance may be wrong by, as a fraction of it
 OF_PILOT = 0.15
-#: what the rest of the time may add to what a run over a part of it shows, as a share
+#: what the rest of the time may add to what a run over a part of it shows, as a fraction
 WHOLE = 1.0
 
 
@@ -41,10 +41,10 @@ class Chosen:
 
 @dataclass
 class Search:
-    """The state of the decisions. used: of the budget, by quantity, as shares of what is wanted."""
+    """The state of the decisions. used: of the budget, by quantity, as fractions of the requested accuracy."""
 
     pilots: Pilots
-    wanted: dict[str, float]
+    requested: dict[str, float]
     used: dict[str, float] = field(default_factory=dict)
     decisions: dict[str, Decision] = field(default_factory=dict)
 
@@ -56,25 +56,26 @@ class Search:
     def fits(self, most: Mapping[str, float], budget: float = BUDGET) -> bool:
         """Whether influences of at most this much fit into what is left of the budget, for all quantities."""
         return all(
-            self.used.get(name, 0.0) + most.get(name, np.inf) / self.wanted[name] <= budget for name in self.wanted
+            self.used.get(name, 0.0) + most.get(name, np.inf) / self.requested[name] <= budget
+            for name in self.requested
         )
 
     def spend(self, most: Mapping[str, float]) -> None:
         """Take influences out of the budget."""
-        for name in self.wanted:
-            self.used[name] = self.used.get(name, 0.0) + most[name] / self.wanted[name]
+        for name in self.requested:
+            self.used[name] = self.used.get(name, 0.0) + most[name] / self.requested[name]
 
     def decide(
         self,
         effect: Effect,
-        kept: bool,
+        recorded: bool,
         evidence: str,
         reason: str,
         estimate: Mapping[str, float] | None = None,
         uncertainty: Mapping[str, float] | None = None,
     ) -> None:
         """Write down what becomes of an effect."""
-        self.decisions[effect.name] = Decision(effect, kept, evidence, reason, estimate or {}, uncertainty or {})
+        self.decisions[effect.name] = Decision(effect, recorded, evidence, reason, estimate or {}, uncertainty or {})
 
     def judge(
         self,
@@ -82,33 +83,41 @@ class Search:
         small: bool,
         why: str,
         most: Mapping[str, float],
-        apart: Mapping[str, Influence],
+        effect_sizes: Mapping[str, Influence],
         besides: str = "",
     ) -> None:
-        """Write down what short runs say. why: it may go, if it is small.  most, apart: what it does there.
+        """Record the results of short runs. why: reason to drop it, if it is small.  most, effect_sizes: its effect
+        there.
 
-        besides: said before the reason why it is kept.
+        besides: text before the reason why it stays.
         """
-        difference = {name: influence.difference for name, influence in apart.items()}
-        uncertainty = {name: influence.uncertainty for name, influence in apart.items()}
+        difference = {name: influence.difference for name, influence in effect_sizes.items()}
+        uncertainty = {name: influence.uncertainty for name, influence in effect_sizes.items()}
         self.decide(
-            effect, not small, PILOT, why if small else besides + too_much(most, self.wanted), difference, uncertainty
+            effect,
+            not small,
+            PILOT,
+            why if small else besides + too_much(most, self.requested),
+            difference,
+            uncertainty,
         )
 
 
-def with_doubt(search: Search, apart: Mapping[str, Influence], soft: bool, more: float = 0.0) -> dict[str, Influence]:
-    """With what pilots may be wrong by, what flexible bodies may change of the impacts, and a share `more`."""
+def with_doubt(
+    search: Search, effect_sizes: Mapping[str, Influence], soft: bool, more: float = 0.0
+) -> dict[str, Influence]:
+    """With what pilots may be wrong by, what flexible bodies may change of the impacts, and a fraction `more`."""
     kinds = {q.name: q.kind for q in search.pilots.chosen}
-    found = {}
-    for name, i in apart.items():
-        share = more + OF_PILOT + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
-        found[name] = Influence(i.difference, i.uncertainty + share * i.difference)
-    return found
+    doubled = {}
+    for name, i in effect_sizes.items():
+        fraction = more + OF_PILOT + (OF_IMPACTS if soft and kinds[name] not in OF_POSE else 0.0)
+        doubled[name] = Influence(i.difference, i.uncertainty + fraction * i.difference)
+    return doubled
 
 
-def too_much(most: Mapping[str, float], wanted: Mapping[str, float]) -> str:
-    """Why an effect is kept: what it may change most, in words."""
-    name = max(wanted, key=lambda n: most[n] / wanted[n])
+def too_much(most: Mapping[str, float], requested: Mapping[str, float]) -> str:
+    """Why an effect stays: what it may change most, in words."""
+    name = max(requested, key=lambda n: most[n] / requested[n])
     if not np.isfinite(most[name]):
-        return f"without it {name} cannot be told, or has other events"
-    return f"without it {name} may be off by {most[name] / wanted[name]:.2g} times what is wanted"
+        return f"without it {name} cannot be determined, or has other events"
+    return f"without it {name} may be off by {most[name] / requested[name]:.2g} times what is requested"

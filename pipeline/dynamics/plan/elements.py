@@ -1,7 +1,7 @@
 """How many finite elements a flexible body calls for, from its reduction on a finer mesh.
 
 A run does not know the elements: they cost time once, when the body is reduced, and decide how right its frequencies
-and its compliance are. So the reduction on twice as many elements tells all there is: by how much frequencies and
+and its compliance are. So the reduction on twice as many elements is enough: by how much frequencies and
 compliance change, and by how much at most what bending does to a quantity changes with them. Errors of beam elements
 fall as the fourth power of their length (Strang and Fix, *An Analysis of the Finite Element Method*, ch. 1.6 and 6),
 so the number that an accuracy calls for follows.
@@ -18,8 +18,8 @@ from flexclear.pipeline.core.decisions import Mesh
 
 #: twice as many elements are compared with; errors fall with this power of their length
 TWICE, ORDER = 2, 4
-#: share of what is wanted that the mesh may err by
-SHARE = 0.1
+#: fraction of the requested accuracy that the mesh may err by
+FRACTION = 0.1
 #: vibrations whose phase has gone wrong by more than this differ by twice their amplitude [rad]
 TURNED = 2.0
 
@@ -29,7 +29,7 @@ def mesh(
     bundle: xr.Dataset,
     finer: xr.Dataset,
     bending: Mapping[str, float],
-    wanted: Mapping[str, float],
+    requested: Mapping[str, float],
     duration: float,
 ) -> Mesh:
     """The elements of a body.
@@ -40,15 +40,15 @@ def mesh(
     beyond = 1.0 / (1.0 - TWICE ** -float(ORDER))  # what twice as many elements lack still
     frequency, phase = _frequencies(bundle, finer, duration)
     compliance = _compliance(bundle, finer)
-    share = beyond * max(compliance, min(TURNED, phase))
-    error = {name: share * bending.get(name, np.inf) for name in wanted}
-    most = max(error[name] / (SHARE * wanted[name]) for name in wanted)
+    fraction = beyond * max(compliance, min(TURNED, phase))
+    error = {name: fraction * bending.get(name, np.inf) for name in requested}
+    most = max(error[name] / (FRACTION * requested[name]) for name in requested)
     called_for = given * max(most, np.finfo(float).tiny) ** (1.0 / ORDER) if np.isfinite(most) else given
     return Mesh(given, max(1, int(np.ceil(called_for))), beyond * frequency, beyond * compliance, error)
 
 
 def _frequencies(bundle: xr.Dataset, finer: xr.Dataset, duration: float) -> tuple[float, float]:
-    """Largest change of a frequency, as a share, and phase by which the lowest vibration is off in the end [rad]."""
+    """Largest change of a frequency, as a fraction, and phase by which the lowest vibration is off in the end [rad]."""
     one, two = (np.sort(b["frequency"].values) for b in (bundle, finer))
     there = min(len(one), len(two))
     one, two = one[:there], two[:there]
@@ -60,7 +60,7 @@ def _frequencies(bundle: xr.Dataset, finer: xr.Dataset, duration: float) -> tupl
 
 
 def _compliance(bundle: xr.Dataset, finer: xr.Dataset) -> float:
-    """Largest change of an entry of the frames' compliance, as a share of those of its two directions."""
+    """Largest change of an entry of the frames' compliance, as a fraction of those of its two directions."""
     one, two = (_matrix(b) for b in (bundle, finer))
     scale = np.sqrt(np.abs(np.outer(np.diag(two), np.diag(two))))
     least = np.finfo(float).eps * scale.max(initial=0.0)
@@ -71,5 +71,5 @@ def _matrix(bundle: xr.Dataset) -> np.ndarray:
     """Motions of all frames under unit loads there, shape (6 frames, 6 frames), in the body frame."""
     shapes = np.concatenate([bundle["frame_translation_shape"].values, bundle["frame_rotation_shape"].values], axis=1)
     moved = shapes.reshape(-1, shapes.shape[-1])
-    found: np.ndarray = moved @ np.linalg.solve(bundle["modal_stiffness"].values, moved.T)
-    return found
+    compliance: np.ndarray = moved @ np.linalg.solve(bundle["modal_stiffness"].values, moved.T)
+    return compliance

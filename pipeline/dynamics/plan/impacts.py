@@ -21,14 +21,14 @@ from flexclear.pipeline.dynamics.run.ledger import CHOSEN
 
 #: where members part, fewer modes are only trusted that were seen over this part of the time
 LEAST_SEEN = 0.5
-#: what is tried: beside impacts steps are short whatever the order, so the method of order 5, at a tolerance that is
+#: what is tried: next to impacts steps are short whatever the order, so the method of order 5, at a tolerance that is
 #: looser than that of the pilots where these are tight
 QUICK, QUICK_RTOL = "dopri5", 1e-4
-#: of the largest energy error of a run, what one over a part of the time may have, as a share of that part
+#: of the largest energy error of a run, what one over a part of the time may have, as a fraction of that part
 OF_LEDGER = 0.25
 #: energy error that the planned run may have then: what it does to what is asked for has been looked at
 LEDGER = 5e-3
-#: levels of modes that leave more than this share of the variables save too little to be tried
+#: levels of modes that leave more than this fraction of the variables save too little to be tried
 WORTH = 0.85
 #: differences beyond so many budgets are not of the tolerance
 NEAR = 10.0
@@ -41,94 +41,94 @@ def bent(search: Search, soft: Sequence[Effect]) -> None:
     pilots = search.pilots
     every = effects(pilots.scene)
     gone = [*search.gone, *(e for e in every if e.within in {g.name for g in search.gone})]
-    share = pilots.part(gone)
-    whole = pilots.must_run(gone, share)
+    fraction = pilots.part(gone)
+    whole = pilots.must_run(gone, fraction)
     rigid = [*soft, *(e for e in every if e.within in {s.name for s in soft})]
-    apart = pilots.between(pilots.point([*gone, *rigid], share=share), whole)
-    apart = with_doubt(search, apart, False, _more(share))
-    most = {name: i.most for name, i in apart.items()}
+    effect_sizes = pilots.between(pilots.point([*gone, *rigid], fraction=fraction), whole)
+    effect_sizes = with_doubt(search, effect_sizes, False, _more(fraction))
+    most = {name: i.most for name, i in effect_sizes.items()}
     small = search.fits(most)
     if small:
         search.spend(most)
     for effect in soft:
-        search.judge(effect, small, "with or without bending the loose joints do the same", most, apart)
+        search.judge(effect, small, "with or without bending the loose joints do the same", most, effect_sizes)
 
 
 def quickest(search: Search, usual: str) -> Chosen:
     """The cheapest way to integrate what is left of a scene with contacts; by `usual` where no other is shown to do."""
     pilots, gone = search.pilots, search.gone
     scene = pilots.variant(gone)
-    loose, share = pilots.loose(scene), pilots.part(gone)
-    whole = pilots.must_run(gone, share)
-    unknown = Chosen(usual, loose, dict.fromkeys(search.wanted, np.nan))
+    loose, fraction = pilots.loose(scene), pilots.part(gone)
+    whole = pilots.must_run(gone, fraction)
+    unknown = Chosen(usual, loose, dict.fromkeys(search.requested, np.nan))
     if whole.refused:
         return unknown
-    for level in [*_levels(search, share), None]:
+    for level in [*_levels(search, fraction), None]:
         for rtol in sorted({QUICK_RTOL, loose}, reverse=True):
             if pilots.work > MOST_WORK:
                 return unknown
-            apart = pilots.between(_tried(search, level, share, rtol, whole), whole)
-            most = {name: (1.0 + _more(share)) * i.difference for name, i in apart.items()}
+            effect_sizes = pilots.between(_tried(search, level, fraction, rtol, whole), whole)
+            most = {name: (1.0 + _more(fraction)) * i.difference for name, i in effect_sizes.items()}
             if search.fits(most):
                 search.spend(most)
                 if level is not None:
-                    _tell(search, level, apart)
+                    _tell(search, level, effect_sizes)
                 return Chosen(QUICK, rtol, most, level, LEDGER)
-            if level is not None and _by_modes(search, most, apart):
+            if level is not None and _by_modes(search, most, effect_sizes):
                 break
     return unknown
 
 
-def _by_modes(search: Search, most: Mapping[str, float], apart: Mapping[str, Influence]) -> bool:
+def _by_modes(search: Search, most: Mapping[str, float], effect_sizes: Mapping[str, Influence]) -> bool:
     """Whether a difference is rather due to the modes than to the tolerance: it is large, or members part anyway."""
     return any(
-        NEAR * BUDGET * wanted < most[name] < np.inf or apart[name].uncertainty > wanted
-        for name, wanted in search.wanted.items()
+        NEAR * BUDGET * requested < most[name] < np.inf or effect_sizes[name].uncertainty > requested
+        for name, requested in search.requested.items()
     )
 
 
-def _more(share: float) -> float:
-    """What the rest of the time may add, as a share."""
-    return 0.0 if share == 1.0 else WHOLE
+def _more(fraction: float) -> float:
+    """What the rest of the time may add, as a fraction."""
+    return 0.0 if fraction == 1.0 else WHOLE
 
 
-def _levels(search: Search, share: float) -> Iterator[int]:
+def _levels(search: Search, fraction: float) -> Iterator[int]:
     """Levels of fewer modes that may be tried."""
     pilots = search.pilots
     bending = pilots.variant(search.gone).flexible()
     mine = [k for k in range(len(pilots.fewer)) if pilots.modes(k, bending) and pilots.saved(k) >= 1.0 / WORTH]
-    if mine and share < LEAST_SEEN:
+    if mine and fraction < LEAST_SEEN:
         every = effects(pilots.scene)
         soft = [e for e in every if e.kind == FLEXIBILITY or e.within.startswith("body.")]
         rigid = pilots.point(list({e.name: e for e in [*search.gone, *soft]}.values()))
-        if any(i.uncertainty > search.wanted[name] for name, i in pilots.between(rigid, rigid).items()):
-            return  # members of rigid bodies part later, and the beginning does not tell what modes do then
+        if any(i.uncertainty > search.requested[name] for name, i in pilots.between(rigid, rigid).items()):
+            return  # members of rigid bodies diverge later, and the beginning does not show what modes do then
     yield from mine
 
 
-def _tried(search: Search, level: int | None, share: float, rtol: float, whole: Point) -> Point:
+def _tried(search: Search, level: int | None, fraction: float, rtol: float, whole: Point) -> Point:
     """A run of a level of modes at a tolerance, given up where it takes longer or loses energy too fast."""
     pilots = search.pilots
     saved = 1.0 if level is None else pilots.saved(level)
     limits: dict[str, Any] = {
         "evaluations": int(saved * whole.evaluations / MEMBERS) + 1,
-        "ledger_tolerance": OF_LEDGER * CHOSEN * share,
+        "ledger_tolerance": OF_LEDGER * CHOSEN * fraction,
     }
-    return pilots.point(search.gone, level=level, share=share, integrator=QUICK, rtol=rtol, **limits)
+    return pilots.point(search.gone, level=level, fraction=fraction, integrator=QUICK, rtol=rtol, **limits)
 
 
-def _tell(search: Search, level: int, apart: dict[str, Influence]) -> None:
+def _tell(search: Search, level: int, effect_sizes: dict[str, Influence]) -> None:
     """Say of bodies with fewer modes why the others go."""
-    beyond = [name for name, i in apart.items() if i.uncertainty > search.wanted[name]]
+    beyond = [name for name, i in effect_sizes.items() if i.uncertainty > search.requested[name]]
     loose = next((d.effect.owner for d in search.decisions.values() if d.kept and d.effect.kind == CLEARANCE), "")
     for body, count in search.pilots.modes(level, search.pilots.bundles).items():
-        told = search.decisions.get(f"body.{body}.modes")
-        if told is None or not told.kept:
+        decision = search.decisions.get(f"body.{body}.modes")
+        if decision is None or not decision.kept:
             continue
         why = f"{count} of its modes do the same as all"
         if beyond:
             why = (
-                f"{' and '.join(beyond)} parts by more than is wanted when {loose or 'a contact'} starts a hair "
+                f"{' and '.join(beyond)} parts by more than requested when {loose or 'a contact'} starts a hair "
                 f"elsewhere, and with {count} of its modes it differs by no more than that"
             )
-        search.decisions[told.effect.name] = replace(told, reason=f"{told.reason}; {why}")
+        search.decisions[decision.effect.name] = replace(decision, reason=f"{decision.reason}; {why}")

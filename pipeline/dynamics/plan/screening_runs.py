@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.effect_size import Influence, influence, kept, members_apart
+from flexclear.pipeline.core.effect_size import Influence, influence, recorded, with_members
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.load import edited
@@ -27,8 +27,8 @@ MEMBERS = 3
 #: rigid pilots without contact are integrated to this tolerance; flexible ones by the method for stiff motions to the
 #: second
 RTOL, SMOOTH_RTOL, SMOOTH = 1e-7, 1e-5, "radau"
-#: tolerance of pilots with contacts: this share of the least clearance over the mechanism's size, between two limits
-#: (errors of places are the tolerance times that size, and must stay small beside the clearance)
+#: tolerance of pilots with contacts: this fraction of the least clearance over the mechanism's size, between two limits
+#: (errors of positions are the tolerance times that size, and must stay small next to the clearance)
 OF_CLEARANCE, TIGHTEST, LOOSEST = 0.05, 1e-7, 1e-5
 #: evaluations times variables that pilots of one variant with contacts may take, all members together: measured, some
 #: 0.2 s on one core.  What takes longer is run over a part of the time, at least so much of it
@@ -61,7 +61,7 @@ class Pilots:
     """Variants of a scene that have been run.
 
     bundles: reduced flexible bodies.  fewer: the same of fewer modes, where there are such, levels with the fewest
-    first.  filled: fills in what recipes tell of rigid bodies.  points: by what was run.  evaluations: of all.
+    first.  filled: fills in what recipes describe rigid bodies.  points: by what was run.  evaluations: of all.
     work: these times the variables of each.  refused_loose: whether the loose tolerance was refused.
     """
 
@@ -110,19 +110,19 @@ class Pilots:
         Its beginning is run from one start to know.
         """
         begun = self.must_run(gone, BEGINNING, 0)
-        share = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
-        return LEAST_PART if begun.refused else float(np.clip(share, LEAST_PART, 1.0))
+        fraction = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
+        return LEAST_PART if begun.refused else float(np.clip(fraction, LEAST_PART, 1.0))
 
     def point(
         self,
         gone: Collection[Effect],
         *,
         level: int | None = None,
-        share: float = 1.0,
+        fraction: float = 1.0,
         members: int = MEMBERS,
         **solver: object,
     ) -> Point:
-        """What is watched of a variant over a share of its time; a refusal of the solver is in the point.
+        """What is watched of a variant over a fraction of its time; a refusal of the solver is in the point.
 
         level: with so few modes of those bodies that have a choice; None: with all.  members: starts, where there are
             contacts.
@@ -132,17 +132,17 @@ class Pilots:
         if level is not None:
             mine |= {name: bundle for name, bundle in self.fewer[level].items() if name in mine}
             scene = with_modes(scene, self.modes(level, mine))
-        if share < 1.0:
-            scene = edited(scene, {"time.end": scene.time.start + share * (scene.time.end - scene.time.start)})
+        if fraction < 1.0:
+            scene = edited(scene, {"time.end": scene.time.start + fraction * (scene.time.end - scene.time.start)})
         names = frozenset(effect.name for effect in gone)
-        key = (names, json.dumps([scene.solver.model_dump(mode="json"), level, share, members]))
+        key = (names, json.dumps([scene.solver.model_dump(mode="json"), level, fraction, members]))
         if key not in self.points:
             self.progress(None, f"run {len(self.points) + 1}: {scene.summary()}")
             starts = members if scene.contacts() or scene.stop else 0
-            found = Runner(mine, kept(scene.owners(), self.chosen), starts).run(members_apart(scene))
-            self.points[key] = found
-            self.evaluations += found.evaluations
-            self.work += found.evaluations * self._variables(mine)
+            measured = Runner(mine, recorded(scene.owners(), self.chosen), starts).run(with_members(scene))
+            self.points[key] = measured
+            self.evaluations += measured.evaluations
+            self.work += measured.evaluations * self._variables(mine)
         return self.points[key]
 
     def modes(self, level: int, bodies: Collection[str]) -> dict[str, int]:
@@ -158,21 +158,21 @@ class Pilots:
         left_out = sum(b.sizes["mode"] for b in self.bundles.values()) - sum(b.sizes["mode"] for b in bundles.values())
         return max(self.extent.variables - 2 * int(left_out), 1)
 
-    def must_run(self, gone: Collection[Effect], share: float, members: int = MEMBERS) -> Point:
+    def must_run(self, gone: Collection[Effect], fraction: float, members: int = MEMBERS) -> Point:
         """What is watched of a variant that the decisions need, at a tight tolerance where the loose one is refused.
 
         Raises SolverError where it is refused then, too, for another reason than that it takes long.
         """
-        found = self.point(gone, share=share, members=members)
-        if found.refused and TAKES_LONG not in found.refused:
+        point = self.point(gone, fraction=fraction, members=members)
+        if point.refused and TAKES_LONG not in point.refused:
             self.refused_loose = True
-            found = self.point(gone, share=share, members=members, rtol=RTOL)
-        if found.refused and TAKES_LONG not in found.refused:
-            raise SolverError(f"{self.scene.name}: the scene cannot be run as it stands: {found.refused}")
-        return found
+            point = self.point(gone, fraction=fraction, members=members, rtol=RTOL)
+        if point.refused and TAKES_LONG not in point.refused:
+            raise SolverError(f"{self.scene.name}: the scene cannot be run as it is: {point.refused}")
+        return point
 
     def between(self, a: Point, b: Point) -> dict[str, Influence]:
-        """How far two of them are apart in each quantity; infinitely where one of them was refused."""
+        """Difference of two of them in each quantity; infinitely where one of them was refused."""
         if a.refused or b.refused:
             return {q.name: Influence(np.inf) for q in self.chosen}
         return {q.name: influence(a, b, q, MEMBERS) for q in self.chosen}

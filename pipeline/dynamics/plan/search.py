@@ -1,10 +1,10 @@
-"""The decisions of a plan: the error that is wanted is a budget, and what is dropped spends it.
+"""The decisions of a plan: the error that is requested is a budget, and what is dropped spends it.
 
 Order of the evidence: bounds and first-order responses along the ideal motion (`dynamics.linear.clearance_response`),
 which cost one run of the ideal mechanism; then runs of variants, rigid ones with clearance and flexible ones without,
 which are cheap;
 then, where clearance stays, a loose run of the whole scene to see whether flexible bodies change what it does.
-What is not shown to be small is kept.
+Effects that are not shown to be small stay.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from flexclear.pipeline.dynamics.linear.response import Response, response
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.impacts import bent, quickest
-from flexclear.pipeline.dynamics.plan.requested_accuracy import wanted_in
+from flexclear.pipeline.dynamics.plan.requested_accuracy import requested_in
 from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, Pilots
 from flexclear.pipeline.dynamics.plan.tolerance import DEFAULT, no_dearer, smooth
 from flexclear.pipeline.dynamics.run.run import Run, integrate
@@ -34,9 +34,9 @@ from flexclear.pipeline.dynamics.run.run import Run, integrate
 #: what bounds of clearances, which hold whatever happens, may use up of the budget
 BY_BOUND = 0.9
 #: by how much the first-order response of flexible bodies counts for more: it leaves out that the pose turns meanwhile,
-#: and that loads follow the vibration; beside runs it is 0.7 to 10 times what is true
+#: and that loads follow the vibration; next to runs it is 0.7 to 10 times what is true
 OF_RESPONSE = 2.0
-#: effects that cost nothing to keep are dropped below this share of what is wanted
+#: effects that cost nothing to keep are dropped below this fraction of the requested accuracy
 FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
 #: why parts go that the motion asked for never feels
 UNCOUPLED = "nothing couples it to what is asked for"
@@ -55,13 +55,13 @@ def plan(
     bundles: reduced flexible bodies.  fewer: the same of fewer modes, of those that have a choice, levels with the
     fewest first.  meshes: numbers of elements, and the bodies as reduced from twice as many.  filled: a variant
     with the rigid bodies that recipes describe filled in.
-    Raises InputError where nothing is wanted, or the motion itself is below it; SolverError where the scene, or what is
-    left of it, cannot be run.
+    Raises InputError where nothing is requested, or the motion itself is below it; SolverError where the scene, or what
+    is left of it, cannot be run.
     """
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
-    apart = uncoupled(scene, {q.owner.partition(".")[0] for q in quantities})
-    bare = lessened(_plain(scene), apart)
+    uncoupled_parts = uncoupled(scene, {q.owner.partition(".")[0] for q in quantities})
+    bare = lessened(_plain(scene), uncoupled_parts)
     mine, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
     pilots = Pilots(bare, mine, less, filled, quantities, progress)
     _ = pilots.extent  # a scene that cannot be built is refused before anything is run
@@ -72,14 +72,14 @@ def plan(
     inner = [effect for effect in every if effect.within]
     within_bodies = [e for e in inner if e.within.startswith("body.")]
     ideal = pilots.point([*loose, *soft, *inner], rtol=RTOL)
-    search = Search(pilots, wanted_in(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
+    search = Search(pilots, requested_in(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
     rigid = _rigid(search, [*loose, *soft, *inner]) if loose or soft else None
     _clearances(search, loose, [*soft, *inner], rigid)
     _interactions(search, soft, inner)
     _flexibilities(search, soft, loose, inner, rigid)
     _confirm(search, soft, inner)
     _others(search, [e for e in every if e.kind not in (CLEARANCE, FLEXIBILITY)], every)
-    return _finished(search, effects(scene), apart, meshes)
+    return _finished(search, effects(scene), uncoupled_parts, meshes)
 
 
 def _plain(scene: Scene) -> Scene:
@@ -104,11 +104,11 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
     free = [effect for effect in loose if effect.owner not in asked]
     if not free:
         return
-    pilots, found = search.pilots, dict[str, Mapping[str, float]]()
+    pilots, bounded = search.pilots, dict[str, Mapping[str, float]]()
     if rigid is not None and any(q.kind in OF_POSE for q in pilots.chosen):
-        found = dict(bounds(pilots.scene, rigid, pilots.chosen).clearance)
-    reach = {effect.name: found.get(effect.owner, {}) for effect in free}
-    total = summed(reach.values(), search.wanted)
+        bounded = dict(bounds(pilots.scene, rigid, pilots.chosen).clearance)
+    reach = {effect.name: bounded.get(effect.owner, {}) for effect in free}
+    total = summed(reach.values(), search.requested)
     if search.fits(total, BY_BOUND):
         search.spend(total)
         for effect in free:
@@ -119,12 +119,12 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
     for effect in sorted(free, key=lambda e: max(reach[e.name].values(), default=np.inf)):
         trial = [*dropped, effect]
         variant = _rigid_without(search, trial, soft)
-        apart = with_doubt(search, search.pilots.between(variant, there), bool(soft))
-        most = {name: i.most for name, i in apart.items()}
-        for name, bound in summed([reach[e.name] for e in trial], search.wanted).items():
+        effect_sizes = with_doubt(search, search.pilots.between(variant, there), bool(soft))
+        most = {name: i.most for name, i in effect_sizes.items()}
+        for name, bound in summed([reach[e.name] for e in trial], search.requested).items():
             most[name] = min(most[name], bound)
         small = search.fits(most)
-        search.judge(effect, small, "its impacts change what is asked for by less", most, apart)
+        search.judge(effect, small, "its impacts change what is asked for by less", most, effect_sizes)
         if small:
             dropped = trial
             left = most
@@ -135,24 +135,24 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
 def _interactions(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
     """Clearances that rigid bodies may do without stay where flexible ones, shaken by impacts, may not.
 
-    Rates and forces only: vibrations that impacts excite are small in places and large in these.
+    Rates and forces only: vibrations that impacts excite are small in positions and large in these.
     """
     pilots = search.pilots
     dropped = [e for e in search.gone if e.kind == CLEARANCE and search.decisions[e.name].evidence == PILOT]
     if not soft or not dropped or all(q.kind in OF_POSE for q in pilots.chosen):
         return
-    share = pilots.part(())
+    fraction = pilots.part(())
     names = {effect.name for effect in dropped}
-    lacking = pilots.point([*dropped, *(e for e in inner if e.within in names)], share=share)
-    apart = with_doubt(
-        search, pilots.between(lacking, pilots.point((), share=share)), False, 0.0 if share == 1.0 else WHOLE
+    lacking = pilots.point([*dropped, *(e for e in inner if e.within in names)], fraction=fraction)
+    effect_sizes = with_doubt(
+        search, pilots.between(lacking, pilots.point((), fraction=fraction)), False, 0.0 if fraction == 1.0 else WHOLE
     )
-    most = {name: i.most for name, i in apart.items()}
-    if all(most[name] <= BUDGET * wanted for name, wanted in search.wanted.items()):
+    most = {name: i.most for name, i in effect_sizes.items()}
+    if all(most[name] <= BUDGET * requested for name, requested in search.requested.items()):
         return
     search.used = {}
     for effect in dropped:
-        search.judge(effect, False, "", most, apart)
+        search.judge(effect, False, "", most, effect_sizes)
 
 
 def _rigid_without(search: Search, trial: Sequence[Effect], soft: Sequence[Effect]) -> Point:
@@ -161,9 +161,9 @@ def _rigid_without(search: Search, trial: Sequence[Effect], soft: Sequence[Effec
     return search.pilots.point([*trial, *inner])
 
 
-def summed(parts: Collection[Mapping[str, float]], wanted: Mapping[str, float]) -> dict[str, float]:
+def summed(parts: Collection[Mapping[str, float]], requested: Mapping[str, float]) -> dict[str, float]:
     """The sum by quantity, infinite where one of them does not say."""
-    return {name: sum(part.get(name, np.inf) for part in parts) for name in wanted}
+    return {name: sum(part.get(name, np.inf) for part in parts) for name in requested}
 
 
 def _flexibilities(
@@ -199,10 +199,10 @@ def _flexibilities(
         trial = [*dropped, effect]
         names = {e.name for e in trial}
         variant = search.pilots.point([*gone, *trial, *(e for e in inner if e.within in names)])
-        apart = with_doubt(search, search.pilots.between(variant, there), False)
-        most = {name: i.most for name, i in apart.items()}
+        effect_sizes = with_doubt(search, search.pilots.between(variant, there), False)
+        most = {name: i.most for name, i in effect_sizes.items()}
         small = search.fits(most)
-        search.judge(effect, small, "its deformation changes what is asked for by less", most, apart)
+        search.judge(effect, small, "its deformation changes what is asked for by less", most, effect_sizes)
         if small:
             dropped, left = trial, most
     if dropped:
@@ -214,18 +214,22 @@ def _with_margin(influence: Mapping[str, float]) -> dict[str, float]:
     return {name: OF_RESPONSE * value for name, value in influence.items()}
 
 
-def _vibrating(found: Response) -> str:
+def _vibrating(estimated: Response) -> str:
     """The first vibration of the assembled mechanism, and how large loads of the motion make the first they excite."""
-    first = f"the mechanism's first frequency is {found.first:.3g} Hz"
-    if np.isnan(found.excited):
+    first = f"the mechanism's first frequency is {estimated.first:.3g} Hz"
+    if np.isnan(estimated.excited):
         return f"{first}, and the loads of the ideal motion excite no vibration"
-    which = "that vibration" if found.excited == found.first else f"the first they excite, of {found.excited:.3g} Hz,"
-    size = f"{found.amplification:.2g} times its quasi-static value"
+    which = (
+        "that vibration"
+        if estimated.excited == estimated.first
+        else f"the first they excite, of {estimated.excited:.3g} Hz,"
+    )
+    size = f"{estimated.amplification:.2g} times its quasi-static value"
     return f"{first}, and the loads of the ideal motion take {which} to {size}"
 
 
 def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) -> None:
-    """Clearances that go beside bodies that stay flexible: one run of all tells whether they do as was estimated.
+    """Clearances that go next to bodies that stay flexible: one run of all shows whether the estimate holds.
 
     Bounds hold along the motion of rigid bodies, and flexible ones may go elsewhere.
     """
@@ -233,26 +237,26 @@ def _confirm(search: Search, soft: Sequence[Effect], inner: Sequence[Effect]) ->
     dropped = [effect for effect in search.gone if effect.kind == CLEARANCE]
     if not dropped or all(effect in search.gone for effect in soft):
         return
-    share = min(1.0, MEMBERS * pilots.part(()))
+    fraction = min(1.0, MEMBERS * pilots.part(()))
     names = {effect.name for effect in search.gone}
-    lacking = pilots.point([*search.gone, *(e for e in inner if e.within in names)], share=share)
-    apart = pilots.between(lacking, pilots.must_run((), share, 0))
-    most = {name: (1.0 if share == 1.0 else 1.0 + WHOLE) * i.difference for name, i in apart.items()}
-    if all(most[name] <= wanted for name, wanted in search.wanted.items()):
+    lacking = pilots.point([*search.gone, *(e for e in inner if e.within in names)], fraction=fraction)
+    effect_sizes = pilots.between(lacking, pilots.must_run((), fraction, 0))
+    most = {name: (1.0 if fraction == 1.0 else 1.0 + WHOLE) * i.difference for name, i in effect_sizes.items()}
+    if all(most[name] <= requested for name, requested in search.requested.items()):
         return
     for effect in dropped:
-        search.judge(effect, False, "", most, apart)
+        search.judge(effect, False, "", most, effect_sizes)
 
 
 def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -> None:
-    """Gravity, friction, damping, stiffening, stops: kept unless a cheap run shows that they do little."""
-    kept = {d.effect.name for d in search.decisions.values() if d.kept}
+    """Gravity, friction, damping, stiffening, stops: they stay unless a cheap run shows that they do little."""
+    remaining = {d.effect.name for d in search.decisions.values() if d.kept}
     gone = list(search.gone)
     dear = any(d.kept and d.effect.kind == FLEXIBILITY for d in search.decisions.values()) and any(
         d.kept and d.effect.kind == CLEARANCE for d in search.decisions.values()
     )
     for effect in others:
-        if effect.within and effect.within not in kept:
+        if effect.within and effect.within not in remaining:
             owner = next(e for e in every if e.name == effect.within)
             search.decide(effect, False, search.decisions[owner.name].evidence, f"goes with the {owner.words}")
             gone.append(effect)
@@ -263,17 +267,17 @@ def _others(search: Search, others: Sequence[Effect], every: Sequence[Effect]) -
             search.decide(effect, True, NONE, NOT_WORTH)
             continue
         there, lost = search.pilots.point(gone), search.pilots.point([*gone, effect])
-        apart = search.pilots.between(lost, there)
-        most = {name: i.most for name, i in apart.items()}
+        effect_sizes = search.pilots.between(lost, there)
+        most = {name: i.most for name, i in effect_sizes.items()}
         small = search.fits(most)
         free = effect.kind in FREE or bool(effect.within)  # friction of a contact goes along with it
         if small and free and not search.fits(most, NEGLIGIBLE + max(search.used.values(), default=0.0)):
-            search.judge(effect, False, "", most, apart, "it costs no time, and ")
+            search.judge(effect, False, "", most, effect_sizes, "it costs no time, and ")
             continue
         if small:
             search.spend(most)
             gone.append(effect)
-        search.judge(effect, small, "what it does is small", most, apart)
+        search.judge(effect, small, "what it does is small", most, effect_sizes)
 
 
 def _chosen(search: Search) -> Chosen:
@@ -285,30 +289,30 @@ def _chosen(search: Search) -> Chosen:
     for level in range(len(pilots.fewer)):
         if not pilots.modes(level, scene.flexible()):
             continue
-        apart = with_doubt(search, pilots.between(pilots.point(gone, level=level), pilots.point(gone)), False)
-        most = {name: i.most for name, i in apart.items()}
+        effect_sizes = with_doubt(search, pilots.between(pilots.point(gone, level=level), pilots.point(gone)), False)
+        most = {name: i.most for name, i in effect_sizes.items()}
         if search.fits(most):
             search.spend(most)
-            return smooth(pilots, gone, search.wanted, level)
-    return smooth(pilots, gone, search.wanted, None)
+            return smooth(pilots, gone, search.requested, level)
+    return smooth(pilots, gone, search.requested, None)
 
 
 def _meshes(search: Search, meshes: Mapping[str, tuple[int, xr.Dataset]]) -> dict[str, Mesh]:
     """The finite elements of bodies that stay flexible, judged by what their flexibility does."""
-    scene, found = search.pilots.scene, {}
+    scene, numbers = search.pilots.scene, {}
     for body, (given, finer) in meshes.items():
         decision = search.decisions.get(f"body.{body}.modes")
         if decision is not None and decision.kept:
             bending = {n: v + decision.uncertainty.get(n, 0.0) for n, v in decision.estimate.items()}
             duration = scene.time.end - scene.time.start
-            found[body] = mesh(given, search.pilots.bundles[body], finer, bending, search.wanted, duration)
-    return found
+            numbers[body] = mesh(given, search.pilots.bundles[body], finer, bending, search.requested, duration)
+    return numbers
 
 
 def _finished(
     search: Search,
     every: Sequence[Effect],
-    apart: tuple[str, ...],
+    uncoupled_parts: tuple[str, ...],
     meshes: Mapping[str, tuple[int, xr.Dataset]],
 ) -> Plan:
     order = {effect.name: k for k, effect in enumerate(every)}
@@ -316,20 +320,20 @@ def _finished(
     left = search.pilots.variant(search.gone).flexible()
     modes = {} if chosen.level is None else search.pilots.modes(chosen.level, left)
     for effect in every:
-        if ".".join(effect.name.split(".")[:2]) in apart:
-            search.decide(effect, False, BOUND, UNCOUPLED, dict.fromkeys(search.wanted, 0.0))
+        if ".".join(effect.name.split(".")[:2]) in uncoupled_parts:
+            search.decide(effect, False, BOUND, UNCOUPLED, dict.fromkeys(search.requested, 0.0))
     decisions = sorted(search.decisions.values(), key=lambda d: order[d.effect.name])
     pilots = search.pilots
     return Plan(
         tuple(decisions),
-        dict(search.wanted),
+        dict(search.requested),
         chosen.integrator,
         chosen.rtol,
         chosen.error,
         modes,
         pilots.evaluations,
         len(pilots.points),
-        apart,
+        uncoupled_parts,
         _meshes(search, meshes),
         chosen.ledger_tolerance,
         chosen.dearer,

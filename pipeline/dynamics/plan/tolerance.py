@@ -1,5 +1,5 @@
-"""The integrator and the tolerance of a planned run: the loosest whose error is a small share of what is wanted, and no
-dearer ones than the scene names itself."""
+"""The integrator and the tolerance of a planned run: the loosest whose error is a small fraction of the requested
+accuracy, and no dearer ones than the scene names itself."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
 from flexclear.pipeline.dynamics.plan.screening_runs import MEMBERS, RTOL, SMOOTH, SMOOTH_RTOL, Pilots
 
-#: share of what is wanted that the integration may err by
-SHARE = 0.15
+#: fraction of the requested accuracy that the integration may err by
+FRACTION = 0.15
 #: tolerances that are tried, loosest first, down to that of the reference
 TRIED = (1e-4, 1e-5, 1e-6)
 STIFF_TRIED = (1e-3, 1e-4)
 DEFAULT, TIGHT = "dop853", 1e-8
 
 
-def smooth(pilots: Pilots, gone: Sequence[Effect], wanted: Mapping[str, float], level: int | None) -> Chosen:
+def smooth(pilots: Pilots, gone: Sequence[Effect], requested: Mapping[str, float], level: int | None) -> Chosen:
     """Integrator and tolerance of the scene without what is gone, where that has no contacts.
 
     level: of modes of its flexible bodies; None: all.
     """
     if not pilots.variant(gone).flexible():
-        return _loosest(pilots, gone, wanted, DEFAULT, TRIED, RTOL, level)
-    found = _loosest(pilots, gone, wanted, SMOOTH, STIFF_TRIED, SMOOTH_RTOL, level)
-    if found.rtol > SMOOTH_RTOL or _within(found.error, wanted):
-        return found
-    unknown, own = dict.fromkeys(wanted, np.nan), own_method(pilots.scene)
+        return _loosest(pilots, gone, requested, DEFAULT, TRIED, RTOL, level)
+    choice = _loosest(pilots, gone, requested, SMOOTH, STIFF_TRIED, SMOOTH_RTOL, level)
+    if choice.rtol > SMOOTH_RTOL or _within(choice.error, requested):
+        return choice
+    unknown, own = dict.fromkeys(requested, np.nan), own_method(pilots.scene)
     if own is None:
         return Chosen(DEFAULT, TIGHT, unknown, level)
     # nothing was shown to do, and what the full scene itself is run with does for it
@@ -57,45 +57,49 @@ def no_dearer(search: Search, chosen: Chosen) -> Chosen:
         return chosen
     bare = pilots.variant(gone)
     loose = bool(bare.contacts() or bare.stop)
-    share = pilots.part(gone) if loose else 1.0
-    there = pilots.point(gone, level=chosen.level, share=share, integrator=chosen.integrator, rtol=chosen.rtol)
+    fraction = pilots.part(gone) if loose else 1.0
+    there = pilots.point(gone, level=chosen.level, fraction=fraction, integrator=chosen.integrator, rtol=chosen.rtol)
     # no more of each member than the other one took
     most = {} if there.refused else {"evaluations": there.evaluations // (MEMBERS if loose else 1) + 1}
-    mine = pilots.point(gone, level=chosen.level, share=share, integrator=own[0], rtol=own[1], **most)
+    mine = pilots.point(gone, level=chosen.level, fraction=fraction, integrator=own[0], rtol=own[1], **most)
     if mine.refused or (not there.refused and mine.evaluations >= there.evaluations):
         return chosen
-    apart = {name: i.difference for name, i in pilots.between(mine, there).items()}
+    differences = {name: i.difference for name, i in pilots.between(mine, there).items()}
     known = all(np.isfinite(error) for error in chosen.error.values())
-    if known and not there.refused and not (search.fits(apart) if loose else _within(apart, search.wanted)):
+    if (
+        known
+        and not there.refused
+        and not (search.fits(differences) if loose else _within(differences, search.requested))
+    ):
         return replace(
             chosen,
             dearer=f"With the scene's own {own[0]} at {own[1]:.0e} the planned run would take {mine.evaluations:,} "
             f"evaluations instead of {there.evaluations:,}, and err by more than the plan allows",
         )
-    return Chosen(*own, apart if known else chosen.error, chosen.level)
+    return Chosen(*own, differences if known else chosen.error, chosen.level)
 
 
-def _within(error: Mapping[str, float], wanted: Mapping[str, float]) -> bool:
-    return all(error[name] <= SHARE * wanted[name] for name in wanted)
+def _within(error: Mapping[str, float], requested: Mapping[str, float]) -> bool:
+    return all(error[name] <= FRACTION * requested[name] for name in requested)
 
 
 def _loosest(
     pilots: Pilots,
     gone: Sequence[Effect],
-    wanted: Mapping[str, float],
+    requested: Mapping[str, float],
     integrator: str,
     tried: Sequence[float],
     reference: float,
     level: int | None,
 ) -> Chosen:
-    """The loosest of the tolerances that is good enough beside the reference, which stands for itself."""
+    """The loosest of the tolerances that is good enough next to the reference, which represents itself."""
     there = pilots.point(gone, level=level, integrator=integrator, rtol=reference)
-    error = dict.fromkeys(wanted, np.nan)
+    error = dict.fromkeys(requested, np.nan)
     tried = [rtol for rtol in tried if rtol > reference]
     for rtol in tried:
-        apart = pilots.between(pilots.point(gone, level=level, integrator=integrator, rtol=rtol), there)
-        error = {name: i.difference for name, i in apart.items()}
-        if _within(error, wanted):
+        effect_sizes = pilots.between(pilots.point(gone, level=level, integrator=integrator, rtol=rtol), there)
+        error = {name: i.difference for name, i in effect_sizes.items()}
+        if _within(error, requested):
             return Chosen(integrator, rtol, error, level)
     if not tried:
         return Chosen(integrator, reference, error, level)

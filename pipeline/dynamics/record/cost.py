@@ -84,10 +84,10 @@ def _followed(
     from flexclear.pipeline.dynamics.run.horizon import Pair
 
     pair = Pair(engine)
-    followed = pair.run(lambda *told: follow(engine, start, progress, other, None, *told))
+    followed = pair.run(lambda *text: follow(engine, start, progress, other, None, *text))
 
-    def steps(mine: Engine, y: np.ndarray, *told: Any) -> Followed:
-        return follow(mine, y, silent, lambda name: another(other(name)), None, *told)
+    def steps(mine: Engine, y: np.ndarray, *text: Any) -> Followed:
+        return follow(mine, y, silent, lambda name: another(other(name)), None, *text)
 
     return *followed, pair.perturbed_run(start, steps, silent)
 

@@ -84,8 +84,8 @@ def recorded(run: Run) -> LabelledArrays:
     for part in parts:
         variables |= part[0]
         coordinates |= part[1]
-    title, told = f"Motion of {subject(run.scene)}", attributes(run.scene) | _report(run)
-    return conformed(labelled(variables, coordinates), RUN, title=title, **told)
+    title, facts = f"Motion of {subject(run.scene)}", attributes(run.scene) | _report(run)
+    return conformed(labelled(variables, coordinates), RUN, title=title, **facts)
 
 
 def subject(scene: Scene) -> str:
@@ -99,20 +99,20 @@ def subject(scene: Scene) -> str:
 
 
 def references(scene: Scene) -> str:
-    """Publications of the methods that the scene's parts stand for, one a line."""
-    found = list[str]()
+    """Publications of the methods that the scene's parts represent, one a line."""
+    sources = list[str]()
     for name in sorted({part.module for part in named(scene)}):
         module = import_module(name)
         own = [thing for thing in vars(module).values() if getattr(thing, "__module__", None) == name]
         for thing in (module, *own):
-            found += cited(getattr(thing, "__doc__", None))
-    return "\n".join(dict.fromkeys(found))
+            sources += cited(getattr(thing, "__doc__", None))
+    return "\n".join(dict.fromkeys(sources))
 
 
 def attributes(scene: Scene) -> dict[str, str]:
     """What the run was made from: parameters, references, versions; no times, no file names.
 
-    Where values come from stands in what is derived from the run: a sentence about a value runs nothing again.
+    Where values come from is in what is derived from the run: a sentence about a value runs nothing again.
     """
     parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
     for body in scene.flexible():
@@ -184,7 +184,7 @@ def _friction_warnings(run: Run) -> list[str]:
 def _report(run: Run) -> dict[str, float | int | str]:
     """How the run was made, for the attributes; and in words what is to be doubted."""
     counters, redundant = run.trajectory.counters, run.engine.mobility.redundant
-    told: dict[str, float | int | str] = {
+    facts: dict[str, float | int | str] = {
         **counters,
         "stiff_share": counters.get("stiff_steps", 0) / max(1, counters.get("steps", 0)),
         "largest_rate": run.trajectory.steepest,
@@ -193,20 +193,20 @@ def _report(run: Run) -> dict[str, float | int | str]:
         "closure_residual_of_given_start": run.model.mechanism.start_residual,
     }
     if run.perturbed is not None:
-        told["separation_perturbation"] = PERTURBATION
-    told |= {"redundant_closure_rows": redundant, "method": run.model.scene.solver.integrator}
+        facts["separation_perturbation"] = PERTURBATION
+    facts |= {"redundant_closure_rows": redundant, "method": run.model.scene.solver.integrator}
     if run.mended:
-        told["start_mended"] = "\n".join(run.mended)
+        facts["start_mended"] = "\n".join(run.mended)
     if run.switched:
-        told["switched"] = run.switched
+        facts["switched"] = run.switched
     if redundant:
-        told["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
-    told["warnings"] = "\n".join(warnings(run))
+        facts["redundant_reactions"] = "one of many solutions: closure rows that follow from the others carry nothing"
+    facts["warnings"] = "\n".join(warnings(run))
     if run.model.contacts:
         from flexclear.pipeline.dynamics.contact import validity
 
-        told["contacts"] = validity.laws(run.model.contacts, run.model.laws)
-    return told
+        facts["contacts"] = validity.laws(run.model.contacts, run.model.laws)
+    return facts
 
 
 def _motion(motions: Motions) -> Part:
@@ -230,12 +230,12 @@ def _joints(model: Model) -> dict[str, object]:
     """Names of the joints, their types, and what they join."""
     joints, frames = model.scene.joint, model.mechanism.frames
     between = [joint.between for joint in joints.values()]
-    found: dict[str, object] = {"joint": list(joints)}
-    found["joint_type"] = ("joint", [joint.type for joint in joints.values()])
+    coordinates: dict[str, object] = {"joint": list(joints)}
+    coordinates["joint_type"] = ("joint", [joint.type for joint in joints.values()])
     for k, side in enumerate(("first", "second")):
-        found[f"joint_{side}_frame"] = ("joint", [pair[k] for pair in between])
-        found[f"joint_{side}_body"] = ("joint", [frames[pair[k]].body for pair in between])
-    return found if joints else {"joint": []}
+        coordinates[f"joint_{side}_frame"] = ("joint", [pair[k] for pair in between])
+        coordinates[f"joint_{side}_body"] = ("joint", [frames[pair[k]].body for pair in between])
+    return coordinates if joints else {"joint": []}
 
 
 def _modes(motions: Motions) -> Part:

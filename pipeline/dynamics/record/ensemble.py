@@ -35,7 +35,7 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory, output_times
 
 def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     """All members (schema ENSEMBLE) of a scene with clearance joints."""
-    wanted = scene.ensemble or Ensemble()
+    requested = scene.ensemble or Ensemble()
     if not scene.contacts() and not scene.stop:
         raise InputError(
             "[ensemble]",
@@ -43,11 +43,11 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
             "remove it",
         )
     engine, other = engines(scene, bundles, progress)
-    names = kept_bodies(engine.model, wanted.bodies, "[ensemble.bodies]")
+    names = kept_bodies(engine.model, requested.bodies, "[ensemble.bodies]")
     start = consistent_start(engine)
     select_rows(engine, start, engine.start)
     jacobian = offset_jacobian(engine, start)
-    offsets = ball_offsets(engine.model, wanted, wanted.members)
+    offsets = ball_offsets(engine.model, requested, requested.members)
     starts = [perturbed(engine, start, jacobian, moved) for moved in offsets]
     making = Lock()
 
@@ -55,82 +55,82 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         with making:
             return another(other(name))
 
-    def alone(k: int, alive: Progress, place: Place | None = None) -> tuple[xr.Dataset, str]:
+    def alone(k: int, alive: Progress, lane: Place | None = None) -> tuple[xr.Dataset, str]:
         """A member on an engine of its own, so that it does not depend on who ran before."""
         mine = another(engine)
-        mine.straight.place = place
+        mine.straight.place = lane
         last, trajectory, switched = follow(mine, starts[k], alive, heir)
         return _member(last, trajectory, names), switched
 
     def done(k: int) -> None:
-        progress(k / wanted.members, f"member {k} of {wanted.members}")
+        progress(k / requested.members, f"member {k} of {requested.members}")
 
-    with abreast(engine, wanted.members, width(), progress) as crews:
-        if crews is None:
-            found = side_by_side(alone, wanted.members, done)
+    with abreast(engine, requested.members, width(), progress) as groups:
+        if groups is None:
+            runs = side_by_side(alone, requested.members, done)
         else:
 
             def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
-                with crews.place() as place:
-                    return alone(k, alive, place)
+                with groups.place() as lane:
+                    return alone(k, alive, lane)
 
-            found = side_by_side(member, wanted.members, done, crews.lanes)
-    members, reasons = [one for one, _ in found], [switched for _, switched in found if switched]
-    made = xr.concat(members, dim="member").assign_coords(member=np.arange(wanted.members))
-    told = {"switched": f"{len(reasons)} of {wanted.members} members, the first {reasons[0]}"} if reasons else {}
-    told |= attributes(scene) | {"title": f"{wanted.members} motions of {subject(scene)}"}
-    return conform(made, ENSEMBLE, **told, seed=wanted.seed, perturbation=wanted.perturbation)
+            runs = side_by_side(member, requested.members, done, groups.lanes)
+    members, reasons = [one for one, _ in runs], [switched for _, switched in runs if switched]
+    made = xr.concat(members, dim="member").assign_coords(member=np.arange(requested.members))
+    facts = {"switched": f"{len(reasons)} of {requested.members} members, the first {reasons[0]}"} if reasons else {}
+    facts |= attributes(scene) | {"title": f"{requested.members} motions of {subject(scene)}"}
+    return conform(made, ENSEMBLE, **facts, seed=requested.seed, perturbation=requested.perturbation)
 
 
-def ball_offsets(model: Model, wanted: Ensemble, members: int) -> Iterator[np.ndarray]:
+def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np.ndarray]:
     """By which each member's start offsets the balls [m], shape (3 contacts,): random directions, equal lengths."""
-    random = np.random.default_rng(wanted.seed)
+    random = np.random.default_rng(requested.seed)
     for _ in range(members):
         offsets = random.normal(size=(len(model.contacts), 3))
-        yield (offsets * (wanted.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True))).ravel()
+        yield (offsets * (requested.perturbation / np.linalg.norm(offsets, axis=1, keepdims=True))).ravel()
 
 
-def kept_bodies(model: Model, wanted: tuple[str, ...] | None, place: str) -> list[str]:
-    """Bodies whose motion is kept: those asked for, else those that have contacts, without contacts all."""
+def kept_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> list[str]:
+    """Bodies whose motion is recorded: those requested, else those that have contacts, without contacts all."""
     known = [n for n, b in model.scene.body.items() if b.type != "ground"]
-    if wanted is None:
+    if requested is None:
         frames = model.mechanism.frames
         return sorted({frames[f].body for c in model.contacts for f in c.joint.between} & set(known)) or known
-    for name in wanted:
+    for name in requested:
         if name not in known:
-            raise InputError(place, f"there is no body '{name}'", f"known: {', '.join(known)}")
-    return list(wanted)
+            raise InputError(path, f"there is no body '{name}'", f"known: {', '.join(known)}")
+    return list(requested)
 
 
 def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Dataset:
     model = engine.model
     regular = output_times(engine.breaks, model.scene.output.interval)
-    peak, count, share = _contact_statistics(engine, trajectory)
-    kept = np.searchsorted(trajectory.time, regular)
+    peak, count, fraction = _contact_statistics(engine, trajectory)
+    rows = np.searchsorted(trajectory.time, regular)
     seen = observed(engine, trajectory)
     require_closed(model, trajectory, seen)
     series = motion_series(Motions(model, seen).several(names), model.mechanism.origin)
     variables = {
-        **{name: (dims, values[kept]) for name, (dims, values) in series.items()},
+        **{name: (dims, values[rows]) for name, (dims, values) in series.items()},
         # of the rows at events, too: an impact is shorter than the output interval
         "peak_acceleration": (("body", "axis"), np.abs(series["acceleration"][1]).max(axis=0)),
-        "contact_normal_force": (("time", "contact"), seen.touch["normal_force"][kept]),
-        "contact_offset": (("time", "contact", "axis"), seen.touch["offset"][kept]),
+        "contact_normal_force": (("time", "contact"), seen.touch["normal_force"][rows]),
+        "contact_offset": (("time", "contact", "axis"), seen.touch["offset"][rows]),
         "impact_count": (("contact",), count),
         "peak_force": (("contact",), peak),
-        "contact_time_share": (("contact",), share),
+        "contact_time_share": (("contact",), fraction),
     }
     return xr.Dataset(variables, coords={"time": regular, "body": names, **contact_names(model)})
 
 
 def _contact_statistics(engine: Engine, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Largest force [N], impacts, and share of the time in contact, per contact."""
+    """Largest force [N], impacts, and fraction of the time in contact, per contact."""
     closings = trajectory.events[trajectory.events["kind"] == CLOSING]
-    peak, count, share = [], [], []
+    peak, count, fraction = [], [], []
     for c in range(trajectory.contacts):
         mine = closings[closings["contact"] == c]
         lasting = np.where(np.isnan(mine["duration"]), engine.end - mine["time"], mine["duration"])
         peak.append(mine["peak_force"].max(initial=0.0))
         count.append(int((mine["speed"] > IMPACT).sum()))
-        share.append(lasting.sum() / (engine.end - engine.start))
-    return np.array(peak), np.array(count), np.array(share)
+        fraction.append(lasting.sum() / (engine.end - engine.start))
+    return np.array(peak), np.array(count), np.array(fraction)

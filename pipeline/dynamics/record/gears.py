@@ -14,10 +14,10 @@ def gear_series(
     model: Model, seen: Observed
 ) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
     """Force [N] or torque [N m] of every gear along its second coordinate, on the joint's second body."""
-    found = {coupling.gear: _force(model, seen, c, coupling) for c, coupling in _couplings(model)}
+    series = {coupling.gear: _force(model, seen, c, coupling) for c, coupling in _couplings(model)}
     turns = {coupling.gear: coupling.second.coordinate.turning for _, coupling in _couplings(model)}
     names = list(model.scene.gear)
-    return {"gear_force": (("time", "gear"), np.stack([found[name] for name in names], axis=1))}, {
+    return {"gear_force": (("time", "gear"), np.stack([series[name] for name in names], axis=1))}, {
         "gear": names,
         "gear_motion": ("gear", [motion(turns[name]) for name in names]),
     }
@@ -25,7 +25,7 @@ def gear_series(
 
 def on_geared_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Every gear on the frames of both joints: frame, moment about the kernels' origin, force; (time, 3) each."""
-    found = []
+    acting = []
     for c, coupling in _couplings(model):
         size = _force(model, seen, c, coupling)
         for side, factor in coupling.parts:
@@ -35,8 +35,8 @@ def on_geared_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray
                 push = moment
                 moment = np.cross(seen.sites[:, model.numbering.site(side.b)]["origin"], push)
             frames = model.scene.joint[side.joint].between
-            found += [(frame, sign * moment, sign * push) for frame, sign in zip(frames, (-1.0, 1.0), strict=True)]
-    return found
+            acting += [(frame, sign * moment, sign * push) for frame, sign in zip(frames, (-1.0, 1.0), strict=True)]
+    return acting
 
 
 def _couplings(model: Model) -> list[tuple[int, Coupling]]:

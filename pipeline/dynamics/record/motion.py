@@ -39,7 +39,7 @@ class Motion:
         return Motion(self.p + r, self.R if turn is None else self.R @ turn, self.v + swing, self.omega, a, self.alpha)
 
     def moving(self, arm: np.ndarray, rate: np.ndarray, second: np.ndarray) -> Motion:
-        """Motion of a point that moves in the body: its place, rate and second rate there, (time, 3)."""
+        """Motion of a point that moves in the body: its position, rate and second rate there, (time, 3)."""
         r, s, t = (turned(self.R, x) for x in (arm, rate, second))
         swing = cross(self.omega, r)
         a = self.a + cross(self.alpha, r) + cross(self.omega, swing + 2.0 * s) + t
@@ -128,8 +128,8 @@ class Motions:
         i = self.model.mechanism.link_of[name]
         link, body = self.model.links[i], self.model.scene.body[name]
         if isinstance(body, RigidBody):
-            place = link.places[name]
-            return self.link(i).at(place.point(np.array(body.com)), place.R)
+            placement = link.places[name]
+            return self.link(i).at(placement.point(np.array(body.com)), placement.R)
         assert link.bundle is not None
         shape, first = link.bundle["modal_first_moment"].values, link.bundle["first_moment"].values
         arm, rate, second = self.modal(i).shift(shape, bow(self.model.mechanism, i))
@@ -141,9 +141,9 @@ class Motions:
 
     def positions(self, names: Sequence[str]) -> np.ndarray:
         """Origins of named frames, kernels' origin, shape (time, frame, 3)."""
-        found = np.take(self.seen.frame_position, [self._frames[name] for name in names], axis=1)
-        self._bend(found, names)
-        return found
+        origins = np.take(self.seen.frame_position, [self._frames[name] for name in names], axis=1)
+        self._bend(origins, names)
+        return origins
 
     @cached_property
     def every_frame(self) -> np.ndarray:
@@ -152,18 +152,18 @@ class Motions:
             return self.seen.frame_position
         return self.positions(list(self._frames))
 
-    def _bend(self, found: np.ndarray, names: Sequence[str]) -> None:
+    def _bend(self, positions: np.ndarray, names: Sequence[str]) -> None:
         """Move those frames, of which some are named, that are on bent bodies."""
         if self.model.mechanism.all_rigid:
             return
         for k, name in enumerate(names):
-            i, place = self._place(name)
+            i, placement = self._place(name)
             link, bundle = self.link(i), self.model.links[i].bundle
             if bundle is not None:
                 label = name.partition(".")[2]
                 S = bundle["frame_translation_shape"].sel(frame=label).values
-                bent = place.p + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
-                found[:, k] = link.p + turned(link.R, bent)
+                bent = placement.p + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
+                positions[:, k] = link.p + turned(link.R, bent)
 
     @cached_property
     def frame_positions(self) -> dict[str, np.ndarray]:
@@ -175,20 +175,20 @@ class Motions:
         """Velocity of the origin and angular velocity of every named frame, world axes, shape (time, 3) each."""
         velocities = {}
         for name in self.model.mechanism.frames:
-            i, place = self._place(name)
+            i, placement = self._place(name)
             link, bundle = self.link(i), self.model.links[i].bundle
             if bundle is None:
-                velocities[name] = link.at(place.p).v, link.omega
+                velocities[name] = link.at(placement.p).v, link.omega
                 continue
             label, state = name.partition(".")[2], self.modal(i)
             S, P = (bundle[f"frame_{k}_shape"].sel(frame=label).values for k in ("translation", "rotation"))
             arm, rate, second = state.shift(S, bow(self.model.mechanism, i, label))
             turning = turned(link.R, _angular_velocity(state.q @ P.T, state.u @ P.T))
-            velocities[name] = link.moving(place.p + arm, rate, second).v, link.omega + turning
+            velocities[name] = link.moving(placement.p + arm, rate, second).v, link.omega + turning
         return velocities
 
     def _place(self, name: str) -> tuple[int, Placement]:
-        """Link of a named frame, and the frame's undeformed place there."""
+        """Link of a named frame, and the frame's undeformed placement there."""
         frame = self.model.mechanism.frames[name]
         i = self.model.mechanism.link_of[frame.body]
         return i, self.model.links[i].places[frame.body].of(frame.place)

@@ -1,4 +1,4 @@
-"""One point of a sweep: a run of which nothing is made but the numbers that are kept."""
+"""One point of a sweep: a run of which only the recorded numbers are made."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
 from flexclear.pipeline.core.scene.load import with_numbers
-from flexclear.pipeline.core.scene.output_quantities import OF_CONTACTS, Kept
+from flexclear.pipeline.core.scene.output_quantities import OF_CONTACTS, Recorded
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.alike import engines_alike
-from flexclear.pipeline.dynamics.run.batched_evaluation import Crews, Place, crews
+from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroups, Place, groups
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed
@@ -38,7 +38,7 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 if TYPE_CHECKING:
     import xarray as xr
 
-#: where nothing is kept of the way, the ledger of energy is looked at so often
+#: where only final values are recorded, the ledger of energy is examined so often
 LOOKS = 50
 #: how much tighter the tolerance of the run is by which the error is estimated
 TIGHTER = 1e-2
@@ -50,12 +50,12 @@ ABREAST, FEWEST = 8, 3
 class Runner:
     """Runs points of one family, all edits of one scene with the same bundles; keeps the engine that it made first.
 
-    kept: what is kept.  members: starts of each point that differ by a hair; 0: the one of the scene.
+    recorded: the quantities.  members: starts of each point that differ by a hair; 0: the one of the scene.
     error: whether each point is run at a tighter tolerance as well.
     """
 
     bundles: Mapping[str, xr.Dataset]
-    kept: Sequence[Kept]
+    recorded: Sequence[Recorded]
     members: int = 0
     error: bool = False
     engine: Engine | None = None
@@ -63,56 +63,56 @@ class Runner:
     #: what is seen of all rows is large, and seen in turn it is there once
     _looking: Lock = field(default_factory=Lock)
 
-    def run(self, scene: Scene, place: Place | None = None, alive: Progress = silent) -> Point:
-        """One point; what physics or the input of this point refuses is told in the point, not raised.
+    def run(self, scene: Scene, lane: Place | None = None, alive: Progress = silent) -> Point:
+        """One point; what physics or the input of this point refuses is reported in the point, not raised.
 
-        place: where its steps may be taken beside those of other points, which changes no bit of it.  alive: called now
-        and then; what it raises ends the work.
+        place: where its steps may be taken next to those of other points, which changes no bit of it.  alive: called
+        now and then; what it raises ends the work.
         """
-        scene = thinned(scene, self.kept)
+        scene = thinned(scene, self.recorded)
         try:
-            values, deviation, count = self._values(scene, place, alive)
+            values, deviation, count = self._values(scene, lane, alive)
             if not self.error:
                 return Point(values, {}, deviation, count)
             tight = with_numbers(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
-            better, _, more = self._values(tight, place, alive)
+            better, _, more = self._values(tight, lane, alive)
         except (SolverError, InputError) as error:
             return Point({}, {}, {}, 0, str(error))
         return Point(values, {name: np.abs(better[name] - v) for name, v in values.items()}, deviation, count + more)
 
     @contextmanager
-    def abreast(self, scene: Scene, points: int) -> Iterator[Crews | None]:
+    def abreast(self, scene: Scene, points: int) -> Iterator[LaneGroups | None]:
         """Where so many points like that of a scene may step side by side; None where each is to be run alone."""
         if points < FEWEST or not self._steps_abreast(scene):
             yield None
             return
-        with crews(ABREAST, threads=1) as made:
+        with groups(ABREAST, threads=1) as made:
             yield made
 
     def _steps_abreast(self, scene: Scene) -> bool:
         try:
-            self._engines(thinned(scene, self.kept))
+            self._engines(thinned(scene, self.recorded))
         except (SolverError, InputError):
-            return False  # as the points will tell, each by itself
+            return False  # as each point reports by itself
         return self.engine is not None and side_by_side(self.engine)
 
-    def _values(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[Values, Values, int]:
+    def _values(self, scene: Scene, lane: Place | None, alive: Progress) -> tuple[Values, Values, int]:
         engine, other = self._engines(scene)
         # exact, since how many points are run side by side depends on the machine and on how long they take
-        engine.straight.wanted = engine.straight.exact = True
-        engine.straight.place = place
-        if in_sections(self.kept):
-            values, count = _sections(engine, self.kept, alive)
+        engine.straight.requested = engine.straight.exact = True
+        engine.straight.place = lane
+        if in_sections(self.recorded):
+            values, count = _sections(engine, self.recorded, alive)
             return values, {}, count
-        found, count = list[Values](), 0
+        rows, count = list[Values](), 0
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, alive, other)
             with self._looking:
-                found.append(_kept(last, trajectory, self.kept))
+                rows.append(_kept(last, trajectory, self.recorded))
             count += trajectory.counters["evaluations"]
         if not self.members:
-            return found[0], {}, count
-        stacked = {name: np.stack([values[name] for values in found]) for name in found[0]}
+            return rows[0], {}, count
+        stacked = {name: np.stack([values[name] for values in rows]) for name in rows[0]}
         means = {name: values.mean(axis=0) for name, values in stacked.items()}
         return means, {name: values.std(axis=0, ddof=1) for name, values in stacked.items()}, count
 
@@ -137,23 +137,23 @@ class Runner:
         return [perturbed(engine, start, jacobian, moved) for moved in offsets]
 
 
-def in_sections(kept: Sequence[Kept]) -> bool:
+def in_sections(recorded: Sequence[Recorded]) -> bool:
     """Whether points are motions that their laws repeat, looked at once in each period."""
-    return any(one.reduction == "sections" for one in kept)
+    return any(one.reduction == "sections" for one in recorded)
 
 
-def thinned(scene: Scene, kept: Sequence[Kept]) -> Scene:
-    """The scene with no more regular outputs than what is kept needs."""
-    if in_sections(kept):
-        # only the states between the stretches of a period are looked at
+def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
+    """The scene with no more regular outputs than the recorded quantities need."""
+    if in_sections(recorded):
+        # only the states between the stretches of a period are examined
         return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": section_period(scene)})})
-    if any(one.throughout for one in kept):
+    if any(one.throughout for one in recorded):
         return scene
     interval = max(scene.output.interval, (scene.time.end - scene.time.start) / LOOKS)
     return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": interval})})
 
 
-def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Kept]) -> Values:
+def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
@@ -166,37 +166,37 @@ def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Kept]) -> Value
             continue
         if one.quantity.name not in series:
             series[one.quantity.name] = _series(motions, forces, one)
-        found = series[one.quantity.name]
+        recorded = series[one.quantity.name]
         if one.reduction == "series":
-            value = found[_regular(engine, trajectory.time)]
+            value = recorded[_regular(engine, trajectory.time)]
         else:
-            value = reduced(trajectory.time, found, one.reduction)
+            value = reduced(trajectory.time, recorded, one.reduction)
         values[one.name] = value if "axis" in one.dims or "quat" in one.dims else value.reshape(value.shape[:1])
     return values
 
 
-def _sections(engine: Engine, kept: Sequence[Kept], alive: Progress) -> tuple[Values, int]:
-    """What is kept once in each period, after the transient, and the evaluations that all periods took."""
+def _sections(engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> tuple[Values, int]:
+    """Recorded values, once in each period, after the transient, and the evaluations that all periods took."""
     scene = engine.model.scene
-    wanted, period = scene.sections or Sections(), section_period(scene)
-    start, parts = consistent_start(engine), stretches(engine, period, wanted.phase)
+    requested, period = scene.sections or Sections(), section_period(scene)
+    start, parts = consistent_start(engine), stretches(engine, period, requested.phase)
     require_periodic(parts, start)
-    looked_at = next(k for k, part in enumerate(parts) if part.start == engine.start + wanted.phase)
+    looked_at = next(k for k, part in enumerate(parts) if part.start == engine.start + requested.phase)
     values, evaluations = dict[str, list[np.ndarray]](), 0
     for done in periods(parts, start, range(0), Cursor()):
         alive(None, f"period {done.number}")
         evaluations += sum(trajectory.counters["evaluations"] for trajectory in done.parts)
-        if done.number >= wanted.transient:
+        if done.number >= requested.transient:
             here = done.parts[looked_at]
             motions = Motions(engine.model, observed(parts[looked_at], replace(here, rows=here.rows[:1])))
-            for one in kept:
+            for one in recorded:
                 values.setdefault(one.name, []).append(_series(motions, {}, one)[0])
-        if done.number + 1 == wanted.transient + wanted.periods:
+        if done.number + 1 == requested.transient + requested.periods:
             break
     return {name: np.array(rows) for name, rows in values.items()}, evaluations
 
 
-def _series(motions: Motions, forces: Mapping[str, tuple[np.ndarray, np.ndarray]], one: Kept) -> np.ndarray:
+def _series(motions: Motions, forces: Mapping[str, tuple[np.ndarray, np.ndarray]], one: Recorded) -> np.ndarray:
     """Values at all rows, shape (rows, components), as the run's dataset has them."""
     owner, kind = one.quantity.owner, one.quantity.kind
     if kind in ("force", "moment"):
@@ -211,7 +211,7 @@ def _series(motions: Motions, forces: Mapping[str, tuple[np.ndarray, np.ndarray]
     return values[:, 0]
 
 
-def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Kept) -> float:
+def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Recorded) -> float:
     contact = [c.name for c in engine.model.contacts].index(one.quantity.owner)
     if one.quantity.kind == "impulse":
         ledger = seen.state[-1, engine.model.speeds.stop :]
@@ -225,8 +225,8 @@ def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Kep
 
 
 def _regular(engine: Engine, time: np.ndarray) -> np.ndarray:
-    """Rows at the regular output times; a break that takes the place of one is the same but for rounding."""
-    wanted = regular_times(engine.model.scene.time, engine.model.scene.output)
-    after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
-    nearer = np.where(np.abs(time[after - 1] - wanted) < np.abs(time[after] - wanted), after - 1, after)
+    """Rows at the regular output times; a break that replaces one is the same but for rounding."""
+    requested = regular_times(engine.model.scene.time, engine.model.scene.output)
+    after = np.clip(np.searchsorted(time, requested), 1, len(time) - 1)
+    nearer = np.where(np.abs(time[after - 1] - requested) < np.abs(time[after] - requested), after - 1, after)
     return np.asarray(nearer)

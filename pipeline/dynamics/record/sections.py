@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names
 from flexclear.pipeline.dynamics.record.ensemble import kept_bodies
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.periods import APART, Cursor, Period, periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.periods import SEPARATION, Cursor, Period, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.pieces import digest, memory, remember
 from flexclear.pipeline.dynamics.run.run import engines, observed
 from flexclear.pipeline.dynamics.run.start import consistent_start
@@ -39,7 +39,7 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
     Raises InputError for laws that do not repeat, SolverError when the run cannot go on.
     """
-    wanted = scene.sections or Sections()
+    requested = scene.sections or Sections()
     for name, load in scene.load.items():
         if isinstance(load, SampledPid):
             raise InputError(
@@ -48,63 +48,65 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
                 "use a continuous 'pid' here",
             )
     period = section_period(scene)
-    # between waypoints only their states are wanted
+    # between waypoints only their states are requested
     engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
-    names = kept_bodies(engine.model, wanted.bodies, "[sections.bodies]")
+    names = kept_bodies(engine.model, requested.bodies, "[sections.bodies]")
     start = consistent_start(engine)
-    engine.straight.wanted = True
-    parts = stretches(engine, period, wanted.phase)
+    engine.straight.requested = True
+    parts = stretches(engine, period, requested.phase)
     require_periodic(parts, start)
-    count = wanted.transient + wanted.periods
-    followed = range(wanted.transient, min(count, wanted.transient + wanted.exponent_periods))
-    tape, begin = _Tape(names, engine.start + wanted.phase), Cursor()
-    kept = _Kept.found(engine, start)
-    if kept is not None and kept.state is not None:
-        remember(engine, kept.state.arrays)
-        tape.unpack(kept.state.arrays)
-        begin = Cursor.unpacked(kept.state.arrays)
+    count = requested.transient + requested.periods
+    followed = range(requested.transient, min(count, requested.transient + requested.exponent_periods))
+    tape, begin = _Tape(names, engine.start + requested.phase), Cursor()
+    recorder = _Recorder.of(engine, start)
+    if recorder is not None and recorder.state is not None:
+        remember(engine, recorder.state.arrays)
+        tape.unpack(recorder.state.arrays)
+        begin = Cursor.unpacked(recorder.state.arrays)
     for done in periods(parts, start, followed, begin):
         progress((done.number + 1) / count, f"period {done.number + 1} of {count}")
-        if done.number >= wanted.transient:
-            tape.add(parts, done, number=done.number - wanted.transient)
+        if done.number >= requested.transient:
+            tape.add(parts, done, number=done.number - requested.transient)
         if done.number + 1 == count:
             tape.orbit = tape.motion_at_waypoints(parts, done)
             break
-        if kept is not None:
-            kept.keep({**memory(engine), **done.after.packed()}, tape)
+        if recorder is not None:
+            recorder.keep({**memory(engine), **done.after.packed()}, tape)
     growth = np.array(tape.growth[: len(followed)])
-    told = {"period": period, "phase": wanted.phase, "transient": wanted.transient, "neighbour_lost": tape.lost}
+    facts = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": tape.lost}
     variables = tape.variables(engine.model) | {"growth": (("followed",), growth)}
-    coordinates = {"section": np.arange(wanted.periods), "body": names, "followed": np.arange(len(followed))}
+    coordinates = {"section": np.arange(requested.periods), "body": names, "followed": np.arange(len(followed))}
     coordinates["waypoint"] = np.array([part.start - engine.start for part in parts])
     if engine.model.contacts:
         coordinates |= contact_names(engine.model)
     made = xr.Dataset(variables, coords=coordinates)
     title = f"Sections of the periodic motion of {subject(scene)}"
-    return conform(made, SECTIONS, title=title, **attributes(scene), **told, neighbour_distance=APART * engine.rtol)
+    return conform(
+        made, SECTIONS, title=title, **attributes(scene), **facts, neighbour_distance=SEPARATION * engine.rtol
+    )
 
 
 def section_period(scene: Scene) -> float:
     """Period of the sections [s], the run's length where the scene gives none; InputError where it does not fit in."""
-    wanted, span = scene.sections or Sections(), scene.time.end - scene.time.start
-    period = wanted.period or span
+    requested, span = scene.sections or Sections(), scene.time.end - scene.time.start
+    period = requested.period or span
     if period > span * (1.0 + 1e-12):
         raise InputError(
             "[sections.period]",
-            f"a period of {period:.6g} s is longer than the run, which tells the laws for {span:.6g} s",
+            f"a period of {period:.6g} s is longer than the run, which defines the laws for {span:.6g} s",
             "let the run last a period at least",
         )
-    if not wanted.phase < period:
+    if not requested.phase < period:
         raise InputError(
             "[sections.phase]",
-            f"{wanted.phase:.6g} s is no time within the period of {period:.6g} s",
+            f"{requested.phase:.6g} s is no time within the period of {period:.6g} s",
             "give a time from 0 to below the period",
         )
     return period
 
 
 @dataclass
-class _Kept:
+class _Recorder:
     """What the task's journal knows of these sections: what an earlier attempt left, if anything."""
 
     journal: Journal
@@ -113,13 +115,13 @@ class _Kept:
     state: State | None
 
     @staticmethod
-    def found(engine: Engine, start: np.ndarray) -> _Kept | None:
-        """None where nothing is kept."""
+    def of(engine: Engine, start: np.ndarray) -> _Recorder | None:
+        """None where nothing is recorded."""
         current, begun = journal.current(), journal.seconds()
         if current is None:
             return None
         name = current.name(digest(engine, start))
-        return _Kept(current, name, begun, current.find(name))
+        return _Recorder(current, name, begun, current.find(name))
 
     def keep(self, arrays: Mapping[str, np.ndarray], tape: _Tape) -> None:
         """From here on the work can go on without the pieces that led here; the tape is as it is until the next."""
@@ -129,7 +131,7 @@ class _Kept:
 
 @dataclass
 class _Tape:
-    """What is kept, one entry per period, and per impact."""
+    """Recorded values, one entry per period, and per impact."""
 
     names: list[str]
     at: float
@@ -151,7 +153,7 @@ class _Tape:
                 self._note(part, trajectory, number, parts[0].start)
 
     def motion_at_waypoints(self, parts: list[Engine], done: Period) -> Variables:
-        """Motion of the kept bodies where the stretches of a period begin."""
+        """Motion of the recorded bodies where the stretches of a period begin."""
         first = np.array([0])
         motions = [self._motion(part, trajectory, first) for part, trajectory in zip(parts, done.parts, strict=True)]
         return {
@@ -159,9 +161,9 @@ class _Tape:
         }
 
     def _motion(self, part: Engine, trajectory: Trajectory, rows: np.ndarray) -> Variables:
-        """Motion of the kept bodies, and the contacts' offsets, at some rows."""
-        kept = replace(trajectory, rows=trajectory.rows[rows])
-        seen, model = observed(part, kept), part.model
+        """Motion of the recorded bodies, and the contacts' offsets, at some rows."""
+        at_rows = replace(trajectory, rows=trajectory.rows[rows])
+        seen, model = observed(part, at_rows), part.model
         series = motion_series(Motions(model, seen).several(self.names), model.mechanism.origin)
         if model.contacts:
             series["contact_offset"] = (("time", "contact", "axis"), seen.touch["offset"].copy())

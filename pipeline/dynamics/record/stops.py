@@ -11,7 +11,7 @@ from flexclear.pipeline.dynamics.model.stops import End
 
 def on_stopped_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Every end of a stop on both frames: frame, moment about the kernels' origin, force; (time, 3) each."""
-    found, numbering = [], model.numbering
+    acting, numbering = [], model.numbering
     for c, (_, end, outer, inner) in enumerate(model.contacts):
         if not isinstance(end, End):
             continue
@@ -20,5 +20,5 @@ def on_stopped_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarra
         push = -end.sense * seen.touch["normal_force"][:, c, None] * along
         force = np.zeros_like(push) if end.coordinate.turning else push
         moment = push if end.coordinate.turning else np.cross(b["origin"], push)
-        found += [(frame, sign * moment, sign * force) for frame, sign in zip(end.between, (-1.0, 1.0), strict=True)]
-    return found
+        acting += [(frame, sign * moment, sign * force) for frame, sign in zip(end.between, (-1.0, 1.0), strict=True)]
+    return acting

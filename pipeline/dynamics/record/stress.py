@@ -73,7 +73,7 @@ def record(motions: Motions, names: tuple[str, ...]) -> tuple[Variables, dict[st
     return variables, {
         "section": np.arange(len(owners)),
         "section_body": ("section", owners),
-        "section_place": ("section", np.concatenate(places), {"units": "m", "long_name": "place along the rod"}),
+        "section_place": ("section", np.concatenate(places), {"units": "m", "long_name": "position along the rod"}),
     }
 
 
@@ -139,7 +139,7 @@ def _inertia(bundle: xr.Dataset, motion: Motion) -> Wrench:
 
 
 def _moved(bundle: xr.Dataset, name: str, q: np.ndarray) -> np.ndarray:
-    """Shapes (place, 3, mode) times coordinates (time, mode): (time, place, 3)."""
+    """Shapes (point, 3, mode) times coordinates (time, mode): (time, point, 3)."""
     return np.einsum("pim,tm->tpi", bundle[name].values, q, optimize=True)
 
 

@@ -16,12 +16,12 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
-#: singular values of the kept closure rows below this share of the largest count as zero in the rank
+#: singular values of the selected closure rows below this fraction of the largest count as zero in the rank
 ZERO = 1e-9
 #: condition numbers below which no row's rank is in doubt, in whatever units, and with which eigenvalues of J J^T, the
 #: squares of the singular values, still have ten of their digits: their roundings are 1e-16 of the largest one
 WELL = 1e3
-#: so many rows are looked at together: the matrices of all take longer to get from the system than to work out
+#: so many rows are examined together: the matrices of all take longer to get from the system than to work out
 AT_ONCE = 256
 
 
@@ -31,18 +31,18 @@ def topology(run: Run) -> tuple[Variables, dict[str, object]]:
     redundant = np.array([name in engine.mobility.redundant_joints for name in run.scene.joint], dtype=np.int8)
     variables: Variables = {"reaction_redundant": (("joint",), redundant)}
     rows, nv = len(trajectory.rows), engine.model.nv
-    told = _singular_values(engine, trajectory, seen, singular.scaled)
-    rank = np.full(rows, told.shape[1], dtype=np.int32)
-    if told.shape[1]:
-        least = np.maximum(told[:, -1], told[:, 0] / INFINITE)
-        condition = variables["condition"] = (("time",), np.minimum(told[:, 0] / least, INFINITE))
-        near = condition[1] > WELL
-        if near.any():
-            values = _singular_values(engine, trajectory, seen, singular.natural)[near]
-            rank[near] = np.sum(values > ZERO * values[:, :1], axis=1)
+    indicators = _singular_values(engine, trajectory, seen, singular.scaled)
+    rank = np.full(rows, indicators.shape[1], dtype=np.int32)
+    if indicators.shape[1]:
+        least = np.maximum(indicators[:, -1], indicators[:, 0] / INFINITE)
+        condition = variables["condition"] = (("time",), np.minimum(indicators[:, 0] / least, INFINITE))
+        singular_rows = condition[1] > WELL
+        if singular_rows.any():
+            values = _singular_values(engine, trajectory, seen, singular.natural)[singular_rows]
+            rank[singular_rows] = np.sum(values > ZERO * values[:, :1], axis=1)
     variables["rank"] = (("time",), rank)
     variables["mobility"] = (("time",), (nv - rank).astype(np.int32))
-    if not told.shape[1]:
+    if not indicators.shape[1]:
         return variables, {}
     passes = trajectory.passes
     variables |= {
@@ -58,8 +58,8 @@ def _singular_values(
 ) -> np.ndarray:
     """Singular values of every row's closure Jacobian, with the rows solved for there; shape (time, rank)."""
     parts = []
-    for part, kept in trajectory.parts():
-        engine.keep(kept)
+    for part, selected in trajectory.parts():
+        engine.keep(selected)
         stored = seen.jacobian[part]
         for first in range(0, max(len(stored), 1), AT_ONCE):
             J = selection.dense(engine.model, engine.h, stored[first : first + AT_ONCE])

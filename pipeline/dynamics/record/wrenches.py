@@ -24,9 +24,9 @@ def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> di
 
     names: of the joints; all when None.
     """
-    wanted = list(motions.model.scene.joint if names is None else names)
-    moment, force = every_joint_wrench(motions, wanted)
-    return {name: (moment[:, k], force[:, k]) for k, name in enumerate(wanted)}
+    requested = list(motions.model.scene.joint if names is None else names)
+    moment, force = every_joint_wrench(motions, requested)
+    return {name: (moment[:, k], force[:, k]) for k, name in enumerate(requested)}
 
 
 def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
@@ -34,7 +34,7 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
     model, seen = motions.model, motions.seen
     known = _tree(model, seen) | _closures(model, seen)
     for c, contact in enumerate(model.contacts[: model.arrays.size(m.N_SURFACES)]):
-        moment, force = known.get(contact.name, (0.0, 0.0))  # what a clearance joint holds beside its contact
+        moment, force = known.get(contact.name, (0.0, 0.0))  # what a clearance joint holds next to its contact
         push = seen.touch["force"][:, c]
         known[contact.name] = (moment + cross(seen.touch["point"][:, c], push), force + push)
     if any(name not in known for name in names):
@@ -57,12 +57,12 @@ def path_wrenches(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, n
 
 def _tree(model: Model, seen: Observed) -> dict[str, Wrench]:
     moment, force = (seen.link_wrenches[field] for field in ("moment", "force"))
-    found = dict[str, Wrench]()
+    wrenches = dict[str, Wrench]()
     for i, link in enumerate(model.links):
         if link.branch.edge is not None:
             sign = -1.0 if link.branch.reverse else 1.0
-            found[link.branch.edge.name] = sign * moment[:, i], sign * force[:, i]
-    return found
+            wrenches[link.branch.edge.name] = sign * moment[:, i], sign * force[:, i]
+    return wrenches
 
 
 def _closures(model: Model, seen: Observed) -> dict[str, Wrench]:
@@ -132,13 +132,13 @@ def _forest(model: Model, names: list[str], bodies: list[str]) -> list[str]:
             b = root[b]
         return b
 
-    kept = []
+    tree = []
     for name in names:
         a, b = (top(model.mechanism.frames[f].body) for f in model.scene.joint[name].between)
         if a != b:
             root[a] = b
-            kept.append(name)
-    return kept
+            tree.append(name)
+    return tree
 
 
 def _far_side(model: Model, name: str, tree: list[str]) -> tuple[set[str], float]:
@@ -152,8 +152,8 @@ def _far_side(model: Model, name: str, tree: list[str]) -> tuple[set[str], float
         while stack:
             body = stack.pop()
             for x, y in others:
-                for near, far in ((x, y), (y, x)):
-                    if near == body and far not in reached:
+                for inner, far in ((x, y), (y, x)):
+                    if inner == body and far not in reached:
                         reached.add(far)
                         stack.append(far)
         return reached

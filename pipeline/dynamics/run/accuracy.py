@@ -30,36 +30,36 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.method_selection import Suit
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
-#: the estimate compares with a run at this share of the tolerance
+#: the estimate compares with a run at this fraction of the tolerance
 FINER = 1e-2
 #: tolerances that are tried lie between these; below, rounding decides
 TIGHTEST, LOOSEST = 1e-14, 1e-2
-#: a run is accepted when its error is between these shares of what is wanted: enough, and not wasteful
+#: a run is accepted when its error is between these fractions of the requested accuracy: enough, and not wasteful
 ENOUGH, WASTEFUL = 1.0, 1.0 / 3.0
 #: what the next try aims at, between the two
 AIM = 0.6
 TRIES = 12
 #: of the evaluations of a run that is accurate enough, what a looser tolerance must be foreseen to save
 SAVED = 0.25
-#: a run that is refused at a looser tolerance than this is tried again at a share of it
+#: a run that is refused at a looser tolerance than this is tried again at a fraction of it
 REFUSED_FOR_GOOD, TIGHTER = 1e-9, 0.1
-#: an error that does not fall below this share when the tolerance falls by FINER has another cause than the steps
+#: an error that does not fall below this fraction when the tolerance falls by FINER has another cause than the steps
 STUCK = 0.3
 
 
 @dataclass(frozen=True)
 class Attempt:
-    """A run at one tolerance: estimated errors by quantity, and the largest as a share of what is wanted."""
+    """A run at one tolerance: estimated errors by quantity, and the largest as a fraction of the requested accuracy."""
 
     rtol: float
     run: xr.Dataset
     errors: Mapping[str, float]
-    share: float
+    fraction: float
 
 
 @dataclass
 class Search:
-    """Runs made so far by tolerance, and what is wanted of them."""
+    """Runs made so far by tolerance, and what is requested of them."""
 
     scene: Scene
     once: Callable[[Scene, Judges | None], xr.Dataset]
@@ -86,29 +86,31 @@ class Search:
         finer = max(rtol * FINER, TIGHTEST)
         # the tightest of all can only be compared with a looser one, whose error is the larger
         other = self.run(finer if finer < rtol else rtol / FINER)
-        wanted = self.wanted(other)
+        requested = self.requested(other)
         # all tighter runs are witnesses: with impacts, two neighbours may agree by luck
         witnesses = [other, *(r for tolerance, r in self.runs.items() if tolerance <= 0.1 * rtol)]
-        errors = {q.name: max(quantities.error(run, r, q) for r in witnesses) for q in wanted}
-        return Attempt(rtol, run, errors, max(errors[q.name] / w for q, w in wanted.items()))
+        errors = {q.name: max(quantities.error(run, r, q) for r in witnesses) for q in requested}
+        return Attempt(rtol, run, errors, max(errors[q.name] / w for q, w in requested.items()))
 
-    def cheapest(self, found: Attempt) -> Attempt:
+    def cheapest(self, attempt: Attempt) -> Attempt:
         """The attempt, or the run that told its error, where another method made that for less.
 
-        How far the two are apart is the error of either at most, unless both err alike; runs that are tighter than both
+        How much the two differ is the error of either at most, unless both err alike; runs that are tighter than both
         are asked as well.
         """
-        finer = found.rtol * FINER
+        finer = attempt.rtol * FINER
         other = self.runs.get(finer)
-        if found.share > ENOUGH or other is None or other.attrs["evaluations"] >= found.run.attrs["evaluations"]:
-            return found
+        if attempt.fraction > ENOUGH or other is None or other.attrs["evaluations"] >= attempt.run.attrs["evaluations"]:
+            return attempt
         tighter = [run for rtol, run in self.runs.items() if rtol < finer]
         if not tighter:
-            return replace(found, rtol=finer, run=other)
-        wanted = self.wanted(other)
-        errors = {q.name: max(found.errors[q.name], *(quantities.error(other, r, q) for r in tighter)) for q in wanted}
-        share = max(errors[q.name] / w for q, w in wanted.items())
-        return Attempt(finer, other, errors, share) if share <= ENOUGH else found
+            return replace(attempt, rtol=finer, run=other)
+        requested = self.requested(other)
+        errors = {
+            q.name: max(attempt.errors[q.name], *(quantities.error(other, r, q) for r in tighter)) for q in requested
+        }
+        fraction = max(errors[q.name] / w for q, w in requested.items())
+        return Attempt(finer, other, errors, fraction) if fraction <= ENOUGH else attempt
 
     def saves(self, rtol: float, looser: float) -> bool:
         """Whether a run at a looser tolerance is foreseen to be so much cheaper that it is worth to be made.
@@ -122,11 +124,11 @@ class Search:
         growth = math.log(finer.attrs["evaluations"] / before.attrs["evaluations"]) / math.log(rtol / at)
         return (rtol / looser) ** max(growth, 0.0) < 1.0 - SAVED
 
-    def wanted(self, run: xr.Dataset) -> dict[Quantity, float]:
-        """Wanted accuracy in SI by quantity; relative ones by the size that the quantity has in `run`."""
+    def requested(self, run: xr.Dataset) -> dict[Quantity, float]:
+        """Requested accuracy in SI by quantity; relative ones by the size that the quantity has in `run`."""
         accuracy = self.scene.accuracy
         assert accuracy is not None
-        wanted = {}
+        requested = {}
         for name, want in accuracy.quantities.items():
             quantity = parse(name, self.scene.owners())
             absolute = want.absolute
@@ -138,8 +140,8 @@ class Search:
                     "a relative accuracy of a quantity that never changes",
                     "give an absolute one, with a unit",
                 )
-            wanted[quantity] = absolute
-        return wanted
+            requested[quantity] = absolute
+        return requested
 
 
 def deliver(
@@ -148,23 +150,24 @@ def deliver(
     """The cheapest run found whose estimated errors are what the scene wants; or the best, and a word on it.
 
     once: makes the run of a scene, under judges of its integrators.  suit: by what its integrator is chosen; None where
-    the scene names one.  The dataset's attributes say what was wanted, estimated and met, and why by which integrator.
+    the scene names one.  The dataset's attributes say what was requested, estimated and met, and why by which
+    integrator.
     """
     search = Search(scene, once, suit)
     best = search.cheapest(_search(search, progress))
-    wanted = {q.name: w for q, w in search.wanted(best.run).items()}
-    met = best.share <= ENOUGH
-    verdict = "met" if met else _missed(search, best, wanted)
+    requested = {q.name: w for q, w in search.requested(best.run).items()}
+    met = best.fraction <= ENOUGH
+    verdict = "met" if met else _missed(search, best, requested)
     progress(None, f"accuracy {'met' if met else 'missed: ' + verdict} (relative tolerance {best.rtol:.1e})")
     if "method_reason" in best.run.attrs:
         progress(None, str(best.run.attrs["method_reason"]))
     return best.run.assign_attrs(
-        accuracy_wanted=json.dumps({name: f"{w:.3g}" for name, w in wanted.items()}, sort_keys=True),
+        accuracy_wanted=json.dumps({name: f"{w:.3g}" for name, w in requested.items()}, sort_keys=True),
         accuracy_estimated=json.dumps({name: f"{e:.3g}" for name, e in best.errors.items()}, sort_keys=True),
         accuracy_verdict=verdict,
         accuracy_rtol=best.rtol,
         accuracy_runs=len(search.runs),
-        accuracy_meaning="largest error of the time integration, estimated by two runs at tolerances 100 times apart",
+        accuracy_meaning="largest error of the time integration, estimated by two runs with a tolerance ratio of 100",
     )
 
 
@@ -184,18 +187,18 @@ def _search(search: Search, progress: Progress) -> Attempt:
             too_loose = min(too_loose, rtol)
             rtol = _next(rtol, 1.0 / TIGHTER, enough, too_loose)
             continue
-        progress(None, f"tolerance {rtol:.1e}: error {now.share:.2g} of what is wanted")
-        if nearest is None or now.share < nearest.share:
+        progress(None, f"tolerance {rtol:.1e}: error {now.fraction:.2g} of the requested accuracy")
+        if nearest is None or now.fraction < nearest.fraction:
             nearest = now
-        if now.share <= ENOUGH:
+        if now.fraction <= ENOUGH:
             enough = now if enough is None or now.rtol > enough.rtol else enough
-            if now.share >= WASTEFUL or rtol >= LOOSEST:
+            if now.fraction >= WASTEFUL or rtol >= LOOSEST:
                 return now
         else:
             too_loose = min(too_loose, rtol)
             if rtol <= TIGHTEST:
                 break
-        rtol = _next(rtol, now.share, enough, too_loose)
+        rtol = _next(rtol, now.fraction, enough, too_loose)
         if enough is not None and not search.saves(enough.rtol, rtol):
             return enough
         if enough is not None and too_loose < 1.05 * enough.rtol:
@@ -206,37 +209,39 @@ def _search(search: Search, progress: Progress) -> Attempt:
 def _first(scene: Scene) -> float:
     """A guess that the search corrects; a tenth of the tightest relative wish, or the scene's own tolerance."""
     assert scene.accuracy is not None
-    shares = [want.relative for want in scene.accuracy.quantities.values() if want.relative is not None]
-    guess = 0.1 * min(shares) if shares else scene.solver.rtol
+    fractions = [want.relative for want in scene.accuracy.quantities.values() if want.relative is not None]
+    guess = 0.1 * min(fractions) if fractions else scene.solver.rtol
     return float(np.clip(guess, 100.0 * TIGHTEST, LOOSEST))
 
 
-def _next(rtol: float, share: float, enough: Attempt | None, too_loose: float) -> float:
+def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float) -> float:
     if enough is not None and too_loose < math.inf:
         return math.sqrt(enough.rtol * too_loose)
-    change = float(np.clip(AIM / max(share, 1e-300), 1e-3, 1e3))
+    change = float(np.clip(AIM / max(fraction, 1e-300), 1e-3, 1e3))
     return float(np.clip(rtol * change, TIGHTEST, LOOSEST))
 
 
-def _missed(search: Search, best: Attempt, wanted: Mapping[str, float]) -> str:
+def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:
     """By how much, and why no tolerance helps."""
-    name = max(wanted, key=lambda n: best.errors[n] / wanted[n])
-    text = f"{name} is good to {best.errors[name]:.2g}, {best.errors[name] / wanted[name]:.2g} times what is wanted"
+    name = max(requested, key=lambda n: best.errors[n] / requested[n])
+    text = (
+        f"{name} is good to {best.errors[name]:.2g}, {best.errors[name] / requested[name]:.2g} times what is requested"
+    )
     looser = min((r for r in search.runs if r > best.rtol), default=None)
     if looser is None:
         return text
     quantity = parse(name, search.scene.owners())
     before = quantities.error(search.runs[looser], best.run, quantity)
     if not best.errors[name] < STUCK * before:
-        until = _trusted_until(search, best, quantity, wanted[name])
+        until = _trusted_until(search, best, quantity, requested[name])
         return f"{text}; tighter tolerances do not help{until}: the motion is chaotic or rounding decides"
     return f"{text}; this is the tightest tolerance"
 
 
-def _trusted_until(search: Search, best: Attempt, quantity: Quantity, wanted: float) -> str:
+def _trusted_until(search: Search, best: Attempt, quantity: Quantity, requested: float) -> str:
     if not quantities.is_series(quantity):
         return ""
     other = search.runs[min(search.runs, key=lambda r: (r == best.rtol, abs(math.log(r / best.rtol))))]
     time, distance = quantities.deviation(best.run, other, quantity)
-    beyond = np.flatnonzero(distance > wanted)
+    beyond = np.flatnonzero(distance > requested)
     return f" (it holds until t = {time[beyond[0]]:.4g} s)" if beyond.size else ""

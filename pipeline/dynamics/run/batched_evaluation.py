@@ -1,9 +1,9 @@
 """Engines that take their steps side by side in one thread, so that their evaluations are made at once.
 
-Each engine's own thread asks for steps as ever (`run.trajectory`), and is told when its stepper has come back: paused,
-at the end of a segment, or with an error. Meanwhile the crew's thread lets up to `lanes` steppers run, each on a stack
-of its own (`compile.stacks`), and evaluates for all of them together (`compile.lanes`). What a stepper does depends on
-nothing but its own engine, so neither the number of crews nor who else is in one changes a bit of it.
+Each engine's own thread asks for steps as ever (`run.trajectory`), and is notified when its stepper has come back:
+paused, at the end of a segment, or with an error. Meanwhile the group's thread lets up to `lanes` steppers run, each on
+a stack of its own (`compile.stacks`), and evaluates for all of them together (`compile.lanes`). What a stepper does
+depends on nothing but its own engine, so neither the number of groups nor who else is in one changes a bit of it.
 """
 
 from __future__ import annotations
@@ -41,14 +41,14 @@ class Code:
     numbers: int
 
 
-class Crew:
+class LaneGroup:
     """A thread that lets steppers run while it is open.
 
-    kept: closure rows that its code solves for.
+    rows: closure rows that its code solves for.
     """
 
-    def __init__(self, kept: bytes, code: Code, lanes: int) -> None:
-        self.kept, self.lanes = kept, lanes
+    def __init__(self, rows: bytes, code: Code, lanes: int) -> None:
+        self.rows, self.lanes = rows, lanes
         self.wait = stacks.addresses()["wait"]
         self._run = functions.LANES(code.abreast)
         self._stacks = stacks.Stacks(lanes)
@@ -64,7 +64,7 @@ class Crew:
         self._thread.start()
 
     def advance(self, function: int, arguments: Sequence[int]) -> None:
-        """Let a stepper run until it comes back; raises what ended the crew's thread, if something did."""
+        """Let a stepper run until it comes back; raises what ended the group's thread, if something did."""
         steps = _Steps(function, arguments)
         with self._news:
             if self._failed is not None:
@@ -87,14 +87,14 @@ class Crew:
         busy: list[_Steps | None] = [None] * self.lanes
         try:
             self._let_run(busy)
-        except BaseException as error:  # for instance no memory: whoever waits is told, instead of waiting for ever
+        except BaseException as error:  # for instance no memory: whoever waits is notified, instead of waiting for ever
             with self._news:
                 self._failed = error
                 for steps in [*self._waiting, *filter(None, busy)]:
                     steps.back.set()
 
     def _let_run(self, busy: list[_Steps | None]) -> None:
-        """What the thread does: let steppers run as long as the crew is open."""
+        """What the thread does: let steppers run as long as the group is open."""
         states = self._stacks.records[:, stacks.STATE]
         while self._take(busy):
             arrays = (self._table, self._places, self._numbers)
@@ -106,7 +106,7 @@ class Crew:
                     steps.back.set()
 
     def _take(self, busy: list[_Steps | None]) -> bool:
-        """Give the steps that are waited for to free lanes, waiting for some where all are free; False: no more."""
+        """Give the steps that are awaited to free lanes, waiting for some where all are free; False: no more."""
         with self._news:
             while not self._waiting and not any(busy):
                 if self._closed:
@@ -121,12 +121,12 @@ class Crew:
         return True
 
 
-class Crews:
-    """Crews for the engines of so many threads, each made when an engine first needs it; of one width."""
+class LaneGroups:
+    """LaneGroups for the engines of so many threads, each made when an engine first needs it; of one width."""
 
     def __init__(self, lanes: int, threads: int) -> None:
         self.width, self.lanes = lanes, lanes * threads
-        self._aboard, self._crews = [0] * threads, dict[tuple[int, int], Crew]()
+        self._aboard, self._groups = [0] * threads, dict[tuple[int, int], LaneGroup]()
         self._boarding = Lock()
 
     @contextmanager
@@ -141,32 +141,32 @@ class Crews:
             with self._boarding:
                 self._aboard[thread] -= 1
 
-    def crew(self, thread: int, kept: bytes, code: Code) -> Crew:
+    def group(self, thread: int, rows: bytes, code: Code) -> LaneGroup:
         """That of a thread which evaluates with this code."""
         with self._boarding:
-            made = self._crews.get((thread, code.abreast))
+            made = self._groups.get((thread, code.abreast))
             if made is None:
-                made = self._crews[thread, code.abreast] = Crew(kept, code, self.width)
+                made = self._groups[thread, code.abreast] = LaneGroup(rows, code, self.width)
             return made
 
     def close(self) -> None:
         """End all threads."""
-        for crew in self._crews.values():
-            crew.close()
+        for group in self._groups.values():
+            group.close()
 
 
 @dataclass(frozen=True)
 class Place:
-    """Where an engine may step beside others: of those in a thread the crew that evaluates as it does."""
+    """Where an engine may step together with others: of those in a thread the group that evaluates as it does."""
 
-    crews: Crews
+    groups: LaneGroups
     thread: int
 
 
 @contextmanager
-def crews(lanes: int, threads: int) -> Iterator[Crews]:
-    """Crews, while they are used."""
-    made = Crews(lanes, threads)
+def groups(lanes: int, threads: int) -> Iterator[LaneGroups]:
+    """LaneGroups, while they are used."""
+    made = LaneGroups(lanes, threads)
     try:
         yield made
     finally:

@@ -19,13 +19,13 @@ from flexclear.pipeline.dynamics.run.collocation import Sampler
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.start import start_motions
 
-#: way off, in units of the coordinates, and singular values below this share of the largest, which are zero
+#: way off, in units of the coordinates, and singular values below this fraction of the largest, which are zero
 WAY, ZERO = 1e-2, 1e-6
-#: directions in which nothing of second order is said, to this share, are not those of a branch
+#: directions in which nothing of second order is said, to this fraction, are not those of a branch
 SILENT = 1e-3
-#: most directions among which branches are looked for, starts of the search for each, its steps, and what is the same
+#: most directions among which branches are searched for, starts of the search for each, its steps, and what is the same
 MOST, STARTS, STEPS, SAME = 6, 60, 40, 1e-3
-#: share of the time since the start over which a rate is taken
+#: fraction of the time since the start over which a rate is taken
 A_LITTLE = 1e-4
 #: halvings of the time in which the drives go the way
 HALVINGS = 60
@@ -84,9 +84,9 @@ def directions(engine: Engine, y: np.ndarray) -> list[Direction]:
     """All directions that the drives and the given velocities leave, from the state at the start; few or none."""
     sampler = Sampler(engine)
     seen = _Pose(engine, y)
-    found = seen.directions()
+    tangents = seen.directions()
     sampler.restore()
-    return found
+    return tangents
 
 
 class _Pose:
@@ -96,9 +96,9 @@ class _Pose:
         self.engine, self.nv, self.units = engine, engine.model.nv, engine.model.speed_scales
         self.rest = y.copy()
         self.rest[engine.model.speeds] = 0.0
-        engine.keep(np.ones(len(engine.kept), dtype=bool))
+        engine.keep(np.ones(len(engine.selected), dtype=bool))
         self.asked = initial.velocity_equations(engine.model, start_motions(engine), self.rest)
-        self.J = self.asked.matrix[self.asked.told :]
+        self.J = self.asked.matrix[self.asked.n_given :]
         U, values, _ = np.linalg.svd(self.J)
         rank = int(np.sum(values > ZERO * values[0])) if len(values) else 0
         self.left = U[:, rank:]
@@ -174,10 +174,10 @@ class _Pose:
         def progress(t: float) -> float:
             return float(np.linalg.norm(self.residual(np.zeros(self.nv), t))) / went
 
-        def reaching(wanted: float) -> float:
+        def reaching(requested: float) -> float:
             span = float(self.engine.breaks[1]) - self.engine.start
             for _ in range(HALVINGS):
-                if progress(self.engine.start + span) * size <= wanted:
+                if progress(self.engine.start + span) * size <= requested:
                     break
                 span *= 0.8
             return span
@@ -199,7 +199,7 @@ class _Pose:
         return [
             Direction(
                 t, self.rest, self._slope(step), self._with(step) - self.rest, lambda at: 0.5 * push * (at - t) ** 2,
-                lambda wanted: float(np.sqrt(2.0 * wanted / (push * size))), False,
+                lambda requested: float(np.sqrt(2.0 * requested / (push * size))), False,
             )
         ]  # fmt: skip
 
@@ -265,7 +265,7 @@ def _heard(forms: _Forms, free: np.ndarray) -> np.ndarray:
 
 def _roots(forms: _Forms, homogeneous: bool) -> list[np.ndarray]:
     """Zeros of the forms; of homogeneous ones those of unit length.  Gauss-Newton from starts of a fixed seed."""
-    k, found = forms.B.shape[1], list[np.ndarray]()
+    k, roots = forms.B.shape[1], list[np.ndarray]()
     size = max(float(np.max(np.abs(forms.A), initial=0.0)), float(np.max(np.abs(forms.B), initial=0.0)))
     for start in np.random.default_rng(0).normal(size=(STARTS * k, k)):
         a = start / (np.linalg.norm(start) if homogeneous else 1.0)
@@ -276,6 +276,6 @@ def _roots(forms: _Forms, homogeneous: bool) -> list[np.ndarray]:
             step, *_ = np.linalg.lstsq(gradient, -value, rcond=1e-10)
             a = a + step
         left = np.linalg.norm(np.append(forms.value(a), size * (a @ a - 1.0) if homogeneous else 0.0))
-        if left <= SAME * size and not any(np.linalg.norm(a - b) <= SAME * (1.0 + np.linalg.norm(b)) for b in found):
-            found.append(a)
-    return found
+        if left <= SAME * size and not any(np.linalg.norm(a - b) <= SAME * (1.0 + np.linalg.norm(b)) for b in roots):
+            roots.append(a)
+    return roots

@@ -1,9 +1,9 @@
 """The motion over a singular pose, or out of one: a polynomial with the slopes of the equations at closed states.
 
-In the pose the equations have no unique solution, and beside it what a method errs is blown up, so that no method's
+In the pose the equations have no unique solution, and next to it what a method errs is blown up, so that no method's
 stages can be there. The motion itself is smooth, on its branch. So it is a polynomial through a state at which all is
 well, with the slopes of the equations at points each of which is closed first (collocation, by Picard's iteration);
-points too near to the pose are left out. What is closed on both sides and smooth between them is the motion that keeps
+points too close to the pose are left out. What is closed on both sides and smooth between them is the motion that keeps
 its branch. That there is one shows: the iteration converges, closing changes nothing, the loops are closed between the
 points as well, and one point less gives the same end. It depends on no method and on no tolerance.
 
@@ -26,24 +26,24 @@ from flexclear.pipeline.dynamics.run.observation import observe_with
 #: points of the polynomial; the end is one of them, the start is not
 POINTS = m.COLLOCATION_ROWS - 1
 NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, POINTS + 1) / POINTS))
-#: points where a closure row has less than this share of the independence that it has at the best one are left out; or
-#: less than the second where the first would leave out more than MANY: a slow motion is long near the pose
+#: points where a closure row has less than this fraction of the independence that it has at the best one are left out;
+#: or less than the second where the first would leave out more than MANY: a slow motion is long close to the pose
 LEAST, SLOW_LEAST, MANY = 0.05, 0.005, 2
 #: so many must be left
 FEWEST = 6
 #: out of a singular pose slopes of so many points lead on; so often the speeds there are made those of the branch
 LED, TURNS = 2, 4
-#: iterations, each of which leaves a share of the error; below ROUNDING they end, below NOISE when they do not help
+#: iterations, each of which leaves a fraction of the error; below ROUNDING they end, below NOISE when they do not help
 ROUNDS, HELPS, ROUNDING, NOISE = 40, 0.3, 1e-13, 1e-10
 #: iterations are given up when one is so much worse than the last, and, after so many, when what the points leave
 #: unresolved does not fall
 WORSE, EARLY = 10.0, 6
-#: what the polynomial may be off, in units of the coordinates and in shares of the mechanism's size; and how much its
-#: end may change without one of the points, which is at least ten times what it is off
+#: what the polynomial may be off, in units of the coordinates and in fractions of the mechanism's size; and how much
+#: its end may change without one of the points, which is at least ten times what it is off
 EXACT, SENSITIVE = 1e-10, 1e-9
-#: all of that may be so much more out of a pose in which the motion begins at rest: it is long near the pose then
+#: all of that may be so much more out of a pose in which the motion begins at rest: it is long close to the pose then
 SLOWLY = 100.0
-#: and where the polynomial is so short that a row has less than this share left at its ends, by the square of that
+#: and where the polynomial is so short that a row has less than this fraction left at its ends, by the square of that
 NEAR = 0.03
 
 
@@ -74,7 +74,7 @@ class Collocation:
 class Lead:
     """What leads out of a singular pose. state: by time [s], roughly.
 
-    turn: by what share of the fastest the speeds at the start may become those of the branch; 0 leaves them alone.
+    turn: by what fraction of the fastest the speeds at the start may become those of the branch; 0 leaves them alone.
     """
 
     state: Callable[[float], np.ndarray]
@@ -138,12 +138,13 @@ def collocate(
     span: float,
     slope: np.ndarray | None,
     lead: Lead | None = None,
-    share: float = 1.0,
+    fraction: float = 1.0,
 ) -> Collocation | None:
     """The motion over a span from a closed state; None where there is no smooth one, or none that is resolved.
 
     slope: at the start; None in a singular pose, where there is none.  lead: what to begin with there; without it the
-    state's own speeds lead.  share: what a closure row has left of its most at the ends; rounding follows its square.
+    state's own speeds lead.  fraction: what a closure row has left of its most at the ends; rounding follows its
+    square.
     """
     began = sampler.evaluations
     samples = _march(sampler, t, y, span, slope, lead)
@@ -152,44 +153,44 @@ def collocate(
         used = _far_from_singular(samples, SLOW_LEAST)
     if used.sum() < FEWEST:
         return None
-    found, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
-    blur = SLOWLY if lead is not None and lead.turn == 0.0 else max(1.0, (NEAR / share) ** 2)
+    evaluated, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
+    blur = SLOWLY if lead is not None and lead.turn == 0.0 else max(1.0, (NEAR / fraction) ** 2)
     for _ in range(TURNS if lead is not None and lead.turn > 0.0 else 1):
-        size = _sizes(sampler.engine, y, [s.slope for s in found])
-        iterated = _iterate(sampler, t, y, span, nodes, found, blur * size)
+        size = _sizes(sampler.engine, y, [s.slope for s in evaluated])
+        iterated = _iterate(sampler, t, y, span, nodes, evaluated, blur * size)
         if iterated is None:
             return None
-        found, slopes, left = iterated
+        evaluated, slopes, left = iterated
         if lead is None or lead.turn == 0.0:
             break
-        better = _speeds_at_start(sampler.engine, y, nodes, [s.y for s in found])
+        better = _speeds_at_start(sampler.engine, y, nodes, [s.y for s in evaluated])
         if not np.max(np.abs(better - y) / size) <= lead.turn:
             return None
         y = better
     series = _series(nodes, slopes, y, span)
-    made = Collocation(t, span, series, found[-1].independence, sampler.evaluations - began)
+    made = Collocation(t, span, series, evaluated[-1].independence, sampler.evaluations - began)
     unresolved = _sensitivity(nodes, slopes, span, blur * size)
     sound = left <= EXACT and unresolved <= SENSITIVE and _open(sampler, made, nodes) <= blur * EXACT
     return made if sound else None
 
 
 def _iterate(
-    sampler: Sampler, t: float, y: np.ndarray, span: float, nodes: np.ndarray, found: list[Sample], size: np.ndarray
+    sampler: Sampler, t: float, y: np.ndarray, span: float, nodes: np.ndarray, evaluated: list[Sample], size: np.ndarray
 ) -> tuple[list[Sample], np.ndarray, float] | None:
     """Picard's iteration from the slopes at the nodes: what is there at last, its slopes, what closing changed."""
-    slopes = np.array([s.slope for s in found])
+    slopes = np.array([s.slope for s in evaluated])
     weights, last, rough = _integrals(nodes, nodes), np.inf, np.inf
     states = y + span * weights @ slopes
     for k in range(ROUNDS):
-        found = [sampler.sample(t + x * span, state) for x, state in zip(nodes, states, strict=True)]
-        if not all(s.sound for s in found):
+        evaluated = [sampler.sample(t + x * span, state) for x, state in zip(nodes, states, strict=True)]
+        if not all(s.sound for s in evaluated):
             return None
-        slopes = np.array([s.slope for s in found])
-        left = float(np.max(np.abs([s.y for s in found] - states) / size))
+        slopes = np.array([s.slope for s in evaluated])
+        left = float(np.max(np.abs([s.y for s in evaluated] - states) / size))
         before, states = states, y + span * weights @ slopes
         change = float(np.max(np.abs(states - before) / size))
         if change <= ROUNDING or (change <= NOISE and change > HELPS * last):
-            return found, slopes, left
+            return evaluated, slopes, left
         unresolved = _sensitivity(nodes, slopes, span, size)
         if not change <= WORSE * last or (k >= EARLY and unresolved > SENSITIVE and unresolved > HELPS * rough):
             return None
@@ -233,7 +234,7 @@ def _march(
 
 
 def _share(sample: Sample, samples: list[Sample]) -> float:
-    """Least share that a row has of the most independence that it has at any sample."""
+    """Least fraction that a row has of the most independence that it has at any sample."""
     if not len(sample.independence):
         return 1.0
     best = np.max([s.independence for s in samples if s.sound], axis=0)
@@ -281,7 +282,7 @@ def _sensitivity(nodes: np.ndarray, slopes: np.ndarray, span: float, size: np.nd
 
 
 def _open(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> float:
-    """Largest violation of a closure between the points, in shares of the mechanism's size or as sines."""
+    """Largest violation of a closure between the points, in fractions of the mechanism's size or as sines."""
     model = sampler.engine.model
     along = model.arrays.table(m.CLOSURE_ROWS, sampler.engine.h)["kind"] == 0
     scale, worst = np.where(along, model.length, 1.0), 0.0

@@ -23,18 +23,18 @@ def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
         if edge is None or link.on_path or not joint_class(edge.kind).COORDINATES:
             continue
         positions, coordinates = model.numbering.positions[i], model.numbering.coordinates[i]
-        for place, q, c in zip(link.joint.positions, positions, coordinates, strict=True):
+        for index, q, c in zip(link.joint.positions, positions, coordinates, strict=True):
             parts = (seen.positions[:, q], seen.speeds[:, c], seen.accelerations[:, c])
             position, rate, second = (link.joint.sign * part for part in parts)
-            series[label(edge.name, edge.kind, place)] = position, rate, second
+            series[label(edge.name, edge.kind, index)] = position, rate, second
     closures = model.arrays.table(m.CLOSURES)
     for row, closure in zip(closures, model.closures, strict=True):
         if isinstance(closure, Coupling):
             continue
         edge = closure.edge
         a, b = seen.sites[:, row["site_a"]], seen.sites[:, row["site_b"]]
-        for place, coordinate in enumerate(joint_class(edge.kind).COORDINATES):
-            series[label(edge.name, edge.kind, place)] = _measured(a, b, coordinate)
+        for index, coordinate in enumerate(joint_class(edge.kind).COORDINATES):
+            series[label(edge.name, edge.kind, index)] = _measured(a, b, coordinate)
     return {name: series[name] for name, _, _ in named_coordinates(model.scene) if name in series}
 
 

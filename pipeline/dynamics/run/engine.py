@@ -23,10 +23,10 @@ from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.batched_evaluation import Crew, Place
+from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroup, Place
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 
-#: two breaks nearer than this share of the run are the same instant, written or summed up in two ways
+#: two breaks nearer than this fraction of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12
 
 
@@ -34,20 +34,20 @@ SHORTEST_SEGMENT = 1e-12
 class Straight:
     """Code for one wiring (`run.specialised`), shared by the engines of one work space.
 
-    wanted: whether all integrations shall use it.  used: whether the present one does.
+    requested: whether all integrations shall use it.  used: whether the present one does.
     exact: whether it is to give the same bits for one state as for several at once.
-    place: where it may step beside others; by default each engine takes its own steps.
-    crew: who takes the steps there, for the closure rows that it is for.
+    place: where it may step together with others; by default each engine takes its own steps.
+    group: who takes the steps there, for the closure rows that it is for.
     addresses: where it is, by the closure rows that it solves for; 0: nowhere.
     rows: those for which the present integration uses it.  They are its own, since what other integrations of this
     engine have met must not change a bit of this one.
     """
 
-    wanted: bool = False
+    requested: bool = False
     used: bool = False
     exact: bool = False
     place: Place | None = None
-    crew: Crew | None = None
+    group: LaneGroup | None = None
     addresses: dict[bytes, int] = field(default_factory=dict)
     rows: list[bytes] = field(default_factory=list)
 
@@ -57,7 +57,7 @@ class Engine:
     """One per run: the work space is not shared.
 
     h: wiring with the rows solved for.  w, n: floats and integers of the work space.  lengths: of the stretches of w.
-    kept: per closure row, whether it is solved for.  mobility: counts at the start.  start, end: of the run [s].
+    selected: per closure row, whether it is solved for.  mobility: counts at the start.  start, end: of the run [s].
     straight: code for this wiring alone.
     """
 
@@ -68,7 +68,7 @@ class Engine:
     w: np.ndarray
     n: np.ndarray
     lengths: Mapping[int, int]
-    kept: np.ndarray
+    selected: np.ndarray
     mobility: Mobility
     start: float
     end: float
@@ -77,7 +77,8 @@ class Engine:
 
     @cached_property
     def breaks(self) -> np.ndarray:
-        """Start, breaks of drives and loads and samples in between, end [s]; what only rounding sets apart is one."""
+        """Start, breaks of drives and loads and samples in between, end [s]; times that differ by rounding only are
+        one."""
         starts, inner = self.model.arrays.table(m.PIECES)["start"], set[float]()
         for first, count in self.model.arrays.table(m.LAWS):
             inner |= {float(t) for t in starts[first + 1 : first + count]}
@@ -94,16 +95,16 @@ class Engine:
     def pieces(self) -> np.ndarray:
         """Piece of every law between each break and the next, shape (breaks - 1, laws)."""
         starts, laws = self.model.arrays.table(m.PIECES)["start"], self.model.arrays.table(m.LAWS)
-        middles, found = 0.5 * (self.breaks[:-1] + self.breaks[1:]), np.zeros((len(self.breaks) - 1, len(laws)), int)
+        middles, indices = 0.5 * (self.breaks[:-1] + self.breaks[1:]), np.zeros((len(self.breaks) - 1, len(laws)), int)
         for k, (first, count) in enumerate(laws):
             passed = np.searchsorted(starts[first : first + count], middles, side="right")
-            found[:, k] = first + np.maximum(passed - 1, 0)
-        return found
+            indices[:, k] = first + np.maximum(passed - 1, 0)
+        return indices
 
     def segments(self, times: np.ndarray | float, *, after: bool) -> np.ndarray:
         """Number of the segment between breaks that holds each time; on a break, that before it or that `after` it."""
-        found = np.searchsorted(self.breaks, times, side="right" if after else "left") - 1
-        return np.asarray(np.minimum(np.maximum(found, 0), len(self.breaks) - 2))
+        index = np.searchsorted(self.breaks, times, side="right" if after else "left") - 1
+        return np.asarray(np.minimum(np.maximum(index, 0), len(self.breaks) - 2))
 
     def select_pieces_after(self, t: float) -> None:
         """Put the pieces in force that hold right after `t`; an earlier run leaves those of its end."""
@@ -112,30 +113,30 @@ class Engine:
 
     def keep(self, rows: np.ndarray) -> None:
         """Solve for these closure rows from now on; the others must follow from them."""
-        if not np.array_equal(self.kept, rows):
-            self.kept[:] = rows
-            selection.write(self.model, self.h, self.kept)
+        if not np.array_equal(self.selected, rows):
+            self.selected[:] = rows
+            selection.write(self.model, self.h, self.selected)
         self.view(m.ROW_SCALE)[: len(rows)] = 0.0
         self.connect()
 
     def connect(self) -> None:
         """Let the steps evaluate with straight code where there is some for the rows solved for."""
-        kept, known = self.kept.tobytes(), self.straight
-        found = None
-        if known.used and kept in known.rows:
-            found = known.crew.wait if known.crew and known.crew.kept == kept else known.addresses.get(kept)
-        self.h[m.RATES] = found or self.h[m.EVALUATE]
+        rows, known = self.selected.tobytes(), self.straight
+        compiled = None
+        if known.used and rows in known.rows:
+            compiled = known.group.wait if known.group and known.group.rows == rows else known.addresses.get(rows)
+        self.h[m.RATES] = compiled or self.h[m.EVALUATE]
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
-        """Step to the end of the segment or of the budget, in this thread or by the crew."""
-        crew = self.straight.crew
-        by = crew.advance if crew is not None and self.h[m.RATES] == crew.wait else None
+        """Step to the end of the segment or of the budget, in this thread or by the group."""
+        group = self.straight.group
+        by = group.advance if group is not None and self.h[m.RATES] == group.wait else None
         self.entry.advance(self.h, self.model.arrays.f, self.w, self.n, outputs, rows, events, by)
 
-    def view(self, place: int) -> np.ndarray:
+    def view(self, index: int) -> np.ndarray:
         """A stretch of the work space, not copied."""
-        o = self.h[place]
-        return self.w[o : o + self.lengths[place]]
+        o = self.h[index]
+        return self.w[o : o + self.lengths[index]]
 
     def table(self, table: Any) -> np.ndarray:
         """A table of the work space with named fields, not copied, shape (rows,)."""
@@ -143,7 +144,7 @@ class Engine:
 
     @property
     def control(self) -> np.ndarray:
-        """The stepper's floats, not copied; m.TIME is the place of the time."""
+        """The stepper's floats, not copied; m.TIME is the index of the time."""
         return self.view(m.CONTROL)
 
     @property
@@ -189,13 +190,13 @@ class Engine:
         return L
 
     def independence(self) -> np.ndarray:
-        """How far each kept closure row is from depending on those before it, at the last evaluated state."""
+        """How far each selected closure row is from depending on those before it, at the last evaluated state."""
         envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
         diagonal = envelope["origin"] + np.arange(len(envelope))
         return 1.0 / np.abs(self.view(m.SCHUR)[diagonal])
 
     def rows(self, stored: int) -> np.ndarray:
-        """JACOBIAN or SPREAD of the last evaluation, shape (kept rows, free coordinates)."""
+        """JACOBIAN or SPREAD of the last evaluation, shape (selected rows, free coordinates)."""
         return selection.dense(self.model, self.h, self.view(stored))
 
 
@@ -214,8 +215,8 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
     """The engine of a model whose functions are compiled, with a work space of its own."""
     solver, space = model.scene.solver, model.arrays.work_space(method.room)
     entry.connect(space.h)
-    kept, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
-    engine = Engine(model, entry, method, *space, kept, mobility, time.start, time.end, solver.rtol, Straight())
+    selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
+    engine = Engine(model, entry, method, *space, selected, mobility, time.start, time.end, solver.rtol, Straight())
     engine.control[m.LENGTH] = model.length
     return engine
 
@@ -223,7 +224,7 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
 def another(engine: Engine) -> Engine:
     """An engine of the same model with a work space of its own, as it is before anything has been run on it."""
     made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
-    made.straight.wanted, made.straight.exact = engine.straight.wanted, engine.straight.exact
+    made.straight.requested, made.straight.exact = engine.straight.requested, engine.straight.exact
     made.straight.addresses = engine.straight.addresses.copy()
     return made
 

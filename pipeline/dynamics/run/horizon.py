@@ -179,7 +179,7 @@ class Pair:
         return lasting(self.times[: len(separation)], separation > SEPARATED, LASTING * self._span)
 
     def _judged(self, k: int) -> float:
-        """Time [s] up to which a separation that begins at comparison k is looked at."""
+        """Time [s] up to which a separation that begins at comparison k is examined."""
         return min(float(self.times[k]) + LASTING * self._span, float(self.times[-1]))
 
     @property
@@ -219,7 +219,7 @@ class _Metric:
     """The motion of all bodies as entries whose squares add up to twice their kinetic energies.
 
     Of a body: its centre of mass's velocity times the root of its mass, its angular velocity in its own axes times the
-    root of its inertia, and the rates of its modes, which have unit mass. Of flexible bodies the deformation's share in
+    root of its inertia, and the rates of its modes, which have unit mass. Of flexible bodies the deformation's part of
     the first two is left out: this is a measure of separation, not an energy balance.
     """
 

@@ -43,7 +43,7 @@ from flexclear.pipeline.dynamics.run.observation import observe
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
-#: singular values below this share of the largest are zero
+#: singular values below this fraction of the largest are zero
 RANK = 1e-8
 
 
@@ -52,12 +52,12 @@ def actuated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
     Raises InputError when the actuators cannot produce the motion, or could in more than one way.
     """
-    wanted = {n: d for n, d in scene.drive.items() if isinstance(d, PathDrive) and d.actuators is not None}
-    names = [a for path in wanted.values() for a in path.actuators or ()]
-    _with_drives(scene, wanted, names)  # all of them can be named, before anything is compiled
+    requested = {n: d for n, d in scene.drive.items() if isinstance(d, PathDrive) and d.actuators is not None}
+    names = [a for path in requested.values() for a in path.actuators or ()]
+    _with_drives(scene, requested, names)  # all of them can be named, before anything is compiled
     engine, start = _started(scene, bundles, progress)
     engine.evaluate(start, engine.start)
-    alone = _enough(engine, scene, wanted, names)
+    alone = _enough(engine, scene, requested, names)
     trajectory, *sides = _run(engine, start, progress)
     before, after = (joint_coordinates(engine.model, seen) for seen in sides)
     laws = {}
@@ -65,7 +65,7 @@ def actuated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         joint, k, _ = _coordinate(scene, name)
         series = label(joint, scene.joint[joint].type, k)
         laws[name] = hermite(trajectory.time, np.array(before[series]), np.array(after[series]))
-    other = _with_drives(scene, wanted, alone)
+    other = _with_drives(scene, requested, alone)
     return (other, laws) if len(alone) == len(names) else _shared(other, laws, names, bundles, progress)
 
 
@@ -96,24 +96,24 @@ def hermite(time: np.ndarray, before: np.ndarray, after: np.ndarray) -> Pieces:
     return Pieces(tuple(pieces))
 
 
-def _coordinate(scene: Scene, actuator: str, place: str = "[drive]") -> tuple[str, int, Coordinate]:
+def _coordinate(scene: Scene, actuator: str, path: str = "[drive]") -> tuple[str, int, Coordinate]:
     """Joint of an actuator, ``joint`` or ``joint.coordinate``; number and declaration of its coordinate."""
     joint, _, coordinate = actuator.partition(".")
-    return coordinate_of(scene, joint, coordinate or None, place)
+    return coordinate_of(scene, joint, coordinate or None, path)
 
 
-def _with_drives(scene: Scene, wanted: Mapping[str, PathDrive], names: list[str]) -> Scene:
+def _with_drives(scene: Scene, requested: Mapping[str, PathDrive], names: list[str]) -> Scene:
     """The scene with a drive per actuator, called like it; its law is given later."""
-    kept = {n: d for n, d in scene.drive.items() if n not in wanted}
+    others = {n: d for n, d in scene.drive.items() if n not in requested}
     made = {}
-    for path, drive in wanted.items():
+    for path, drive in requested.items():
         for name in (a for a in drive.actuators or () if a in names):
-            place = f"[drive.{path}.actuators]"
-            if name in kept or name in made or name in scene.load:
-                raise InputError(place, f"something called '{name}' acts already", "name each actuator once")
-            joint, _, _ = _coordinate(scene, name, place)
+            where = f"[drive.{path}.actuators]"
+            if name in others or name in made or name in scene.load:
+                raise InputError(where, f"something called '{name}' acts already", "name each actuator once")
+            joint, _, _ = _coordinate(scene, name, where)
             made[name] = JointDrive(joint=joint, coordinate=_named(name), law=Constant(type="constant"))
-    return _changed(scene, {"drive": {**kept, **made}})
+    return _changed(scene, {"drive": {**others, **made}})
 
 
 def _named(actuator: str) -> str | None:
@@ -128,29 +128,29 @@ def _changed(scene: Scene, update: dict[str, object]) -> Scene:
     return changed
 
 
-def _enough(engine: Engine, scene: Scene, wanted: Mapping[str, PathDrive], names: list[str]) -> list[str]:
+def _enough(engine: Engine, scene: Scene, requested: Mapping[str, PathDrive], names: list[str]) -> list[str]:
     """As many of the actuators as there are freedoms; all of them, unless the scene allows for more."""
     nv, drives = engine.model.nv, engine.model.drives
     free = null_space(_closure_jacobian(engine), rcond=RANK)
-    known = [k for k, name in enumerate(drives) if name.partition(".")[0] in wanted]
+    known = [k for k, name in enumerate(drives) if name.partition(".")[0] in requested]
     held = [k for k in range(len(drives)) if k not in known]
     if held:  # other drives go on as they do
         free = free @ null_space(free[[nv + k for k in held]], rcond=RANK)
     of_path = free[[nv + k for k in known]]
     of_actuators = np.array([_rate(engine, scene, name) @ free for name in names])
-    place = f"[drive.{next(iter(wanted))}.actuators]"
+    where = f"[drive.{next(iter(requested))}.actuators]"
     rank, both = _rank(of_actuators), _rank(np.vstack([of_actuators, of_path]))
     if both > rank:
         raise InputError(
-            place,
+            where,
             f"{', '.join(names)} cannot produce this motion: with them held, {both - rank} of its freedoms remain",
             "name further actuators",
         )
     if rank == len(names):
         return names
-    if any(path.allocation == "unique" for path in wanted.values()):
+    if any(path.allocation == "unique" for path in requested.values()):
         raise InputError(
-            place,
+            where,
             f"{len(names)} actuators act on {rank} freedoms: their forces are not unique",
             f'name {rank} of them, or ask for allocation = "least-norm"',
         )

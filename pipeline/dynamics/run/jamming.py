@@ -24,7 +24,7 @@ def explanation(engine: Engine) -> str:
     return (
         f"the friction of joint {names[worst]} presses the joint the more, the more it rubs (by {gains[worst]:.3g} of "
         "each newton): it jams, and rigid bodies with Coulomb's law have no motion there, or several (Painleve's "
-        "paradox); a smaller coefficient, a longer guide or a flexible body beside the joint is the remedy"
+        "paradox); a smaller coefficient, a longer guide or a flexible body next to the joint is the remedy"
     )
 
 

@@ -1,9 +1,9 @@
 """Which integrator suits a scene that asks for accuracy alone, by what reason, and who looks whether it was right.
 
 Costs are counted in evaluations of the right-hand side. What stability will cost the explicit method follows from the
-fastest rate of the equations, linearised at the start; what accuracy will cost, a run tells: it is taken over to other
-tolerances by the order of the error estimate. So the first run is a guess, which runs to come and, while it goes on,
-its judge correct.
+fastest rate of the equations, linearised at the start; the cost of accuracy comes from a run: it is extrapolated to
+other tolerances by the order of the error estimate. So the first run is a guess, which runs to come and, while it goes
+on, its judge correct.
 
 Source: Hairer & Wanner, *Solving Ordinary Differential Equations II*, 2nd ed. (1996), sec. IV.2 (stability limits).
 """
@@ -33,13 +33,13 @@ from flexclear.pipeline.dynamics.run.start import consistent_start
 STAGES, REACH = 12.0, 5.0
 #: an evaluation with the algebra that its method needs, in evaluations of the default method
 DEARER = {DEFAULT: 1.0, VIBRATING: 1.4, STIFF: 2.0}
-#: of a scene with contacts, evaluations of the default method where the modes limit it, as a share of what it needs to
-#: be stable: it begins again at each contact, and steps more strictly there (measured: 1.45 and more)
+#: of a scene with contacts, evaluations of the default method where the modes limit it, as a fraction of what it needs
+#: to be stable: it begins again at each contact, and steps more strictly there (measured: 1.45 and more)
 TOUCHING = 1.5
-#: least and largest power of the tolerance with which evaluations grow, as two runs tell
+#: least and largest power of the tolerance with which evaluations grow, according to two runs
 LEAST_POWER, LARGEST_POWER = 0.02, 0.4
 #: the vibrations must be so much faster than all else, for nothing else limits the exponential method
-APART = 2.0
+SEPARATION = 2.0
 #: least that the default method must need before the exponential and the stiff one are tried, and before the stiff one
 #: is taken without any run
 CHEAP, WORTH, CRAWLING = 200.0, 3000.0, 300_000.0
@@ -48,12 +48,12 @@ UNKNOWN, AT = 20_000.0, 1e-4
 #: how many times dearer than another one a method must be to be given up, as pace and foresight are rough; and where it
 #: is only tried
 CLEARLY, TRIED = 3.0, 1.5
-#: where a method has used this share of what the other one is foreseen to take, it must be twice as many times dearer,
-#: earlier still more: starts may be hasty
+#: where a method has used this fraction of what the other one is foreseen to take, it must be twice as many times
+#: dearer, earlier still more: starts may be hasty
 EARLY = 0.1
-#: what a method takes for the rest of a motion tells of it where that is more than half
+#: what a method takes for the rest of a motion characterises it where that is more than half
 ENOUGH = 0.5
-#: evaluations between two looks, as a share of those foreseen, and at least
+#: evaluations between two looks, as a fraction of those foreseen, and at least
 LOOK, LEAST_LOOK = 0.02, 200
 #: an integrator that is too dear at a tolerance is taken again at one that is so many times looser
 AGAIN = 10.0
@@ -75,7 +75,7 @@ class Suit:
 
     span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  missed: by integrator, the
     loosest tolerance at which a run with it has been handed on.  told: by integrator, what the present run was foreseen
-    to take when it was handed on from it.  left: evaluations and share of the motion when that happened last.
+    to take when it was handed on from it.  left: evaluations and fraction of the motion when that happened last.
     touching: whether there are contacts.
     """
 
@@ -84,7 +84,7 @@ class Suit:
     names: tuple[str, ...]
     seen: dict[str, dict[float, float]] = field(default_factory=dict)
     missed: dict[str, float] = field(default_factory=dict)
-    told: dict[str, float] = field(default_factory=dict)
+    expected: dict[str, float] = field(default_factory=dict)
     left: tuple[float, float] = (0.0, 0.0)
     touching: bool = False
 
@@ -104,16 +104,17 @@ class Suit:
         at = min(seen, key=lambda known: abs(np.log(known / rtol)))
         # half of them are spent on finding and beginning contacts, whatever the tolerance
         power = (0.5 if self.touching or name == DEFAULT else 1.0) / (ORDERS[name] + 1.0)
-        if len(seen) > 1 and name != DEFAULT:  # of the default method two runs may only tell where it is stable
+        if len(seen) > 1 and name != DEFAULT:  # of the default method two runs may only show where it is stable
             other = min((one for one in seen if one != at), key=lambda known: abs(np.log(known / at)))
-            told = float(np.log(seen[other] / seen[at]) / np.log(at / other))
-            power = float(np.clip(told, LEAST_POWER, LARGEST_POWER))
-        found: float = seen[at] * (at / rtol) ** power
+            slope = float(np.log(seen[other] / seen[at]) / np.log(at / other))
+            power = float(np.clip(slope, LEAST_POWER, LARGEST_POWER))
+        expected: float = seen[at] * (at / rtol) ** power
         # where stability limited the run, a looser tolerance saves nothing
-        return max(found, min(self.least, seen[at])) if name == DEFAULT else found
+        return max(expected, min(self.least, seen[at])) if name == DEFAULT else expected
 
     def cost(self, name: str, rtol: float) -> float:
-        """What a run is foreseen to take, in evaluations of the default method; nothing where only a run can tell."""
+        """What a run is foreseen to take, in evaluations of the default method; nothing where only a run can show
+        it."""
         if name in self.seen:
             return DEARER[name] * self.evaluations(name, rtol)
         return self.least if name == DEFAULT else 0.0
@@ -140,7 +141,7 @@ class Suit:
 
     def _vibrates(self) -> bool:
         """Whether the modes' vibrations alone make the default method dear."""
-        return self.rates.all > APART * self.rates.held and self.by_stability > CHEAP
+        return self.rates.all > SEPARATION * self.rates.held and self.by_stability > CHEAP
 
     def best(self, rtol: float) -> str:
         """The integrator to take at a tolerance."""
@@ -184,23 +185,23 @@ class Suit:
         if VIBRATING in self.missed:
             return f"{DEFAULT}: a run before began with {VIBRATING}, which was dearer than foreseen and handed on"
         if not self.rates.all:
-            return f"{DEFAULT}: it is tried first, as nothing at the start tells of a fast rate"
+            return f"{DEFAULT}: it is tried first, as nothing at the start shows a fast rate"
         return f"{DEFAULT}: the fastest rate at the start, {self.rates.all:.3g} 1/s, takes no more than {most}"
 
     def judges(self, rtol: float) -> Judges:
-        """Who looks whether a run goes as foreseen, and its twin, of which nothing is remembered afterwards."""
-        self.told.clear()
-        return Judges(self._panel(rtol), replace(self, told={}, left=(0.0, 0.0))._panel(rtol))
+        """Judges of whether a run goes as expected, and the same for its perturbed run, of which nothing is stored."""
+        self.expected.clear()
+        return Judges(self._panel(rtol), replace(self, expected={}, left=(0.0, 0.0))._panel(rtol))
 
     def _panel(self, rtol: float) -> Panel:
-        found = {}
+        panel = {}
         for name in self.names:
             heir, most = self.heir(name, rtol)
             if not heir:
                 continue
             every = max(int(LOOK * most), LEAST_LOOK)
-            found[name] = (Judge(every, self._verdict(name, heir, max(most, WORTH))), heir)
-        return found
+            panel[name] = (Judge(every, self._verdict(name, heir, max(most, WORTH))), heir)
+        return panel
 
     def _verdict(self, name: str, heir: str, most: float) -> Callable[[Engine, Sequence[Look]], str]:
         """Why an integrator is to be given up for one that takes so much."""
@@ -210,12 +211,12 @@ class Suit:
             if engine.model.scene.solver.integrator == DEFAULT and not limited(looks):
                 return ""
             # what has been handed on from in this run already was seen to take more than was foreseen
-            enough = max(most, DEARER[heir] * self.told.get(heir, 0.0)) / DEARER[name]
+            enough = max(most, DEARER[heir] * self.expected.get(heir, 0.0)) / DEARER[name]
             whole = pace(looks, CLEARLY * enough) * self.span
             used = max(looks[-1].evaluations - looks[0].evaluations, 1)
             if whole < (TRIED if tried else CLEARLY) * (1.0 + EARLY * enough / used) * enough:
                 return ""
-            self.told[name] = whole
+            self.expected[name] = whole
             self.left = looks[-1].evaluations, (looks[-1].time - engine.start) / self.span
             if name == DEFAULT:
                 return refusal.stiffness(engine.n, engine.control)
@@ -228,11 +229,11 @@ class Suit:
 
     def learn(self, rtol: float, name: str, run: xr.Dataset) -> None:
         """Remember what a run that began with an integrator took."""
-        if DEFAULT in self.told:  # where stability sets the pace, it tells what the whole run would have taken
-            self.seen.setdefault(DEFAULT, {})[rtol] = self.told[DEFAULT]
-        if run.attrs["method"] != name and not (name == DEFAULT and name in self.told):
+        if DEFAULT in self.expected:  # where stability sets the pace, it gives the cost of the whole run
+            self.seen.setdefault(DEFAULT, {})[rtol] = self.expected[DEFAULT]
+        if run.attrs["method"] != name and not (name == DEFAULT and name in self.expected):
             self.missed[name] = max(rtol, self.missed.get(name, 0.0))
-        used, done = self.left if self.told else (0.0, 0.0)
+        used, done = self.left if self.expected else (0.0, 0.0)
         if done < ENOUGH:
             rest = (float(run.attrs["evaluations"]) - used) / (1.0 - done)
             self.seen.setdefault(run.attrs["method"], {})[rtol] = max(rest, 1.0)

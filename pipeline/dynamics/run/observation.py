@@ -16,13 +16,13 @@ from flexclear.pipeline.dynamics.run.engine import Engine
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.collocation import Collocation
 
-#: no row is projected to less than this share of the mechanism's size
+#: no row is projected to less than this fraction of the mechanism's size
 ROUNDING = 1e-14
 #: pivot ratios of the closures at which the equations hold eight digits of accelerations where loops are closed to
 #: 1e-14, and six, with which a row must do in whose own pose they hold nothing
 CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
-#: first distance in time from a singular pose, as share of the polynomial over it, its factor from try to try, and how
-#: many tries there are
+#: first distance in time from a singular pose, as fraction of the polynomial over it, its factor from try to try, and
+#: how many tries there are
 NEAREST, WIDER, TRIES = 1e-4, 2.0, 11
 #: where it is looked, in units of the distance, and the weights there of the limit between: exact for quintics
 SIDES, WEIGHTS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([1.0, -6.0, 15.0, 15.0, -6.0, 1.0]) / 20.0
@@ -51,10 +51,10 @@ def frames(engine: Engine, rows: np.ndarray) -> Frames:
     return observation.frames_by_name(blocks, size)
 
 
-def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, share: float) -> Blocks:
-    """The same with given pieces of the laws, (rows, laws), projected to a share of the mechanism's size."""
+def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, fraction: float) -> Blocks:
+    """The same with given pieces of the laws, (rows, laws), projected to a fraction of the mechanism's size."""
     whole, blocks = observation.room(len(rows), engine.model.arrays.size)
-    _observe(engine, rows, pieces, share * engine.model.length, whole)
+    _observe(engine, rows, pieces, fraction * engine.model.length, whole)
     return blocks
 
 
@@ -73,13 +73,13 @@ def _observe(engine: Engine, rows: np.ndarray, pieces: np.ndarray, tolerance: fl
 
 
 def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
-    """Whether a row of the record is so near to a singular pose that its accelerations and forces are rounding."""
+    """Whether a row of the record is so close to a singular pose that its accelerations and forces are rounding."""
     one = m.record(row[None], len(engine.model.contacts))
     seen = engine.attempt(one.state[0], float(one.time[0]))
     return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear
 
 
-def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -> Blocks | None:
+def observe_around(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -> Blocks | None:
     """What is observed of such a row: the limit from both sides, of each block one row; None without one.
 
     In the pose the closures' multipliers are not unique, and a smooth motion makes them continuous across it: the mean
@@ -91,9 +91,9 @@ def beside(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -
     pieces = np.tile(engine.pieces[engine.segments(0.5 * (motion.start + motion.end), after=True)], (len(SIDES), 1))
     for k in range(TRIES):
         rows = np.tile(row, (len(SIDES), 1))
-        near = m.record(rows, len(engine.model.contacts))
-        near.time[:] += NEAREST * motion.span * WIDER**k * SIDES
-        near.state[:] = motion.states(near.time)
+        rows_around = m.record(rows, len(engine.model.contacts))
+        rows_around.time[:] += NEAREST * motion.span * WIDER**k * SIDES
+        rows_around.state[:] = motion.states(rows_around.time)
         if not any(blurred(engine, side, clear) for side in rows):
             seen = observe_with(engine, rows, pieces, ROUNDING)
             if not np.any(seen["status"]):

@@ -18,12 +18,12 @@ from flexclear.pipeline.dynamics.contact.validity import SHALLOW
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.start import project, rates_at_speeds
 
-#: times ahead at which the least depth is looked for
+#: times ahead at which the least depth is searched for
 AHEAD = 60
-#: steps of a search; longest one, as share of the mechanism's size or in rad; how often one is halved
+#: steps of a search; longest one, as fraction of the mechanism's size or in rad; how often one is halved
 STEPS, LONGEST, HALVINGS = 60, 0.1, 12
-#: a depth is the least when a step would take off less than this share of it; share of what its slope promises that a
-#: step must take off (Armijo)
+#: a depth is the least when a step would take off less than this fraction of it; fraction of what its slope promises
+#: that a step must take off (Armijo)
 LEAST, ENOUGH = 1e-3, 1e-4
 
 
@@ -31,7 +31,7 @@ def forced_depth(engine: Engine, contact: int) -> tuple[float, float]:
     """When contact number `contact` must be deeper [m] than its inner radius, and how deep then; else (inf, 0).
 
     From the stepper's state on, if the contact is deep already; rigid bodies only, since others bend instead.
-    Searches are local, as the motion is.  The memory is not kept.
+    Searches are local, as the motion is.  The memory is not preserved.
     """
     model, t = engine.model, float(engine.control[m.TIME])
     radius, y = model.contacts[contact].joint.radius, engine.view(m.Y).copy()
@@ -42,14 +42,14 @@ def forced_depth(engine: Engine, contact: int) -> tuple[float, float]:
             if depth > radius:
                 return float(time), depth
     except SolverError:
-        pass  # other loops do not reach so far either: the run will tell
+        pass  # other loops do not reach so far either: the run will show it
     return np.inf, 0.0
 
 
 def _shallowest(engine: Engine, y: np.ndarray, contact: int, enough: float) -> tuple[np.ndarray, float]:
     """A state nearby in which the contact is least deep, or no deeper than `enough`; and how deep [m].
 
-    Quasi-Newton steps (BFGS) in the free speeds, by natural units; drives stand where they are at the engine's start.
+    Quasi-Newton steps (BFGS) in the free speeds, by natural units; drives are where they are at the engine's start.
     Source: Nocedal & Wright, *Numerical Optimization*, 2nd ed. (2006), ch. 6.
     """
     scales = engine.model.speed_scales[: engine.model.nv]
@@ -91,7 +91,7 @@ def _depth(engine: Engine, y: np.ndarray, contact: int) -> float:
 
 
 def _slope(engine: Engine, y: np.ndarray, contact: int) -> np.ndarray:
-    """Change of the depth per unit of each free speed, drives at rest and closures kept, shape (nv,)."""
+    """Change of the depth per unit of each free speed, drives at rest and closures satisfied, shape (nv,)."""
 
     def rate(speeds: np.ndarray) -> float:
         rates_at_speeds(engine, y, speeds)

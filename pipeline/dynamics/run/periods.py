@@ -31,10 +31,10 @@ from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, inte
 #: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together
 WAYPOINTS = 16
 #: the neighbour's distance in units of the relative tolerance: what steps differ by is then a thousandth of it
-APART = 1e3
-#: a neighbour that went this many times as far between two waypoints was beyond what is linear; that is told
+SEPARATION = 1e3
+#: a neighbour that went this many times as far between two waypoints was beyond what is linear; that is reported
 FAR = 1e4
-#: laws repeat when they end a period as they began it, but for this share
+#: laws repeat when they end a period as they began it, but for this fraction
 SAME = 1e-6
 
 
@@ -55,15 +55,15 @@ class Moment:
 
 @dataclass(frozen=True)
 class Cursor:
-    """Where a motion stands between two periods: number of the next one, the motion itself, and its neighbour."""
+    """Where a motion is between two periods: number of the next one, the motion itself, and its neighbour."""
 
     number: int = 0
     here: Moment | None = None
-    beside: Moment | None = None
+    neighbour: Moment | None = None
 
     def packed(self) -> dict[str, np.ndarray]:
         """All of it as arrays; what is not there has none."""
-        moments = {"here": self.here, "beside": self.beside}
+        moments = {"here": self.here, "neighbour": self.neighbour}
         arrays = {f"{name}.{k}": v for name, one in moments.items() if one is not None for k, v in vars(one).items()}
         return {**arrays, "number": np.array(self.number)}
 
@@ -75,7 +75,7 @@ class Cursor:
             mine = {k.removeprefix(f"{name}."): v for k, v in arrays.items() if k.startswith(f"{name}.")}
             return Moment(**mine) if mine else None
 
-        return Cursor(int(arrays["number"]), moment("here"), moment("beside"))
+        return Cursor(int(arrays["number"]), moment("here"), moment("neighbour"))
 
 
 @dataclass(frozen=True)
@@ -132,9 +132,9 @@ def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
 
 
 def stretches(engine: Engine, period: float, phase: float) -> list[Engine]:
-    """The engine between the waypoints of a period, one of which is at `phase`; they share its work space."""
+    """The engine between the waypoints of a period, one of which is at `phase`; they use its work space."""
     regular = period * np.linspace(0.0, 1.0, WAYPOINTS + 1)
-    # where a regular one is next to the phase, the phase takes its place
+    # where a regular one is next to the phase, the phase replaces it
     inner = regular[1:-1][np.abs(regular[1:-1] - phase) > 0.25 * period / WAYPOINTS]
     times = engine.start + np.unique([0.0, *inner, phase, period])
     return [replace(engine, start=float(a), end=float(b)) for a, b in pairwise(times)]
@@ -149,25 +149,25 @@ def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) 
     """
     period = parts[-1].end - parts[0].start
     scales = state_scales(parts[0], period)
-    apart = APART * parts[0].rtol
-    number, here, beside = begin.number, begin.here, begin.beside
+    separation = SEPARATION * parts[0].rtol
+    number, here, neighbour = begin.number, begin.here, begin.neighbour
     while True:
         done, growth, lost = list[Trajectory](), 0.0, 0
         if number not in followed:
-            beside = None
+            neighbour = None
         for part in parts:
             trajectory, there = _go(part, y, here)
-            if beside is not None:
-                after = _follow(part, beside)
-                beside, grown = brought_back(part, scales, there, after, apart)
+            if neighbour is not None:
+                after = _follow(part, neighbour)
+                neighbour, grown = brought_back(part, scales, there, after, separation)
                 growth, lost = growth + grown[0], lost + grown[1]
             elif number in followed:
-                beside = _set_beside(part, scales, there, apart)
+                neighbour = _set_neighbour(part, scales, there, separation)
             done.append(trajectory)
             here = there
-        here, beside = (None if moment is None else _earlier(moment, period) for moment in (here, beside))
+        here, neighbour = (None if moment is None else _earlier(moment, period) for moment in (here, neighbour))
         number += 1
-        yield Period(number - 1, tuple(done), growth, lost, Cursor(number, here, beside))
+        yield Period(number - 1, tuple(done), growth, lost, Cursor(number, here, neighbour))
 
 
 def state_scales(engine: Engine, period: float) -> np.ndarray:
@@ -198,16 +198,16 @@ def _follow(part: Engine, here: Moment) -> Moment | None:
 def _handed(part: Engine, here: Moment) -> Handover:
     """A moment as what another method would have left of this stretch: one row, and the contacts' open events."""
     counters = np.zeros(m.INTEGERS - m.STATUS, dtype=np.int64)
-    for place, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.begun))):
-        counters[place - m.STATUS] = value
+    for index, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.begun))):
+        counters[index - m.STATUS] = value
     lasting = np.zeros(len(LASTING))
     lasting[0] = part.start
     rows = m.empty_record(1, len(part.model.contacts), len(here.y))
     first = m.record(rows, len(part.model.contacts))
     first.time[:], first.state[:] = part.start, here.y
     first.modes[:], first.latched[:] = here.modes[: len(part.model.contacts)], here.latched[: len(part.model.contacts)]
-    kept = ((part.start, part.kept.copy()),)
-    return Handover(here.y, here.modes, here.latched, here.watched, counters, lasting, rows, here.begun, kept)
+    selections = ((part.start, part.selected.copy()),)
+    return Handover(here.y, here.modes, here.latched, here.watched, counters, lasting, rows, here.begun, selections)
 
 
 def _moment(part: Engine, trajectory: Trajectory) -> Moment:
@@ -231,34 +231,34 @@ def _earlier(moment: Moment, period: float) -> Moment:
     return replace(moment, begun=begun)
 
 
-def _set_beside(part: Engine, scales: np.ndarray, here: Moment, apart: float) -> Moment:
+def _set_neighbour(part: Engine, scales: np.ndarray, here: Moment, separation: float) -> Moment:
     """A neighbour in a direction that no symmetry of a mechanism has."""
     direction = np.where(np.isfinite(scales), np.sin(1.0 + np.arange(len(scales)) * 2.399963), 0.0)
     unit = direction / np.linalg.norm(direction)
-    moved = here.y + apart * unit * np.where(np.isfinite(scales), scales, 0.0)
+    moved = here.y + separation * unit * np.where(np.isfinite(scales), scales, 0.0)
     return replace(here, y=_closed(part, moved))
 
 
 def brought_back(
-    part: Engine, scales: np.ndarray, here: Moment, beside: Moment | None, apart: float
+    part: Engine, scales: np.ndarray, here: Moment, neighbour: Moment | None, separation: float
 ) -> tuple[Moment, tuple[float, int]]:
     """The neighbour at its distance again; by how much that had grown (its logarithm), and 1 if it was lost.
 
     Where one of both has a contact closed and the other has not, they are left as they are until both have: a state
     between them would have surfaces that overlap without having met.
     """
-    if beside is None:
-        return _set_beside(part, scales, here, apart), (0.0, 1)
-    if not np.array_equal(here.modes, beside.modes):
-        return beside, (0.0, 0)
-    difference = beside.y - here.y
+    if neighbour is None:
+        return _set_neighbour(part, scales, here, separation), (0.0, 1)
+    if not np.array_equal(here.modes, neighbour.modes):
+        return neighbour, (0.0, 0)
+    difference = neighbour.y - here.y
     distance = float(np.linalg.norm(difference / scales))
     if distance == 0.0:
-        return _set_beside(part, scales, here, apart), (0.0, 1)
-    share = apart / distance
-    y = _closed(part, here.y + share * difference)
-    latched = here.latched + share * (beside.latched - here.latched)
-    return replace(beside, y=y, latched=latched), (-float(np.log(share)), int(distance > FAR * apart))
+        return _set_neighbour(part, scales, here, separation), (0.0, 1)
+    fraction = separation / distance
+    y = _closed(part, here.y + fraction * difference)
+    latched = here.latched + fraction * (neighbour.latched - here.latched)
+    return replace(neighbour, y=y, latched=latched), (-float(np.log(fraction)), int(distance > FAR * separation))
 
 
 def _closed(part: Engine, y: np.ndarray) -> np.ndarray:

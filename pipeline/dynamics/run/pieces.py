@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.singular_pass import Pass
 
 #: arrays of an engine that change as it works
-MEMORY = ("w", "n", "h", "kept")
+MEMORY = ("w", "n", "h", "selected")
 
 
 #: closure rows solved for, each from a time on [s]
@@ -125,17 +125,17 @@ class Piece:
         }
         return State(arrays, notes, tape.rows[: n[m.N_RECORDED]], journal.seconds() - self.begun)
 
-    def restore(self, found: State, outputs: np.ndarray) -> None:
+    def restore(self, state: State, outputs: np.ndarray) -> None:
         """Put engine and tape into the state that was found."""
         from flexclear.pipeline.dynamics.run.collocation import Collocation
         from flexclear.pipeline.dynamics.run.singular_pass import Pass
 
-        arrays, notes = found.arrays, found.notes
+        arrays, notes = state.arrays, state.notes
         remember(self.engine, arrays)
         rows, events = (int(count) for count in notes["room"])
         tape = Tape(
             outputs,
-            np.zeros((rows, found.grown.shape[1])),
+            np.zeros((rows, state.grown.shape[1])),
             np.full((events, m.EVENT.size), np.nan),
             list(zip(notes["selections"], arrays["selections"], strict=True)),
             [
@@ -146,7 +146,7 @@ class Piece:
             set(notes["doubted"]),
             [Look(*one) for one in notes["looks"]],
         )
-        tape.rows[: len(found.grown)], tape.events[: len(arrays["events"])] = found.grown, arrays["events"]
+        tape.rows[: len(state.grown)], tape.events[: len(arrays["events"])] = state.grown, arrays["events"]
         self.engine.straight.rows[:] = [bytes(rows) for rows in notes["straight"]]
         self.tape, self.done = tape, bool(notes["done"])
 
@@ -165,37 +165,37 @@ def remember(engine: Engine, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def piece(engine: Engine, y: np.ndarray, outputs: np.ndarray, left: Handover | None) -> Piece | None:
-    """The piece of an integration from state y, as an earlier attempt left it; None where nothing is kept.
+    """The piece of an integration from state y, as an earlier attempt left it; None where nothing is recorded.
 
     left: what another method left or None.
     """
-    kept = journal.current()
-    if kept is None:
+    storage = journal.current()
+    if storage is None:
         return None
     begun = journal.seconds()
-    with kept.uncounted():
-        made = Piece(kept, engine, kept.name(digest(engine, y, outputs, *_arrays(left))), begun)
-        found = kept.find(made.name)
-        if found is not None:
-            made.restore(found, outputs)
+    with storage.uncounted():
+        made = Piece(storage, engine, storage.name(digest(engine, y, outputs, *_arrays(left))), begun)
+        stored = storage.find(made.name)
+        if stored is not None:
+            made.restore(stored, outputs)
     return made
 
 
 def digest(engine: Engine, *arrays: np.ndarray) -> str:
     """Of all that decides what an engine makes of some arrays, the processor included."""
-    told = f"{processor()} {INTERPRETED} {engine.start!r} {engine.end!r} {_told(engine.model.scene)}"
-    found = hashlib.sha256(told.encode())
+    described = f"{processor()} {INTERPRETED} {engine.start!r} {engine.end!r} {_described(engine.model.scene)}"
+    hashed = hashlib.sha256(described.encode())
     h = engine.h.copy()
     h[list(m.ADDRESSES)] = 0
-    for array in (h, engine.model.arrays.f, engine.w, engine.n, engine.kept, *arrays):
-        found.update(np.ascontiguousarray(array).tobytes())
-    return found.hexdigest()
+    for array in (h, engine.model.arrays.f, engine.w, engine.n, engine.selected, *arrays):
+        hashed.update(np.ascontiguousarray(array).tobytes())
+    return hashed.hexdigest()
 
 
 _last: list[tuple[Scene, str]] = []
 
 
-def _told(scene: Scene) -> str:
+def _described(scene: Scene) -> str:
     """All that a scene says; remembered of the last one, since studies ask for thousands of pieces of it."""
     known, text = _last[0] if _last else (None, "")
     if known is not scene:

@@ -41,10 +41,10 @@ Panel = Mapping[str, tuple[Judge, str]]
 
 
 class Judges(NamedTuple):
-    """Who looks at a run, and who at its twin; two panels, since judges may remember what they have seen."""
+    """Judges of a run and of its perturbed run; two panels, since judges may store what they have seen."""
 
     run: Panel
-    twin: Panel
+    perturbed: Panel
 
 
 def look(engine: Engine) -> Look:
@@ -63,7 +63,7 @@ def half(looks: Sequence[Look]) -> Look:
 def pace(looks: Sequence[Look], patience: float) -> float:
     """Evaluations per second of motion by which to judge a method: as of late, since half of its evaluations.
 
-    patience: evaluations up to which the average counts where it is less; a hasty start or a single impact tell little.
+    patience: evaluations up to which the average counts where it is less; a fast start or a single impact says little.
     """
     first, middle, now = looks[0], half(looks), looks[-1]
     average, late = (

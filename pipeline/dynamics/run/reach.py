@@ -11,11 +11,11 @@ from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.engine import Engine
 
-#: least singular value of the closures, as share of the largest, above which a pose is not yet at the end of reach; and
-#: above which it is not singular
+#: least singular value of the closures, as fraction of the largest, above which a pose is not yet at the end of reach;
+#: and above which it is not singular
 NEAR, SINGULAR = 0.1, 1e-3
-#: a rest: share of a row in what depends, and speeds as share of the largest before
-SHARE, DYING = 0.1, 0.1
+#: a rest: fraction of a row in what depends, and speeds as fraction of the largest before
+FRACTION, DYING = 0.1, 0.1
 #: at the end of reach speeds grow beyond bounds: so much faster than the drives' a loop does not move elsewhere
 FASTER = 40.0
 
@@ -27,12 +27,12 @@ def beyond_reach(engine: Engine) -> str:
     drives; at the end of a loop's reach it asks them not to move.  Of loops with flexible
     bodies, whose modes give way, this says nothing.  The memory stays as it is.
     """
-    model, kept = engine.model, (engine.w.copy(), engine.n.copy())
+    model, saved = engine.model, (engine.w.copy(), engine.n.copy())
     if not model.drives or not model.closures or not model.mechanism.all_rigid:
         return ""
-    told = _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
-    engine.w[:], engine.n[:] = kept
-    return told
+    text = _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
+    engine.w[:], engine.n[:] = saved
+    return text
 
 
 def require_shallow(engine: Engine) -> None:
@@ -44,7 +44,7 @@ def require_shallow(engine: Engine) -> None:
     from flexclear.pipeline.dynamics.contact.validity import SHALLOW, pressed_through
     from flexclear.pipeline.dynamics.run.overtravel import forced_depth
 
-    model, kept = engine.model, (engine.w.copy(), engine.n.copy())
+    model, saved = engine.model, (engine.w.copy(), engine.n.copy())
     t = float(engine.control[m.TIME])
     engine.attempt(engine.view(m.Y).copy(), t)
     gaps = engine.table(m.TOUCH)["gap"].copy()
@@ -54,15 +54,15 @@ def require_shallow(engine: Engine) -> None:
     away = (
         f"drive {drive} leads out of reach: shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"
     )
-    engine.w[:], engine.n[:] = kept
+    engine.w[:], engine.n[:] = saved
     for k, (contact, depth) in enumerate(zip(model.contacts, -gaps, strict=True)):
-        if told := pressed_through(contact.words, contact.joint, float(depth)):
+        if text := pressed_through(contact.words, contact.joint, float(depth)):
             remedy = "choose a stiffer contact, a slower impact or smaller loads"
-            raise SolverError(f"at t = {t:.6g} s: {told}: {f'{away}; else {remedy}' if pulled else remedy}")
+            raise SolverError(f"at t = {t:.6g} s: {text}: {f'{away}; else {remedy}' if pulled else remedy}")
         if not (pulled and model.mechanism.all_rigid and depth > SHALLOW * contact.joint.radius > 0.0):
             continue
         time, least = forced_depth(engine, k)
-        engine.w[:], engine.n[:] = kept
+        engine.w[:], engine.n[:] = saved
         if least:
             raise SolverError(
                 f"at t = {t:.6g} s: {contact.words}: the surfaces are {depth:.3g} m deep in each other, and "
@@ -76,14 +76,14 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
 
     rows: recorded so far, whose speeds those at the stepper's state are compared with.
     """
-    model, kept = engine.model, (engine.w.copy(), engine.n.copy())
+    model, saved = engine.model, (engine.w.copy(), engine.n.copy())
     t, y = float(engine.control[m.TIME]), engine.view(m.Y).copy()
     engine.attempt(y, t)
     J = singular.natural(model, engine.h, engine.rows(m.JACOBIAN))
     where = singular.diagnosis(engine) if J.size else ""
     U, values, _ = np.linalg.svd(J) if J.size else (np.eye(1), np.ones(1), None)
-    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > SHARE)
-    engine.w[:], engine.n[:] = kept
+    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > FRACTION)
+    engine.w[:], engine.n[:] = saved
     if not J.size or values[-1] > SINGULAR * values[0]:
         return ""
     states = m.record(rows, len(model.contacts)).state
@@ -119,7 +119,7 @@ def _too_fast(engine: Engine, t: float, where: str) -> str:
         return ""
     return (
         f"at t = {t:.6g} s: the mechanism passes a singular pose ({where}), where it can go on in several ways, and "
-        f"{' and '.join(causes)} is too fast there for its branch to be told: {', or '.join(remedies)}"
+        f"{' and '.join(causes)} is too fast there for its branch to be determined: {', or '.join(remedies)}"
     )
 
 

@@ -10,7 +10,7 @@ from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 from flexclear.pipeline.dynamics.run.reach import beyond_reach, end_in_pose
 
-#: above this share of steps that stability limits, stiffness is named as the cause of a long run
+#: above this fraction of steps that stability limits, stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
 #: why the stepper stops where loops are pulled further than they reach
 LOOPS = (m.STEP_TOO_SMALL, m.NO_START, m.NO_CONVERGENCE, m.AT_SINGULAR, m.LOST_CLOSURE)
@@ -25,15 +25,15 @@ def text(engine: Engine, rows: np.ndarray) -> str:
     if n[m.STATUS] in LOOPS and jammed(engine):
         return f"at t = {control[m.TIME]:.6g} s: {explanation(engine)}"
     if n[m.STATUS] in LOOPS:
-        told = beyond_reach(engine) or end_in_pose(engine, rows)
-        if told:
-            return told
+        message = beyond_reach(engine) or end_in_pose(engine, rows)
+        if message:
+            return message
     where = singular.diagnosis(engine)
     culprit = contacts[n[m.CULPRIT]].words if contacts else ""
     fixed = f"{control[m.FIXED]:.2g} s"
     too_long = f"the fixed step of {fixed} is too long for it, or " if control[m.FIXED] else ""
     unsolvable = (
-        f"the loops cannot be kept closed: {too_long}a singular pose in which they can go on in several ways ({where})"
+        f"the loops cannot be closed: {too_long}a singular pose in which they can go on in several ways ({where})"
     )
     if not engine.model.closures:
         unsolvable = f"the equations cannot be solved here: {too_long}the motion has grown beyond bounds"
@@ -47,8 +47,8 @@ def text(engine: Engine, rows: np.ndarray) -> str:
         "divides by zero",
         m.NO_CONVERGENCE: f"Newton's iteration fails at the fixed step of {fixed}: "
         "take a shorter step, or leave [solver.step] out",
-        m.STUCK_EVENT: f"{culprit} opens and closes without end at one time: a smaller rtol tells these "
-        "times apart, a softer contact or more damping parts them",
+        m.STUCK_EVENT: f"{culprit} opens and closes without end at one time: a smaller rtol distinguishes these "
+        "times, a softer contact or more damping separates them",
         m.STEPPED_OVER: f"the contact of {culprit} began unseen within a step: a smaller rtol or a shorter "
         "step finds it",
         m.AT_SINGULAR: "the motion does not get away from a singular pose, where it can go on in several ways "
@@ -75,16 +75,16 @@ def _why_so_many(engine: Engine, n: np.ndarray, control: np.ndarray) -> str:
     name, done = engine.model.scene.solver.integrator, control[m.TIME] - engine.start
     other = engine.method.traits.hands_over_to
     steps, rejected, events = (int(n[k]) for k in (m.STEPS, m.REJECTED, m.N_EVENTS))
-    told = [f"{steps} steps and {rejected} rejected ones, {events} events, at last by {name}"]
+    parts = [f"{steps} steps and {rejected} rejected ones, {events} events, at last by {name}"]
     if n[m.STIFF_STEPS] > STIFF_SHARE * max(1, steps):
         choice = f"choose an implicit integrator ({other}), or " if other else ""
-        return f"{told[0]}; {stiffness(n, control)}; {choice}a larger v_static"
+        return f"{parts[0]}; {stiffness(n, control)}; {choice}a larger v_static"
     if control[m.STEEPEST] > 0.0:
-        told.append(f"rates up to {control[m.STEEPEST]:.2g} 1/s")
+        parts.append(f"rates up to {control[m.STEEPEST]:.2g} 1/s")
     if done > 0.0:
         whole = n[m.EVALUATIONS] * control[m.SPAN] / done
-        told.append(f"at this pace the whole run takes {whole:.1g} evaluations")
-    return "; ".join([*told, _remedy(steps, rejected, events, other)])
+        parts.append(f"at this pace the whole run takes {whole:.1g} evaluations")
+    return "; ".join([*parts, _remedy(steps, rejected, events, other)])
 
 
 def _remedy(steps: int, rejected: int, events: int, other: str) -> str:

@@ -28,7 +28,7 @@ from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run import trajectory as stepping
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, beside, blurred, observe_blocks
+from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, blurred, observe_around, observe_blocks
 from flexclear.pipeline.dynamics.run.progress_rate import Judges, Panel
 from flexclear.pipeline.dynamics.run.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
@@ -47,7 +47,7 @@ class Run:
     scene: as the user gave it; the engine may hold another, made for it.
     perturbed: the same run from a perturbed start, of scenes with contacts.
     mended: what was changed of the start that the scene gives, in words.
-    switched: from when on and why another integrator took the place of the first; empty when none did.
+    switched: from when on and why another integrator replaced the first; empty when none did.
     """
 
     scene: Scene
@@ -65,16 +65,17 @@ class Run:
 
 
 def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Engine:
-    """The compiled engine of a scene where its run begins; paths are not looked for."""
+    """The compiled engine of a scene where its run begins; paths are not searched for."""
     return prepare(tabulate(build(begun(scene, bundles, progress)[0], bundles)), progress)
 
 
 def placed(scene: Scene) -> Scene:
-    """The scene whose joints and drives place the bodies where the run begins: itself, unless it begins elsewhere."""
+    """The scene whose joints and drives position the bodies where the run begins: itself, unless it begins
+    elsewhere."""
     if scene.start is None or scene.start.at is None:
         return scene
-    found: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
-    return found
+    scene_placed: Scene = import_module(module_of(STARTS, scene.start.at, where="[start.at]")).placed(scene)
+    return scene_placed
 
 
 def driven(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
@@ -94,8 +95,8 @@ def begun(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -
     if scene.start is None or scene.start.at is None:
         return scene, ""
     begin = lookup(STARTS, scene.start.at, where="[start.at]")
-    found: tuple[Scene, str] = begin(scene, bundles, progress)
-    return found
+    started: tuple[Scene, str] = begin(scene, bundles, progress)
+    return started
 
 
 def engines(
@@ -107,16 +108,16 @@ def engines(
 
 
 def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Callable[[str, Progress], Engine]:
-    """What makes the engine of a run by an integrator's name, that of the scene's own by none; it tells how it goes."""
+    """What makes the engine of a run by an integrator's name, that of the scene's own by none; it reports progress."""
     posed, choice = begun(scene, bundles, progress)
     moved, given = driven(posed, bundles, progress)
     making = Lock()  # a run and its perturbed run may both go on with another integrator
 
     def made(name: str, tell: Progress) -> Engine:
-        wanted = edited(moved, {"solver.integrator": name}) if name else moved
+        requested = edited(moved, {"solver.integrator": name}) if name else moved
         with making:
-            model = tabulate(build(wanted, bundles), given)
-            if choice:  # the poses found no longer tell of it
+            model = tabulate(build(requested, bundles), given)
+            if choice:  # the poses found no longer describe it
                 model = replace(model, mechanism=replace(model.mechanism, choice=choice))
             return prepare(model, tell)
 
@@ -171,10 +172,10 @@ def integrate(
     pair = Pair(engine)
 
     def neighbour(alive: Progress) -> PerturbedRun:
-        return pair.perturbed_run(start, lambda mine, y, *told: steps(mine, y, alive, others, *told), alive)
+        return pair.perturbed_run(start, lambda mine, y, *text: steps(mine, y, alive, others, *text), alive)
 
     with meanwhile(neighbour) as perturbed:
-        done = checked(lambda: pair.run(lambda *told: steps(engine, start, progress, ours, *told)))
+        done = checked(lambda: pair.run(lambda *text: steps(engine, start, progress, ours, *text)))
         try:
             return replace(done, perturbed=perturbed())
         except StoppedError as stopped:
@@ -208,7 +209,7 @@ def follow(
             progress(None, f"{stiff}; going on with {heir}")
             reasons.append(str(stiff))
             straight, engine, left = engine.straight, other(heir), stiff.handover
-            engine.straight.wanted, engine.straight.exact = straight.wanted, straight.exact
+            engine.straight.requested, engine.straight.exact = straight.requested, straight.exact
 
 
 def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:
@@ -228,14 +229,14 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
     Raises SolverError where one of them could not be evaluated.
     """
     parts = list[Blocks]()
-    for part, kept in trajectory.parts():
-        engine.keep(kept)
+    for part, selected in trajectory.parts():
+        engine.keep(selected)
         out = observe_blocks(engine, trajectory.rows[part])
         for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
             row, lost = trajectory.rows[part][k], out["status"][k, 0]
-            limit = beside(engine, row, motion, CLEAR)
+            limit = observe_around(engine, row, motion, CLEAR)
             if limit is None and lost:
-                limit = beside(engine, row, motion, NEARLY_CLEAR)
+                limit = observe_around(engine, row, motion, NEARLY_CLEAR)
             for name, values in (limit or {}).items():
                 out[name][k] = values
         parts.append(out)
@@ -249,8 +250,8 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
             raise SolverError(at + "friction of ideal joints jams the mechanism in the recorded state")
         if seen.status[bad[0]] == m.SINGULAR:
             lost = (
-                "the recorded state is so near to a singular pose that nothing tells its accelerations and forces: let "
-                "the mechanism pass the pose at speed, or stop elsewhere"
+                "the recorded state is so close to a singular pose that nothing determines its accelerations and "
+                "forces: let the mechanism pass the pose at speed, or stop elsewhere"
             )
         raise SolverError(at + lost)
     return seen
@@ -259,7 +260,7 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
 def _near_singular(
     engine: Engine, rows: np.ndarray, motions: tuple[Collocation, ...]
 ) -> Iterator[tuple[int, Collocation]]:
-    """Rows, by number, that are too near to a singular pose, and the motion over it to which they belong."""
+    """Rows, by number, that are too close to a singular pose, and the motion over it to which they belong."""
     for motion in motions:
         engine.select_pieces_after(0.5 * (motion.start + motion.end))
         begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")

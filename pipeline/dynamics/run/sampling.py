@@ -15,13 +15,13 @@ from flexclear.pipeline.dynamics.effects import LOADS
 from flexclear.pipeline.dynamics.model.gauges import values
 from flexclear.pipeline.dynamics.run.engine import Engine
 
-#: a break is a sample when it is off by no more than this share of the period
+#: a break is a sample when it is off by no more than this fraction of the period
 NEAR = 1e-6
 
 
 @dataclass(frozen=True)
 class _Sampled:
-    """A controller: its row of LOADS, its numbers, its part, the places of its internal states."""
+    """A controller: its row of LOADS, its numbers, its part, the indices of its internal states."""
 
     row: Any
     numbers: np.ndarray
@@ -61,7 +61,7 @@ def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
 
 
 def _controllers(engine: Engine) -> list[_Sampled]:
-    model, found = engine.model, []
+    model, controllers = engine.model, []
     for k, (name, _) in enumerate(model.loads):
         load = model.scene.load[name]
         if isinstance(load, SampledPid):
@@ -69,5 +69,5 @@ def _controllers(engine: Engine) -> list[_Sampled]:
             numbers = model.arrays.table(m.LOAD_NUMBERS)["value"][row["number0"] : row["number0"] + 7]
             states = slice(int(row["internal0"]), int(row["internal0"]) + 3)
             part = lookup(LOADS, load.type, where=f"[load.{name}]")
-            found.append(_Sampled(row, numbers, part, states, load.period))
-    return found
+            controllers.append(_Sampled(row, numbers, part, states, load.period))
+    return controllers

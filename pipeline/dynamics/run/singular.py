@@ -1,4 +1,4 @@
-"""Closures near singular poses: choice of the rows to solve for, condition numbers, refusals in words."""
+"""Closures close to singular poses: choice of the rows to solve for, condition numbers, refusals in words."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 #: length that makes rows and coordinates of the closures comparable in condition numbers [m]
 SCALE = 0.1
-#: a selection is looked at again when its pivot ratio has fallen to this share of what it was, and replaced when
+#: a selection is checked again when its pivot ratio has fallen to this fraction of what it was, and replaced when
 #: another is this much better; or this much, where a singular pose seems ahead that may only be one of the selection
 WORN, BETTER, CLEARLY = 1e-2, 10.0, 4.0
 
@@ -30,16 +30,16 @@ def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
 
     As many as the rank of the mechanism.  Where no row is redundant there is nothing to choose.
     """
-    everything = np.ones(len(engine.kept), dtype=bool)
+    everything = np.ones(len(engine.selected), dtype=bool)
     if not engine.mobility.redundant:
         return 1.0
     engine.keep(everything)
     engine.attempt(y, t)
     spread = engine.rows(m.SPREAD)
     scales = selection.row_scales(engine.model, spread, _natural_lengths(engine))
-    kept, ratio = selection.choose(spread, scales, engine.mobility.rank)
-    engine.keep(kept)
-    engine.view(m.ROW_SCALE)[: kept.sum()] = scales[kept] ** 2
+    selected, ratio = selection.choose(spread, scales, engine.mobility.rank)
+    engine.keep(selected)
+    engine.view(m.ROW_SCALE)[: selected.sum()] = scales[selected] ** 2
     return ratio
 
 
@@ -48,17 +48,17 @@ def _natural_lengths(engine: Engine) -> np.ndarray:
     return selection.natural_lengths(engine.model, columns, points, engine.mass_factor())
 
 
-def improve(engine: Engine, t: float, wanted: float = BETTER) -> bool:
+def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:
     """Select rows anew where the present ones have become nearly dependent; whether others are so much better.
 
     The state in Y and its slope stay as they are: the motion does not depend on the selection.
     """
-    row_scale = engine.view(m.ROW_SCALE)[: len(engine.kept)].copy()
+    row_scale = engine.view(m.ROW_SCALE)[: len(engine.selected)].copy()
     y, slope = engine.view(m.Y).copy(), engine.slope.copy()
-    pivots, before = engine.view(m.PIVOT), engine.kept.copy()
+    pivots, before = engine.view(m.PIVOT), engine.selected.copy()
     present = float(pivots[m.LAST_PIVOT])
     ratio = select_rows(engine, y, t) if engine.mobility.redundant else present
-    better = ratio > max(wanted * present, BLIND) and not np.array_equal(before, engine.kept)
+    better = ratio > max(requested * present, BLIND) and not np.array_equal(before, engine.selected)
     if not better:
         engine.keep(before)
         engine.view(m.ROW_SCALE)[: len(row_scale)] = row_scale
@@ -72,7 +72,8 @@ def improve(engine: Engine, t: float, wanted: float = BETTER) -> bool:
 
 
 def scaled(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
-    """Closure Jacobians (..., kept rows, nv) with lengths in units of `SCALE`: what condition numbers are told of."""
+    """Closure Jacobians (..., selected rows, nv) with lengths in units of `SCALE`: what condition numbers are reported
+    of."""
     along = built_rows(model, h) == 0
     return J * np.outer(np.where(along, 1.0 / SCALE, 1.0), coordinate_scales(model.numbering))
 
@@ -84,7 +85,7 @@ def natural(model: Model, h: np.ndarray, J: np.ndarray) -> np.ndarray:
 
 
 def built_rows(model: Model, h: np.ndarray) -> np.ndarray:
-    """Kind of each kept row: 0 along an axis [m], 1 of two axes [-]."""
+    """Kind of each selected row: 0 along an axis [m], 1 of two axes [-]."""
     kinds = []
     rows = model.arrays.table(m.CLOSURE_ROWS, h)
     for c in model.arrays.table(m.CLOSURES, h):
@@ -119,7 +120,7 @@ def diagnosis(engine: Engine) -> str:
 
 
 def worst_joint(engine: Engine, left: np.ndarray) -> str:
-    """Joint with the largest share of a left singular vector."""
+    """Joint with the largest fraction of a left singular vector."""
     return selection.joints_of_rows(engine.model, engine.h)[int(np.argmax(np.abs(left)))]
 
 

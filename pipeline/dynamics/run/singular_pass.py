@@ -16,26 +16,26 @@ from flexclear.pipeline.dynamics.run.collocation import Collocation, Lead, Sampl
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.reach import beyond_reach, rest
 
-#: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this share of its unit,
-#: then half of that, and so on
+#: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this fraction of its
+#: unit, then half of that, and so on
 REACH, HALVINGS = 0.3, 10
-#: share of its unit that the fastest coordinate goes back for the rate of the rows' independence
+#: fraction of its unit that the fastest coordinate goes back for the rate of the rows' independence
 A_LITTLE = 1e-4
-#: least share of a row with which a polynomial may begin: where other motions are fast it must be short
+#: least fraction of a row with which a polynomial may begin: where other motions are fast it must be short
 NEAREST = 3e-4
-#: speeds in a pose that a polynomial led to may be off by this share of the fastest
+#: speeds in a pose that a polynomial led to may be off by this fraction of the fastest
 TURN = 1e-6
-#: where no polynomial was found and a row has less than this share left, it is asked whether a loop's reach ends
+#: where no polynomial was found and a row has less than this fraction left, it is asked whether a loop's reach ends
 OBVIOUS = 0.02
-#: what is left of a segment after the polynomial, in shares of its length, that belongs to it
+#: what is left of a segment after the polynomial, in fractions of its length, that belongs to it
 REMAINDER = 1e-3
-#: looks at a polynomial for the poses that it passes; singular values below this share of the largest vanish there
+#: looks at a polynomial for the poses that it passes; singular values below this fraction of the largest vanish there
 LOOKS, VANISHED = 32, 1e-6
-#: shares of the polynomial to which a pose is found, and at which it is looked at from both sides
+#: fractions of the polynomial to which a pose is found, and at which it is examined from both sides
 NEAR, NEARLY = 1e-7, 1e-4
-#: two looks that find a pose at times which differ by less than this share of the polynomial have found the same one
+#: two looks that find a pose at times which differ by less than this fraction of the polynomial have found the same one
 SAME = 1e-6
-#: a loop whose speeds in the pose are below this share of those beside it is at rest
+#: a loop whose speeds in the pose are below this fraction of those next to it is at rest
 AT_REST = 1e-5
 
 
@@ -52,8 +52,8 @@ class Pass:
 def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
     """Leave a polynomial ready for the stepper, over the singular pose ahead of it or out of one; and what it passes.
 
-    Where there is none yet, the stepper's memory says how near to the pose it shall go before it asks again, or that it
-    shall go on by itself.  SolverError when the mechanism comes to rest in the pose.
+    Where there is none yet, the stepper's memory says how close to the pose it shall go before it asks again, or that
+    it shall go on by itself.  SolverError when the mechanism comes to rest in the pose.
     """
     control = engine.control
     t, y = float(control[m.TIME]), engine.view(m.Y).copy()
@@ -67,9 +67,9 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
     engine.n[m.EVALUATIONS] += sampler.evaluations
     control[m.REACH] = control[m.MOST_REACH] = reach
     if made is None:
-        told = beyond_reach(engine) if control[m.LEFT] < OBVIOUS else ""
-        if told:
-            raise SolverError(told)
+        text = beyond_reach(engine) if control[m.LEFT] < OBVIOUS else ""
+        if text:
+            raise SolverError(text)
         return None, ()
     engine.view(m.Y)[:] = made.states(np.array([t]))[0]
     engine.view(m.COLLOCATION)[:] = made.series.ravel()
@@ -78,7 +78,7 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
 
 
 def _closed(sampler: Sampler, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
-    """The state closed, and its slope; as it is, and None, where the pose is too near for both."""
+    """The state closed, and its slope; as it is, and None, where the pose is too close for both."""
     closed, sound = sampler.closed(t, y)
     if not sound or not sampler.attempt(t, closed):
         return y, None
@@ -86,7 +86,7 @@ def _closed(sampler: Sampler, t: float, y: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def foresee_at_start(engine: Engine) -> bool:
-    """Put a pose that is near ahead of the stepper's state into its memory, where no step has led to; whether it is so.
+    """Put a pose close ahead of the stepper's state into its memory, where no step has led to; whether it is so.
 
     From how fast the closure rows come to depend on each other there.
     """
@@ -113,10 +113,10 @@ def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple
     Else None, and from how far before the pose it may be tried again: 0 where rounding leaves nothing to try.
     """
     control = sampler.engine.control
-    ahead, reach, share = float(control[m.PASS_TIME]) - t, float(control[m.REACH]), float(control[m.LEFT])
-    nearest = NEAREST / share * ahead
+    ahead, reach, fraction = float(control[m.PASS_TIME]) - t, float(control[m.REACH]), float(control[m.LEFT])
+    nearest = NEAREST / fraction * ahead
     while reach >= max(ahead, nearest):
-        made = collocate(sampler, t, y, _within(sampler, t, ahead + reach), slope, share=share * reach / ahead)
+        made = collocate(sampler, t, y, _within(sampler, t, ahead + reach), slope, fraction=fraction * reach / ahead)
         if made is not None:
             return made, reach
         reach *= 0.5
@@ -124,7 +124,7 @@ def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple
 
 
 def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
-    """A polynomial out of a pose, or over one that has come too near to be foreseen, by the motion's own scale."""
+    """A polynomial out of a pose, or over one that is too close to be predicted, by the motion's own scale."""
     nq = sampler.engine.model.nq
     sampler.attempt(t, y)
     rate = np.append(sampler.slope()[:nq], np.zeros(len(y) - nq))
@@ -158,25 +158,25 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
         J = singular.natural(engine.model, engine.h, engine.rows(m.JACOBIAN))
         return float(np.linalg.svd(J, compute_uv=False)[engine.mobility.rank - 1])
 
-    kept = engine.kept.copy()
-    engine.keep(np.ones(len(kept), dtype=bool))
-    low, found = np.array([least(t) for t in times]), list[float]()
+    saved = engine.selected.copy()
+    engine.keep(np.ones(len(saved), dtype=bool))
+    low, times_of_passes = np.array([least(t) for t in times]), list[float]()
     bounded = np.concatenate([[np.inf], low, [np.inf]])
     for k in np.flatnonzero((low <= bounded[:-2]) & (low <= bounded[2:])):
         bracket = float(times[max(int(k) - 1, 0)]), float(times[min(int(k) + 1, LOOKS)])
         t = float(minimize_scalar(least, bounds=bracket, method="bounded", options={"xatol": NEAR * made.span}).x)
         t = _between(least, float(min((t, *bracket), key=least)), NEARLY * made.span, bracket)
-        if least(t) < VANISHED * np.max(low) and not (found and t - found[-1] < SAME * made.span):
-            found.append(t)
-    engine.keep(kept)
-    return tuple(_pass(sampler, made, t) for t in found)
+        if least(t) < VANISHED * np.max(low) and not (times_of_passes and t - times_of_passes[-1] < SAME * made.span):
+            times_of_passes.append(t)
+    engine.keep(saved)
+    return tuple(_pass(sampler, made, t) for t in times_of_passes)
 
 
 def _between(least: Callable[[float], float], t: float, aside: float, bracket: tuple[float, float]) -> float:
-    """Where straight lines on both sides meet at zero: in the pose itself nothing can be told."""
+    """Where straight lines on both sides meet at zero: in the pose itself nothing can be determined."""
     before, after = least(t - aside), least(t + aside)
-    share = before / (before + after) if before + after > 0.0 else 0.5
-    return float(np.clip(t - aside + 2.0 * aside * share, *bracket))
+    fraction = before / (before + after) if before + after > 0.0 else 0.5
+    return float(np.clip(t - aside + 2.0 * aside * fraction, *bracket))
 
 
 def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass:
@@ -193,7 +193,7 @@ def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass:
 
 
 def _refuse_rest(engine: Engine, made: Collocation, one: Pass, left: np.ndarray) -> None:
-    """SolverError where the coordinates of the dependent closures stand still in the pose."""
+    """SolverError where the coordinates of the dependent closures do not move in the pose."""
     moving = selection.coordinates_of_rows(engine.model, engine.h, np.max(np.abs(left), axis=1) > 0.1)
     speeds = engine.model.speeds
     times = np.append(np.linspace(made.start, made.end, LOOKS + 1), one.time)

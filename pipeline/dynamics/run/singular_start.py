@@ -22,23 +22,23 @@ from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, label
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.observation import observe
 
-#: the way is first as long as the fastest coordinate takes for this share of its unit, then half of that, and so on
+#: the way is first as long as the fastest coordinate takes for this fraction of its unit, then half of that, and so on
 FIRST, HALVINGS = 0.3, 9
-#: velocities may differ from those of a branch by this share: they are given with some digits
+#: velocities may differ from those of a branch by this fraction: they are given with some digits
 SAME = 1e-6
-#: directions that were looked for are good to some hundredths
+#: directions that were searched for are good to some hundredths
 ANY = 0.5
-#: changes of a coordinate on two branches, which are known to some hundredths, that differ by less than this share are
-#: alike
+#: changes of a coordinate on two branches, which are known to some hundredths, that differ by less than this fraction
+#: are alike
 ALIKE = 0.05
 
 
 @dataclass(frozen=True)
 class StartMotion:
-    """A motion out of the pose; kept: closure rows that are solved for on it."""
+    """A motion out of the pose; selected: closure rows that are solved for on it."""
 
     motion: Collocation
-    kept: np.ndarray
+    selected: np.ndarray
 
     @property
     def state(self) -> np.ndarray:
@@ -53,13 +53,13 @@ def start_motion(engine: Engine, y: np.ndarray) -> StartMotion:
     """
     choices = engine.model.scene.start.branch if engine.model.scene.start is not None else ()
     if np.any(y[engine.model.speeds] != 0.0) and not choices:
-        found, turn = [branches.by_speeds(engine, y)], SAME
+        motions, turn = [branches.by_speeds(engine, y)], SAME
     else:
-        found, turn = _chosen(engine, branches.directions(engine, y), choices), ANY
-    way = _along(engine, found[0], turn) if found else None
+        motions, turn = _chosen(engine, branches.directions(engine, y), choices), ANY
+    way = _along(engine, motions[0], turn) if motions else None
     if way is None:
         raise SolverError(engine.mobility.start_refusal)
-    engine.keep(way.kept)
+    engine.keep(way.selected)
     return way
 
 
@@ -71,13 +71,13 @@ def _along(engine: Engine, way: Direction, turn: float) -> StartMotion | None:
     for k in range(HALVINGS):
         span = min(way.reaching(FIRST * 0.5**k), engine.breaks[1] - engine.start)
         singular.select_rows(engine, way.state(engine.start + span), engine.start + span)
-        kept, sampler = engine.kept.copy(), Sampler(engine)
+        saved, sampler = engine.selected.copy(), Sampler(engine)
         lead = Lead(way.state, turn if way.at_speed else 0.0)
         made = collocate(sampler, engine.start, way.start, span, None, lead)
         sampler.restore()
         engine.n[m.EVALUATIONS] += sampler.evaluations
         if made is not None:
-            return StartMotion(made, kept)
+            return StartMotion(made, saved)
     return None
 
 
@@ -90,13 +90,13 @@ def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) 
         until = engine.start + min(way.reaching(branches.WAY) for way in ways)
         changes = [_changes(engine, way, until) for way in ways]
         for number, choice in enumerate(choices):
-            place = "[start.branch]" if len(choices) == 1 else f"[start.branch.{number}]"
+            path = "[start.branch]" if len(choices) == 1 else f"[start.branch.{number}]"
             scene = engine.model.scene
-            joint, k, _ = coordinate_of(scene, choice.joint, choice.coordinate, place)
-            wanted = [choice.sign * change[label(joint, scene.joint[joint].type, k)] for change in changes]
-            near = [max(wanted) - value <= ALIKE * max(map(abs, wanted)) for value in wanted]
-            ways = [way for way, best in zip(ways, near, strict=True) if best]
-            changes = [change for change, best in zip(changes, near, strict=True) if best]
+            joint, k, _ = coordinate_of(scene, choice.joint, choice.coordinate, path)
+            requested = [choice.sign * change[label(joint, scene.joint[joint].type, k)] for change in changes]
+            best_ways = [max(requested) - value <= ALIKE * max(map(abs, requested)) for value in requested]
+            ways = [way for way, best in zip(ways, best_ways, strict=True) if best]
+            changes = [change for change, best in zip(changes, best_ways, strict=True) if best]
         if len(ways) > 1:
             _refuse_open(engine, changes, choices)
     return ways
@@ -114,14 +114,14 @@ def _changes(engine: Engine, way: Direction, until: float) -> dict[str, float]:
 
 
 def _refuse_open(engine: Engine, changes: list[dict[str, float]], choices: tuple[Branch, ...]) -> None:
-    """Say which joint tells the branches apart best, and how its coordinate changes on each."""
+    """Say which joint distinguishes the branches best, and how its coordinate changes on each."""
     spread = {name: float(np.ptp([change[name] for change in changes])) for name in changes[0]}
     size = {name: max(abs(change[name]) for change in changes) for name in changes[0]}
     best = max(spread, key=lambda name: spread[name] / size[name] if size[name] > 0.0 else 0.0)
-    told = ", ".join(f"{change[best] / size[best]:+.2g}" for change in changes)
+    text = ", ".join(f"{change[best] / size[best]:+.2g}" for change in changes)
     joint, _, coordinate = best.partition(".")
     written = f'joint = "{joint}", ' + (f'coordinate = "{coordinate}", ' if coordinate else "") + "sign = 1"
-    ways = f"{len(changes)} ways, on which joint {best} begins to move like {told}"
+    ways = f"{len(changes)} ways, on which joint {best} begins to move like {text}"
     if choices:
         raise InputError(
             "[start.branch]", f"leaves {ways}", f"choose by {{ {written} }} or sign = -1, as one more of a list"

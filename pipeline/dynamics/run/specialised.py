@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.compile import functions, stacks
 from flexclear.pipeline.dynamics.effects import Parts
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.model import selection
-from flexclear.pipeline.dynamics.run.batched_evaluation import Code, Crew, Crews, Place, crews
+from flexclear.pipeline.dynamics.run.batched_evaluation import Code, LaneGroup, LaneGroups, Place, groups
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring, wiring
@@ -36,16 +36,17 @@ SELECTIONS = 4
 #: states that are evaluated at once: few, or many. Of fewer than `FEW` each is evaluated alone
 FEW, LANES = 2, (4, 8)
 _making = Lock()
-#: addresses by parts, wiring and lanes: many engines of a process share them
+#: addresses by parts, wiring and lanes: many engines of a process use them
 _known: dict[tuple[Parts, Wiring, int], int] = {}
 
 
 def settle(engine: Engine, progress: Progress) -> None:
     """Let the steps from here on evaluate with what this integration calls for.
 
-    That is told by the engine and its count of evaluations, so an integration that was interrupted goes on as it would.
+    That is reported by the engine and its count of evaluations, so an integration that was interrupted goes on as it
+    would.
     """
-    engine.straight.used = engine.straight.wanted or bool(engine.n[m.EVALUATIONS] >= MANY)
+    engine.straight.used = engine.straight.requested or bool(engine.n[m.EVALUATIONS] >= MANY)
     if engine.straight.used:
         _make(engine, progress)
     engine.connect()
@@ -53,20 +54,20 @@ def settle(engine: Engine, progress: Progress) -> None:
 
 def specialise(engine: Engine, progress: Progress = silent) -> None:
     """Let all of the engine's integrations use straight code, from now on."""
-    engine.straight.wanted = True
+    engine.straight.requested = True
     settle(engine, progress)
 
 
 @contextmanager
-def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> Iterator[Crews | None]:
-    """Crews for so many engines like this one, in so many threads; None where each is to take its own steps.
+def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> Iterator[LaneGroups | None]:
+    """LaneGroups for so many engines like this one, in so many threads; None where each is to take its own steps.
 
     Either way they, as `another` makes them of it, use straight code with the same bits.
     """
-    engine.straight.wanted = engine.straight.exact = True
+    engine.straight.requested = engine.straight.exact = True
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
-    if members >= FEW * threads and side_by_side(engine) and _code(engine, engine.kept.tobytes(), progress, lanes):
-        with crews(lanes, threads) as made:
+    if members >= FEW * threads and side_by_side(engine) and _code(engine, engine.selected.tobytes(), progress, lanes):
+        with groups(lanes, threads) as made:
             yield made
     else:
         settle(engine, progress)
@@ -74,7 +75,7 @@ def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> I
 
 
 def side_by_side(engine: Engine) -> bool:
-    """Whether its steps can be taken beside those of others here."""
+    """Whether its steps can be taken next to those of others here."""
     return stacks.supported() and suited(engine)
 
 
@@ -88,31 +89,31 @@ def _make(engine: Engine, progress: Progress) -> None:
 
     An integration that goes on in another process needs that of the rows which it has met before, too.
     """
-    straight, kept = engine.straight, engine.kept.tobytes()
+    straight, rows_of_engine = engine.straight, engine.selected.tobytes()
     if not suited(engine):
         return
-    if straight.place is not None and straight.crew is None:
-        straight.crew = _crew(engine, kept, straight.place, progress)
-    if kept not in straight.rows and len(straight.rows) < SELECTIONS:
-        straight.rows.append(kept)
+    if straight.place is not None and straight.group is None:
+        straight.group = _group(engine, rows_of_engine, straight.place, progress)
+    if rows_of_engine not in straight.rows and len(straight.rows) < SELECTIONS:
+        straight.rows.append(rows_of_engine)
     for rows in straight.rows:
-        if rows not in straight.addresses and not (straight.crew and straight.crew.kept == rows):
+        if rows not in straight.addresses and not (straight.group and straight.group.rows == rows):
             straight.addresses[rows] = _code(engine, rows, progress, lanes=int(straight.exact))
 
 
-def _crew(engine: Engine, kept: bytes, place: Place, progress: Progress) -> Crew | None:
-    """Who takes the steps at a place, with the closure rows that the first integration there begins with."""
-    several = _code(engine, kept, progress, place.crews.width)
+def _group(engine: Engine, rows: bytes, lane: Place, progress: Progress) -> LaneGroup | None:
+    """What takes the steps in a lane, with the closure rows that the first integration there begins with."""
+    several = _code(engine, rows, progress, lane.groups.width)
     if not several:
         return None
-    code = Code(several, _code(engine, kept, progress, lanes=1), len(engine.model.arrays.f))
-    return place.crews.crew(place.thread, kept, code)
+    code = Code(several, _code(engine, rows, progress, lanes=1), len(engine.model.arrays.f))
+    return lane.groups.group(lane.thread, rows, code)
 
 
-def _code(engine: Engine, kept: bytes, progress: Progress, lanes: int) -> int:
+def _code(engine: Engine, rows: bytes, progress: Progress, lanes: int) -> int:
     """Address of the code for closure rows; 0 where there is none."""
     h, parts = engine.h.copy(), engine.model.parts
-    selection.write(engine.model, h, np.frombuffer(kept, dtype=bool))
+    selection.write(engine.model, h, np.frombuffer(rows, dtype=bool))
     with _making:  # engines may run side by side
         wired = wiring(engine.model.arrays, h)
         known = _known.get((parts, wired, lanes))

@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics.run.observation import observe
 
 #: impact rate that a resting contact is given: the hysteresis of an impact long past has no say [m/s]
 NO_IMPACT = 1e300
-#: surfaces that overlap by less than this share of the clearance touch
+#: surfaces that overlap by less than this fraction of the clearance touch
 TOUCHING = 1e-9
 
 
@@ -35,8 +35,8 @@ def consistent_start(engine: Engine) -> np.ndarray:
     if not engine.mobility.singular_start:
         y = _closed(engine, y)
     # a singular pose has no rates to project on
-    share = 0.0 if engine.mobility.singular_start else initial.WRONG
-    y = initial.given_velocities(model, start_motions(engine), y, share)
+    fraction = 0.0 if engine.mobility.singular_start else initial.WRONG
+    y = initial.given_velocities(model, start_motions(engine), y, fraction)
     if not engine.mobility.singular_start:
         y = project(engine, y)
     if model.loads or model.arrays.size(m.N_INTERNAL):
@@ -74,9 +74,9 @@ def _closed(engine: Engine, y: np.ndarray) -> np.ndarray:
         return project(engine, y)
     except SolverError as error:
         paths = [name for name, drive in engine.model.scene.drive.items() if isinstance(drive, PathDrive)]
-        place = f"[drive.{paths[0]}]" if paths else "[joint]"
+        path = f"[drive.{paths[0]}]" if paths else "[joint]"
         what = "correct where the path starts, or the poses" if paths else "correct lengths, frames or poses"
-        raise InputError(place, f"the mechanism cannot be assembled: {error}", what) from None
+        raise InputError(path, f"the mechanism cannot be assembled: {error}", what) from None
 
 
 def _look(engine: Engine, y: np.ndarray) -> None:
@@ -125,15 +125,18 @@ def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
         joint = contact.joint
         if joint.initial_approach_speed is not None:
             continue
-        found, remedy = f"its surfaces start {depth:.3g} m deep in each other", "enlarge the clearance"
-        found += f" (clearance {joint.clearance:.3g} m)"
+        problem, remedy = f"its surfaces start {depth:.3g} m deep in each other", "enlarge the clearance"
+        problem += f" (clearance {joint.clearance:.3g} m)"
         if isinstance(joint, End):
             unit = "rad" if joint.coordinate.turning else "m"
-            found, remedy = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}", "move the end"
+            problem, remedy = (
+                f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}",
+                "move the end",
+            )
         elif contact.name in loose(engine.model.scene):
             remedy = "begin where the joint would be without clearance ([start] at = 'ideal'), " + remedy
         raise InputError(
             f"[{contact.place}]",
-            found,
+            problem,
             f"move a body, {remedy}, or declare the speed at which this contact began as initial_approach_speed",
         )

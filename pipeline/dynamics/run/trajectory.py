@@ -83,7 +83,7 @@ class Trajectory:
         firsts = np.searchsorted(self.time, starts, side="right")
         firsts[0] = 0
         ends = [*firsts[1:], len(self.rows)]
-        return [(slice(a, b), kept) for a, b, (_, kept) in zip(firsts, ends, self.selections, strict=True)]
+        return [(slice(a, b), selected) for a, b, (_, selected) in zip(firsts, ends, self.selections, strict=True)]
 
     def without(self, times: np.ndarray) -> Trajectory:
         """The trajectory without its rows at some times [s], but for those at its events."""
@@ -92,7 +92,7 @@ class Trajectory:
 
     def selection(self, row: int) -> np.ndarray:
         """Closure rows that were solved for to reach a row."""
-        return next(kept for part, kept in self.parts() if part.start <= row < part.stop)
+        return next(selected for part, selected in self.parts() if part.start <= row < part.stop)
 
 
 #: the engine that came to the end, what it followed, and why it is not the one that began
@@ -112,8 +112,8 @@ def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
     span = breaks[-1] - breaks[0]
     regular = breaks[0] + interval * np.arange(int(np.floor(span / interval * (1 + 1e-12))) + 1)
     after = np.clip(np.searchsorted(breaks, regular), 1, len(breaks) - 1)
-    apart = np.minimum(np.abs(regular - breaks[after - 1]), np.abs(regular - breaks[after])) > 1e-9 * interval
-    return np.union1d(regular[apart], breaks)
+    distinct = np.minimum(np.abs(regular - breaks[after - 1]), np.abs(regular - breaks[after])) > 1e-9 * interval
+    return np.union1d(regular[distinct], breaks)
 
 
 def integrate(
@@ -230,7 +230,7 @@ def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> Tape:
     engine.view(m.Y)[:], engine.latched[:], engine.view(m.WATCH.place)[:] = left.y, left.latched, left.watched
     engine.control[LASTING] = left.lasting
     tape.rows, tape.events = np.concatenate([left.rows, tape.rows]), np.concatenate([left.events, tape.events])
-    same = np.array_equal(left.selections[-1][1], engine.kept)
+    same = np.array_equal(left.selections[-1][1], engine.selected)
     tape.selections = [*left.selections, *([] if same else tape.selections)]
     tape.collocations, tape.passes = [*left.collocations], [*left.passes]
     return tape
@@ -262,7 +262,7 @@ def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
     ratio = singular.select_rows(engine, y, t)
     engine.view(m.Y)[:] = y
     engine.view(m.PIVOT)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
-    return engine.kept.copy()
+    return engine.selected.copy()
 
 
 def _leave_singular_start(engine: Engine, tape: Tape) -> None:
@@ -277,7 +277,7 @@ def _leave_singular_start(engine: Engine, tape: Tape) -> None:
     engine.view(m.PIVOT)[:] = 1.0, 0.0
     engine.control[m.COLLOCATED] = way.motion.span
     tape.collocations.append(way.motion)
-    tape.selections[:] = [(engine.start, engine.kept.copy())]
+    tape.selections[:] = [(engine.start, engine.selected.copy())]
 
 
 def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
@@ -313,7 +313,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: P
             _pass_over(engine, tape)
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
             if singular.improve(engine, t):
-                tape.selections.append((t, engine.kept.copy()))
+                tape.selections.append((t, engine.selected.copy()))
             elif status != m.WORN_ROWS and not _rescued(engine, tape):
                 raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
         elif status != m.PAUSED:
@@ -363,7 +363,7 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     """
     t = float(engine.control[m.TIME])
     if engine.mobility.redundant and singular.improve(engine, t, singular.CLEARLY):
-        tape.selections.append((t, engine.kept.copy()))
+        tape.selections.append((t, engine.selected.copy()))
         return True
     from flexclear.pipeline.dynamics.run.singular_pass import SAME, lay_over
 

@@ -17,11 +17,11 @@ from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.engine import Engine
 
-#: displacement of a point in its body frame, as share of the body's length, above which linear modes are doubted
+#: displacement of a point in its body frame, as fraction of the body's length, above which linear modes are doubted
 BENT = 0.05
 #: rotation of a section in the body frame [rad] above which they are doubted
 TURNED = 0.15
-#: speed of turning, as share of the first frequency, above which a body without stiffening is doubted
+#: speed of turning, as fraction of the first frequency, above which a body without stiffening is doubted
 SPIN = 0.2
 #: rows whose shapes are added up at a time
 ROWS = 16
@@ -47,7 +47,7 @@ class Flexible:
 
 def flexibles(model: Model) -> list[Flexible]:
     """The flexible links of a model, and by what each is judged."""
-    found = []
+    bodies = []
     for i, coordinates in sorted(model.numbering.modal_positions.items()):
         name, bundle = str(model.links[i].flexible), model.links[i].bundle
         assert bundle is not None
@@ -57,7 +57,7 @@ def flexibles(model: Model) -> list[Flexible]:
         along = offsets @ axis
         stiffened = getattr(model.scene.body[name], "stiffening", None) is not None
         least = 0.0 if stiffened else float(np.linalg.eigvalsh(bundle["modal_stiffness"].values)[0])
-        found.append(
+        bodies.append(
             Flexible(
                 name,
                 i,
@@ -69,7 +69,7 @@ def flexibles(model: Model) -> list[Flexible]:
                 float(np.sqrt(max(least, 0.0))),
             )
         )
-    return found
+    return bodies
 
 
 def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
@@ -104,7 +104,7 @@ def _judged(body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: n
         row, bent = largest(body.shapes, q, BENT * body.length)
         if bent > BENT * body.length:
             yield (
-                f"{body.name}: at t = {time[row]:.6g} s a point of it is {bent:.3g} m from its undeformed place, "
+                f"{body.name}: at t = {time[row]:.6g} s a point of it is {bent:.3g} m from its undeformed position, "
                 f"{bent / body.length:.2g} of its length; linear modes hold below {BENT:g}: divide it into several "
                 "bodies joined by fixed joints, or make it stiffer"
             )
@@ -127,7 +127,7 @@ def _spun(body: Flexible, time: np.ndarray, frame: np.ndarray) -> Iterator[str]:
         yield (
             f"{body.name}: at t = {time[row]:.6g} s it turns at {speeds[row]:.4g} rad/s, "
             f"{speeds[row] / body.first:.2g} of its first frequency ({body.first:.4g} rad/s), and nothing stiffens it; "
-            f"linear modes hold below {SPIN:g} and diverge near 1: give a beam stiffening = {{}}"
+            f"linear modes hold below {SPIN:g} and diverge close to 1: give a beam stiffening = {{}}"
         )
 
 
@@ -138,13 +138,13 @@ def largest(shapes: np.ndarray, q: np.ndarray, floor: float) -> tuple[int, float
     """
     bound = np.abs(q) @ np.linalg.norm(shapes, axis=1).max(axis=0, initial=0.0)
     order = np.argsort(-bound, kind="stable")
-    found = (0, 0.0)
+    peak = (0, 0.0)
     for first in range(0, len(order), ROWS):
         rows = order[first : first + ROWS]
-        if not bound[rows[0]] > max(floor, found[1]):
+        if not bound[rows[0]] > max(floor, peak[1]):
             break
         sizes = np.linalg.norm(np.einsum("nam,tm->tna", shapes, q[rows]), axis=2).max(axis=1)
         best = int(np.argmax(sizes))
-        if sizes[best] > found[1]:
-            found = int(rows[best]), float(sizes[best])
-    return found
+        if sizes[best] > peak[1]:
+            peak = int(rows[best]), float(sizes[best])
+    return peak

@@ -2,7 +2,7 @@
 
 For one state at a time, or for several in the lanes of the processor's vectors. Several states go both ways at a
 branch where some of them do, and each keeps what its own way gives. What they come to must not depend on how many there
-are, nor which: so every operation is then rounded as it stands, and of products and sums those are fused that the tape
+are, nor which: so every operation is then rounded as it is, and of products and sums those are fused that the tape
 says, not those that the compiler likes.
 """
 
@@ -37,67 +37,67 @@ LIBRARY = {"sin": "sin", "cos": "cos", "exp": "exp", "tanh": "tanh", "arctan2": 
 
 @dataclass(frozen=True)
 class Program:
-    """block: what is computed.  stores: what is written at the end, (array, place, value)."""
+    """block: what is computed.  stores: what is written at the end, (array, index, value)."""
 
     block: list[Any]
     stores: list[tuple[str, Any, Any]]
 
 
 def loads(program: Program) -> list[tuple[str, Any]]:
-    """Array and place of all that is loaded."""
-    found, blocks = list[tuple[str, Any]](), [program.block]
+    """Array and index of all that is loaded."""
+    entries, blocks = list[tuple[str, Any]](), [program.block]
     while blocks:
         for item in blocks.pop():
             if isinstance(item, Branch):
                 blocks += item.blocks
             elif item.operation == "load":
-                found.append(item.arguments)
-    return found
+                entries.append(item.arguments)
+    return entries
 
 
 def uses(program: Program) -> Counter[Symbol]:
     """How often each symbol is used by what the stores need."""
-    found: Counter[Symbol] = Counter()
-    for _, place, value in program.stores:
-        found.update(s for s in (place, value) if isinstance(s, Symbol))
-    _use(program.block, found)
-    return found
+    counts: Counter[Symbol] = Counter()
+    for _, index, value in program.stores:
+        counts.update(s for s in (index, value) if isinstance(s, Symbol))
+    _use(program.block, counts)
+    return counts
 
 
-def _use(block: list[Any], found: Counter[Symbol]) -> None:
+def _use(block: list[Any], counts: Counter[Symbol]) -> None:
     for item in reversed(block):
         if isinstance(item, Branch):
             for joined, *values in item.joins:
-                if found[joined]:
-                    found.update(value for value in values if isinstance(value, Symbol))
-                    found[item.condition] += 1
+                if counts[joined]:
+                    counts.update(value for value in values if isinstance(value, Symbol))
+                    counts[item.condition] += 1
             for inner in item.blocks:
-                _use(inner, found)
-        elif found[item]:
-            found.update(a for a in item.arguments if isinstance(a, Symbol))
+                _use(inner, counts)
+        elif counts[item]:
+            counts.update(a for a in item.arguments if isinstance(a, Symbol))
 
 
-def size(block: list[Any], found: Counter[Symbol]) -> int:
+def size(block: list[Any], counts: Counter[Symbol]) -> int:
     """How many operations a block has, each call for as many as it takes as long as."""
     total = 0
     for item in block:
         if isinstance(item, Branch):
-            total += 1 + sum(size(inner, found) for inner in item.blocks)
-        elif found[item]:
+            total += 1 + sum(size(inner, counts) for inner in item.blocks)
+        elif counts[item]:
             total += CALL if item.operation in LIBRARY else 1
     return total
 
 
-def fused(block: list[Any], found: Counter[Symbol]) -> dict[Symbol, tuple[Symbol, Any]]:
+def fused(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbol, Any]]:
     """By sum: the product in it that nothing else uses, of the same block, and what is added to it."""
     pairs, products = dict[Symbol, tuple[Symbol, Any]](), set[Symbol]()
     for item in block:
         if isinstance(item, Branch):
             for inner in item.blocks:
-                pairs |= fused(inner, found)
-        elif item.operation == "mul" and found[item] == 1 and divisor(item, found) is None:
+                pairs |= fused(inner, counts)
+        elif item.operation == "mul" and counts[item] == 1 and divisor(item, counts) is None:
             products.add(item)
-        elif found[item] and item.operation in ("add", "sub"):
+        elif counts[item] and item.operation in ("add", "sub"):
             a, b = item.arguments
             if b in products:
                 pairs[item] = b, a
@@ -106,10 +106,10 @@ def fused(block: list[Any], found: Counter[Symbol]) -> dict[Symbol, tuple[Symbol
     return pairs
 
 
-def divisor(product: Symbol, found: Counter[Symbol]) -> Symbol | None:
+def divisor(product: Symbol, counts: Counter[Symbol]) -> Symbol | None:
     """The factor of a product that is the reciprocal of something by which nothing else is divided."""
     for factor in product.arguments:
-        if isinstance(factor, Symbol) and factor.operation == "reciprocal" and found[factor] == 1:
+        if isinstance(factor, Symbol) and factor.operation == "reciprocal" and counts[factor] == 1:
             return factor
     return None
 
@@ -117,9 +117,9 @@ def divisor(product: Symbol, found: Counter[Symbol]) -> Symbol | None:
 class Emitter:
     """Writes a program into a function under construction.
 
-    where: the place of an array's element: where(array, place as a number or a value of the code, lane) -> pointer.
-    lanes: states at once.  exact: every operation is rounded as it stands.
-    number: of several states, what stands at a place of f, of all of them.
+    where: address of an array's element: where(array, index as a number or a value of the code, lane) -> pointer.
+    lanes: states at once.  exact: every operation is rounded as it is.
+    number: of several states, what is at an index of f, of all of them.
     """
 
     def __init__(
@@ -143,18 +143,18 @@ class Emitter:
     def emit(self) -> None:
         """Write everything."""
         self._block(self.program.block)
-        for array, place, value in self.program.stores:
-            found = self._value(value, INTEGER if array in "hn" else FLOAT)
+        for array, index, value in self.program.stores:
+            operand = self._value(value, INTEGER if array in "hn" else FLOAT)
             for lane in range(self.lanes):
-                self.builder.store(self._of(found, lane), self.where(array, self._place(place, lane), lane))
+                self.builder.store(self._of(operand, lane), self.where(array, self._place(index, lane), lane))
 
     def _value(self, value: Any, kind: str) -> Any:
         if isinstance(value, Symbol):
             return self.values[value]
         return ir.Constant(self.types[kind], value if self.lanes == 1 else [value] * self.lanes)
 
-    def _place(self, place: Any, lane: int) -> Any:
-        return self._of(self.values[place], lane) if isinstance(place, Symbol) else place
+    def _place(self, index: Any, lane: int) -> Any:
+        return self._of(self.values[index], lane) if isinstance(index, Symbol) else index
 
     # Lanes -------------------------------------------------------------------------------------------------------
 
@@ -166,10 +166,10 @@ class Emitter:
         """One value of those of all lanes."""
         if self.lanes == 1:
             return values[0]
-        found = ir.Constant(ir.VectorType(values[0].type, self.lanes), ir.Undefined)
+        vector = ir.Constant(ir.VectorType(values[0].type, self.lanes), ir.Undefined)
         for lane, value in enumerate(values):
-            found = self.builder.insert_element(found, value, _NUMBER(lane))
-        return found
+            vector = self.builder.insert_element(vector, value, _NUMBER(lane))
+        return vector
 
     # Blocks ------------------------------------------------------------------------------------------------------
 
@@ -238,13 +238,13 @@ class Emitter:
         left, end = [self._value(join[way], join[0].kind) for join in joins], builder.block
         builder.branch(after)
         builder.position_at_end(after)
-        found = []
+        merged = []
         for value in left:
             phi = builder.phi(value.type)
             phi.add_incoming(value, end)
             phi.add_incoming(ir.Constant(value.type, None), before)
-            found.append(phi)
-        return found
+            merged.append(phi)
+        return merged
 
     # Operations --------------------------------------------------------------------------------------------------
 
@@ -276,12 +276,12 @@ class Emitter:
             return self._instruction(INTRINSICS[name], values)
         return self._together([self._call(name, [self._of(v, lane) for v in values]) for lane in range(self.lanes)])
 
-    def _load(self, array: str, place: Any) -> Any:
+    def _load(self, array: str, index: Any) -> Any:
         builder = self.builder
-        if array == "f" and self.number is not None and not isinstance(place, Symbol):
-            return self.number(place)
-        places = [self.where(array, self._place(place, lane), lane) for lane in range(self.lanes)]
-        return self._together([builder.load(found) for found in places])
+        if array == "f" and self.number is not None and not isinstance(index, Symbol):
+            return self.number(index)
+        places = [self.where(array, self._place(index, lane), lane) for lane in range(self.lanes)]
+        return self._together([builder.load(pointer) for pointer in places])
 
     def _product(self, s: Symbol, values: list[Any]) -> Any:
         """A quotient where nothing else is divided by the same."""
@@ -312,7 +312,7 @@ class Emitter:
     def _call(self, name: str, values: list[Any]) -> Any:
         """A function of the mathematics library, in one lane.
 
-        Exact code has no other in its place, such as one for vectors: the compiler is not to know what it is.
+        Exact code has no alternative, such as one for vectors: the compiler is not to know what it is.
         """
         module, kind = self.builder.module, TYPES[FLOAT]
         full = LIBRARY[name] if self.exact or name not in INTRINSICS else f"{INTRINSICS[name]}.f64"

@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, UnsuitedError
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
-#: operations beyond which straight code is no faster than loops: it no longer fits the caches near to the processor
+#: operations beyond which straight code is no faster than loops: it no longer fits the processor's first caches
 LONGEST = 80_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_SPEEDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
@@ -38,20 +38,20 @@ def program(rates: Callable, wiring: wired.Wiring) -> Program:
         trace.plain(rates)(h, f, w, n, wired.start(wired.STATE), wired.start(wired.RATES))
     except ZeroDivisionError:
         raise UnsuitedError("rows are solved for of which the wiring says that they depend on each other") from None
-    kept = _kept(h)
-    stores = [("w", place, value) for place, value in w.values.items() if kept(*wired.split(place))]
+    is_stored = _kept(h)
+    stores = [("w", index, value) for index, value in w.values.items() if is_stored(*wired.split(index))]
     return Program(trace.tape.block, [*stores, ("n", m.EVALUATION, n.values[m.EVALUATION]), ("n", m.ABRIDGED, 1)])
 
 
 def _kept(h: list[int]) -> Callable[[int, int], bool]:
-    """Whether a place is read after an evaluation: of the factor of J M^-1 J^T its diagonal, of scales the last."""
+    """Whether an index is read after an evaluation: of the factor of J M^-1 J^T its diagonal, of scales the last."""
     o = h[m.CLOSURE_ENVELOPE.place]
     rows = [(h[o + 2 * r], h[o + 2 * r + 1]) for r in range(h[m.N_KEPT_ROWS])]
     diagonal = {start - first + r for r, (first, start) in enumerate(rows)}
 
-    def kept(stretch: int, place: int) -> bool:
-        scale = stretch == m.ROW_SCALE and place >= h[m.N_CLOSURE_ROWS]
-        return stretch in KEPT or scale or (stretch == m.SCHUR and place in diagonal)
+    def kept(stretch: int, index: int) -> bool:
+        scale = stretch == m.ROW_SCALE and index >= h[m.N_CLOSURE_ROWS]
+        return stretch in KEPT or scale or (stretch == m.SCHUR and index in diagonal)
 
     return kept
 
@@ -65,8 +65,8 @@ def straight(rates: Callable, wiring: wired.Wiring, *, exact: bool = False) -> A
     @intrinsic
     def run(typingctx: Any, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            found = program(rates, wiring)
-            Emitter(builder, found, _places(builder, found, [values]), exact=exact).emit()
+            tape = program(rates, wiring)
+            Emitter(builder, tape, _places(builder, tape, [values]), exact=exact).emit()
             return context.get_dummy_value()
 
         return types.void(h, f, w, n, y, dy), generate
@@ -78,8 +78,8 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
     """Functions of compiled code: note(h, f, numbers, lane) and abreast(places, numbers).
 
     The second does the same for several states, each of a mechanism with numbers of its own, which the first has put
-    where they stand side by side: numbers has room for all of f in all lanes.
-    places: addresses of all h, then of all f, w and n, then all places y and dy, shape (6 lanes,).
+    where they are adjacent: numbers has room for all of f in all lanes.
+    places: addresses of all h, then of all f, w and n, then all addresses of y and dy, shape (6 lanes,).
     """
     made = cache(lambda: program(rates, wiring))  # both functions are typed and written, and the tape is long
 
@@ -88,8 +88,8 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
             h, f, numbers, lane = values
             begins = dict[int, Any]()
-            for k, place in enumerate(_numbers(made())):
-                stretch, inside = wired.split(place)
+            for k, index in enumerate(_numbers(made())):
+                stretch, inside = wired.split(index)
                 if stretch not in begins:
                     begins[stretch] = builder.gep(f, [builder.load(builder.gep(h, [_INTEGER(stretch)]))])
                 value = builder.load(builder.gep(begins[stretch], [_INTEGER(inside)]))
@@ -101,17 +101,17 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
     @intrinsic
     def run(typingctx: Any, places: Any, numbers: Any) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            found, (places, numbers) = made(), values
+            tape, (places, numbers) = made(), values
             given = [_arguments(builder, places, lane, lanes) for lane in range(lanes)]
             side_by_side = builder.bitcast(numbers, ir.VectorType(ir.DoubleType(), lanes).as_pointer())
-            row = {place: k for k, place in enumerate(_numbers(found))}
+            row = {index: k for k, index in enumerate(_numbers(tape))}
 
-            def number(place: int) -> Any:
-                loaded = builder.load(builder.gep(side_by_side, [_INTEGER(row[place])]))
+            def number(index: int) -> Any:
+                loaded = builder.load(builder.gep(side_by_side, [_INTEGER(row[index])]))
                 loaded.align = 8
                 return loaded
 
-            Emitter(builder, found, _places(builder, found, given), lanes, exact=True, number=number).emit()
+            Emitter(builder, tape, _places(builder, tape, given), lanes, exact=True, number=number).emit()
             return context.get_dummy_value()
 
         return types.void(places, numbers), generate
@@ -119,13 +119,13 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
     return note, run
 
 
-def _numbers(found: Program) -> list[int]:
+def _numbers(tape: Program) -> list[int]:
     """Places in f of all that a program loads from there."""
-    return sorted({place for array, place in loads(found) if array == "f" and isinstance(place, int)})
+    return sorted({index for array, index in loads(tape) if array == "f" and isinstance(index, int)})
 
 
 def exactly(kernel: Any) -> Any:
-    """A kernel, and those in its closure, with every operation rounded as it stands: equal bits wherever it is used."""
+    """A kernel, and those in its closure, with every operation rounded as it is: equal bits wherever it is used."""
     function = kernel.py_func
     cells = [cell.cell_contents for cell in function.__closure__ or ()]
     exact = tuple(CellType(exactly(cell) if isinstance(cell, Kernel) else cell) for cell in cells)
@@ -140,14 +140,14 @@ def _arguments(builder: ir.IRBuilder, places: Any, lane: int, lanes: int) -> lis
     return [builder.inttoptr(word, kind.as_pointer()) for word, kind in zip(words, kinds, strict=False)] + words[4:]
 
 
-def _places(builder: ir.IRBuilder, found: Program, given: list[Any]) -> Callable:
+def _places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
     """Where the code finds an element of an array in a lane: in a stretch whose begin it has looked up first.
 
     given: h, f, w, n, y and dy of each lane.
     """
     begins = dict[Any, Any]()
-    places = [(array, place) for array, place, _ in found.stores] + loads(found)
-    stretches = sorted({(array, wired.split(place)[0]) for array, place in places if isinstance(place, int)})
+    places = [(array, index) for array, index, _ in tape.stores] + loads(tape)
+    stretches = sorted({(array, wired.split(index)[0]) for array, index in places if isinstance(index, int)})
     for lane, (h, f, w, n, y, dy) in enumerate(given):
         builder.store(y, builder.gep(n, [_INTEGER(m.STATE)]))
         for array, stretch in stretches:
@@ -156,10 +156,10 @@ def _places(builder: ir.IRBuilder, found: Program, given: list[Any]) -> Callable
                 begin = builder.load(builder.gep(h, [_INTEGER(stretch)]))
             begins[array, stretch, lane] = builder.gep({"f": f, "w": w, "n": n}[array], [begin])
 
-    def where(array: str, place: Any, lane: int) -> Any:
-        if not isinstance(place, int):
-            return builder.gep(given[lane]["hfwn".index(array)], [place])
-        stretch, inside = wired.split(place)
+    def where(array: str, index: Any, lane: int) -> Any:
+        if not isinstance(index, int):
+            return builder.gep(given[lane]["hfwn".index(array)], [index])
+        stretch, inside = wired.split(index)
         return builder.gep(begins[array, stretch, lane], [_INTEGER(inside)])
 
     return where

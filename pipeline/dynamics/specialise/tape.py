@@ -125,14 +125,14 @@ class Tape:
     def write(self, kind: str, operation: str, *arguments: Any) -> Symbol:
         """The symbol of an operation, which joins the tape if it is new."""
         key = (operation, *(id(a) if isinstance(a, Symbol) else (type(a), a) for a in arguments))
-        found = self._known.get(key)
-        if found is None:
-            found = self._known[key] = self._symbol(kind, operation, arguments)
+        symbol = self._known.get(key)
+        if symbol is None:
+            symbol = self._known[key] = self._symbol(kind, operation, arguments)
             self._scopes[-1].append(key)
-            self.block.append(found)
+            self.block.append(symbol)
             if self.count > self.longest:
                 raise UnsuitedError("the computation is too long")
-        return found
+        return symbol
 
     def _symbol(self, kind: str, operation: str, arguments: tuple[Any, ...]) -> Symbol:
         self.count += 1
@@ -197,7 +197,7 @@ class Tape:
         return self.write(FLOAT, "mul", *_ordered(a, b))
 
     def divide(self, a: Any, b: Any) -> Any:
-        """The quotient, by a reciprocal that others may share."""
+        """The quotient, by a reciprocal that others may reuse."""
         if not isinstance(b, Symbol):
             return self.multiply(a, 1.0 / b)
         if _negative(b):
@@ -233,7 +233,7 @@ class Tape:
                 del self._known[key]
 
     def join(self, branch: Branch, a: Any, b: Any) -> Any:
-        """What a place holds after a branch."""
+        """Value at an index after a branch."""
         if same(a, b):
             return a
         joined = self._symbol(kind_of(a), "join", ())

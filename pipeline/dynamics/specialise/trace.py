@@ -1,7 +1,7 @@
-"""Kernels run in Python on symbols, so that what they compute for one wiring stands on a tape.
+"""Kernels run in Python on symbols, so that what they compute for one wiring is on a tape.
 
-Sizes, offsets and tables of h are numbers, so loops are counted and places known while the tape is written; w and f
-hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it stands, and
+Sizes, offsets and tables of h are numbers, so loops are counted and indices known while the tape is written; w and f
+hold symbols. A branch that depends on a symbol is run both ways, up to the end of the kernel in which it is, and
 what both ways leave is joined. Kernels that are called before the branch are not run again, but what they did is
 repeated.
 """
@@ -23,27 +23,27 @@ FUNCTIONS = ("sqrt", "sin", "cos", "exp", "tanh", "arctan2", "round", "copysign"
 
 
 class Memory:
-    """An array that is read and written by place; what was not written is loaded when the code runs."""
+    """An array that is read and written by index; what was not written is loaded when the code runs."""
 
     def __init__(self, trace: Trace, name: str, kind: str) -> None:
         self.trace, self.name, self.kind = trace, name, kind
         self.values: dict[int, Any] = {}
 
-    def __getitem__(self, place: Any) -> Any:
-        if not isinstance(place, Symbol) and place in self.values:
-            return self.values[place]
-        return self.trace.tape.write(self.kind, "load", self.name, place)
+    def __getitem__(self, index: Any) -> Any:
+        if not isinstance(index, Symbol) and index in self.values:
+            return self.values[index]
+        return self.trace.tape.write(self.kind, "load", self.name, index)
 
-    def __setitem__(self, place: int, value: Any) -> None:
-        self.trace.journal.append((self, place, self.values.get(place), value))
-        self.values[place] = value
+    def __setitem__(self, index: int, value: Any) -> None:
+        self.trace.journal.append((self, index, self.values.get(index), value))
+        self.values[index] = value
 
-    def put_back(self, place: int, value: Any) -> None:
+    def put_back(self, index: int, value: Any) -> None:
         """Undo a store."""
         if value is None:
-            del self.values[place]
+            del self.values[index]
         else:
-            self.values[place] = value
+            self.values[index] = value
 
 
 class Run:
@@ -80,8 +80,8 @@ class Trace:
             caller.done.append((result, self.journal[start:]))
         else:
             result, stores = caller.done[caller.position]
-            for memory, place, _, value in stores:
-                memory[place] = value
+            for memory, index, _, value in stores:
+                memory[index] = value
         caller.position += 1
         return result
 
@@ -100,24 +100,24 @@ class Trace:
         for block, choice in zip(branch.blocks, (True, False), strict=True):
             with self.tape.inside(block):
                 result = self._explored(function, arguments, [*decisions, choice], list(run.done))
-            ways.append((result, {(memory, place): value for memory, place, _, value in self.journal[start:]}))
+            ways.append((result, {(memory, index): value for memory, index, _, value in self.journal[start:]}))
             self._go_back(start)
         return self._joined(branch, *ways)
 
     def _go_back(self, start: int) -> None:
         while len(self.journal) > start:
-            memory, place, before, _ = self.journal.pop()
-            memory.put_back(place, before)
+            memory, index, before, _ = self.journal.pop()
+            memory.put_back(index, before)
 
     def _joined(self, branch: Branch, first: Any, second: Any) -> Any:
         """What a branch leaves: of stores in memory, and its result."""
         self.tape.block.append(branch)
-        for memory, place in dict.fromkeys([*first[1], *second[1]]):
+        for memory, index in dict.fromkeys([*first[1], *second[1]]):
             values = []
             for block, (_, stores) in zip(branch.blocks, (first, second), strict=True):
                 with self.tape.inside(block):
-                    values.append(stores.get((memory, place), memory[place]))
-            memory[place] = self.tape.join(branch, *values)
+                    values.append(stores.get((memory, index), memory[index]))
+            memory[index] = self.tape.join(branch, *values)
         return self._joined_results(branch, first[0], second[0])
 
     def _joined_results(self, branch: Branch, a: Any, b: Any) -> Any:
@@ -128,7 +128,7 @@ class Trace:
     # Kernels as Python --------------------------------------------------------------------------------------------
 
     def plain(self, value: Any) -> Any:
-        """What a kernel refers to, with kernels that run on symbols in the place of compiled ones."""
+        """What a kernel refers to, with kernels that run on symbols instead of compiled ones."""
         if id(value) not in self._plain:
             self._alive.append(value)
             self._plain[id(value)] = self._made_plain(value)
@@ -186,6 +186,6 @@ class _Names:
         self._trace, self._module = trace, module
 
     def __getattr__(self, name: str) -> Any:
-        found = self._trace.plain(getattr(self._module, name))
-        setattr(self, name, found)
-        return found
+        attribute = self._trace.plain(getattr(self._module, name))
+        setattr(self, name, attribute)
+        return attribute

@@ -1,7 +1,7 @@
-"""The wiring of a mechanism as its specialised code depends on it, and what the code keeps apart from it.
+"""The wiring of a mechanism as its specialised code depends on it, and what the code does not depend on.
 
 Sizes and tables of h, without those that only laws of time, error norms and the record read. Where w and f keep what
-is none of it: stretches of arrays are known by their place in the header, so that one code serves every integrator and
+is none of it: stretches of arrays are known by their index in the header, so that one code serves every integrator and
 any number of pieces of laws.
 """
 
@@ -19,9 +19,9 @@ Wiring = tuple[tuple[int, ...], ...]
 #: read by laws of time, error norms and the record alone
 LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS, m.BODIES, m.FRAMES)
 SIZES = m.ADDRESSES[0]
-#: a place is a stretch of an array and where in the stretch; the first stretch is the array itself
+#: an index is a stretch of an array and where in the stretch; the first stretch is the array itself
 STRETCH = 40
-#: stretches of w that are told by an argument: the state and its rates
+#: stretches of w that are reported by an argument: the state and its rates
 STATE, RATES = m.HEADER + 1, m.HEADER + 2
 
 
@@ -39,21 +39,21 @@ def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
 
 
 def header(wired: Wiring) -> list[int]:
-    """The array h of a wiring, with a stretch in the place of every offset in f and w."""
-    h = [*wired[0], *((place + 1) << STRETCH for place in range(SIZES, m.HEADER))]
+    """The array h of a wiring, with a stretch instead of every offset in f and w."""
+    h = [*wired[0], *((index + 1) << STRETCH for index in range(SIZES, m.HEADER))]
     for table, rows in zip(m.TABLES["h"], wired[1:], strict=True):
         h[table.place] = len(h)
         h += rows
     return h
 
 
-def split(place: int) -> tuple[int, int]:
-    """The header's place of a stretch, -1 of an array itself, and where in it."""
-    return (place >> STRETCH) - 1, place & ((1 << STRETCH) - 1)
+def split(index: int) -> tuple[int, int]:
+    """The header's index of a stretch, -1 of an array itself, and where in it."""
+    return (index >> STRETCH) - 1, index & ((1 << STRETCH) - 1)
 
 
 def start(stretch: int) -> int:
-    """The place where a stretch begins."""
+    """The index where a stretch begins."""
     return (stretch + 1) << STRETCH
 
 
@@ -62,7 +62,7 @@ def ground(h: list[int]) -> dict[int, Any]:
     frame, own = h[m.LINK_FRAMES.place], h[m.OWN.place]
     axes = range(frame + m.FRAME.axes, frame + m.FRAME.axes + 9, 4)
     return {
-        **{place: 0.0 for place in range(frame, frame + m.FRAME.size)},
-        **{place: 1.0 for place in axes},
-        **{place: 0.0 for place in range(own, own + m.OWN.size)},
+        **{index: 0.0 for index in range(frame, frame + m.FRAME.size)},
+        **{index: 1.0 for index in axes},
+        **{index: 0.0 for index in range(own, own + m.OWN.size)},
     }

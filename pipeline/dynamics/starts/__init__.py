@@ -2,8 +2,9 @@
 `Start.at`, core/scene/start.
 
 Each module has a function ``begin(scene, bundles, progress) -> (Scene, str)``: the scene with the poses, velocities and
-modal coordinates of that start in the place of what it says itself, and `Mechanism.choice` of what they were found by;
-and ``placed(scene) -> Scene``: the one whose joints and drives place the bodies there, which `flexclear check` builds.
+modal coordinates of that start instead of what it says itself, and `Mechanism.choice` of what they were found by;
+and ``placed(scene) -> Scene``: the one whose joints and drives position the bodies there, which `flexclear check`
+builds.
 """
 
 from typing import get_args

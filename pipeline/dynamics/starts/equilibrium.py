@@ -22,12 +22,12 @@ from flexclear.pipeline.dynamics.starts.snapshot import posed, resting
 def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, str]:
     """The scene at its equilibrium, and how it was assembled; velocities stay as the scene gives them.
 
-    Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium near its poses.
+    Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium close to its poses.
     """
-    bench, rest = equilibrium(placed(scene), bundles, progress, None, None, False)
+    bench, rest = equilibrium(placed(scene), bundles, progress, None, None)
     progress(None, f"begins at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
-    found = resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time), scene.contacts())
-    return found, bench.engine.model.mechanism.choice
+    rest_state = resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time), scene.contacts())
+    return rest_state, bench.engine.model.mechanism.choice
 
 
 def placed(scene: Scene) -> Scene:

@@ -1,8 +1,8 @@
-"""A run with clearance that begins as its ideal twin does: its pose and velocities, pins at rest in their sockets.
+"""A run with clearance that begins as its ideal mechanism does: its pose and velocities, pins at rest in their sockets.
 
-The twin has ideal joints in the place of pins and balls with clearance. The force that such a joint carries at the
+The ideal_scene has ideal joints instead of pins and balls with clearance. The force that such a joint carries at the
 start presses the pin onto one side of its socket, and so deep into it that the contact carries that force. Slots and
-planes have no ideal joint in their place: they stay as they are, and what touches them where the poses put it.
+planes have no ideal counterpart: they stay as they are, and what touches them where the poses put it.
 """
 
 from __future__ import annotations
@@ -30,21 +30,23 @@ from flexclear.pipeline.dynamics.run.run import driven
 from flexclear.pipeline.dynamics.run.start import consistent_start, project, rates_at_speeds
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
-#: a pin is in its place when it is this share of the clearance from it; passes in which that is reached, at most
+#: a pin has its final position when it is this fraction of the clearance from it; passes in which that is reached, at
+#: most
 THERE, PASSES = 1e-9, 20
-#: forces below this share of the weight press nothing: the pin stays in the middle
+#: forces below this fraction of the weight press nothing: the pin stays in the middle
 NOTHING = 1e-9
-#: singular values below this share of the largest are rounding
+#: singular values below this fraction of the largest are rounding
 RANK = 1e-9
 
 
 def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, str]:
-    """The scene as its ideal twin starts, and how that was assembled; one without clearance is its own twin.
+    """The scene as its ideal mechanism starts, and how that was assembled; one without clearance is its own.
 
-    Raises InputError for a twin that cannot be built, SolverError when the pins cannot be put where they are pressed.
+    Raises InputError for an ideal scene that cannot be built, SolverError when the pins cannot be put
+    where they are pressed.
     """
-    twin, t = placed(scene), scene.time.start
-    engine, y = _started(twin, bundles, progress)
+    ideal_scene, t = placed(scene), scene.time.start
+    engine, y = _started(ideal_scene, bundles, progress)
     forces = _forces(scene, engine, y)
     concentric, choice = moving(scene, engine, y, t), engine.model.mechanism.choice
     if not scene.contacts():
@@ -55,7 +57,7 @@ def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -
 
 
 def placed(scene: Scene) -> Scene:
-    """The scene with ideal joints in the place of those that have such a counterpart.
+    """The scene with ideal joints instead of those that have such a counterpart.
 
     Raises InputError where it has contacts, and none of them has one.
     """
@@ -121,7 +123,7 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
 
 
 def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray, bent: np.ndarray) -> np.ndarray:
-    """The state with the pins moved by `offsets` (3 each) [m], and modal coordinates as near to `bent` as that allows.
+    """The state with the pins moved by `offsets` (3 each) [m], and modal coordinates as close to `bent` as that allows.
 
     The least motion alone would bend rods by some of the clearance, and the run begin with the blow of their springing
     back: a stiff one is under kilonewtons then.

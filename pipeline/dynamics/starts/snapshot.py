@@ -33,9 +33,9 @@ def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
         if isinstance(body, Ground):
             bodies[name] = body
             continue
-        place, frame = model.links[i].places[name], frames[i]
-        p = frame["origin"] + frame["axes"] @ place.p + model.mechanism.origin
-        quaternion = matrix_to_quaternion(frame["axes"] @ place.R)
+        placement, frame = model.links[i].places[name], frames[i]
+        p = frame["origin"] + frame["axes"] @ placement.p + model.mechanism.origin
+        quaternion = matrix_to_quaternion(frame["axes"] @ placement.R)
         pose = Pose(position=tuple(_given(p)), quaternion=tuple(_given(quaternion)))
         bodies[name] = body.model_copy(update={"pose": pose})
     given = scene.start.modal if scene.start is not None else {}
@@ -91,5 +91,5 @@ def _begun(scene: Scene, modal: dict[str, ModalStart]) -> Start:
         }
         for joint, coordinates in old.joint.items()
     }
-    kept = {joint: coordinates for joint, coordinates in rates.items() if coordinates}
-    return old.model_copy(update={"at": None, "joint": kept, "modal": modal})
+    nonempty = {joint: coordinates for joint, coordinates in rates.items() if coordinates}
+    return old.model_copy(update={"at": None, "joint": nonempty, "modal": modal})

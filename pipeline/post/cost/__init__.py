@@ -1,1 +1,1 @@
-"""What accuracy costs: errors of many runs of one scene against the best one, beside what each took."""
+"""What accuracy costs: errors of many runs of one scene against the best one, next to what each took."""

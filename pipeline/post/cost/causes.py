@@ -1,4 +1,4 @@
-"""Which cause dominates: the error of the scene as it stands, split by what would have to be refined."""
+"""Which cause dominates: the error of the scene as it is, split by what would have to be refined."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ CAUSES = {
     "sampling of the output": "a shorter output interval",
     "ensemble spread": "more members",
 }
-#: what is told of an error that is infinite
+#: the message about an error that is infinite
 OTHER = "other impacts"
-#: letters that fit beside a bar
+#: letters that fit next to a bar
 LETTERS = 52
 COLORS = ("#332288", "#88CCEE", "#44AA99", "#DDCC77", "#999933", "#AA4499", "#882255")
 
 
-def beside(study: xr.Dataset, split: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
+def with_causes(study: xr.Dataset, split: Mapping[str, Mapping[str, float]]) -> xr.Dataset:
     """A study's dataset with ``error_by_cause(quantity, cause)``, NaN where a scene has no such cause."""
     names = [str(name) for name in study["quantity"].values]
     values = np.array([[split[name].get(cause, np.nan) for cause in CAUSES] for name in names])
-    told = {"units": "1", "long_name": "error of the scene as it stands, as a share of the quantity's size"}
-    return study.assign_coords(cause=list(CAUSES)).assign(error_by_cause=(("quantity", "cause"), values, told))
+    attributes = {"units": "1", "long_name": "error of the scene as it is, as a fraction of the quantity's size"}
+    return study.assign_coords(cause=list(CAUSES)).assign(error_by_cause=(("quantity", "cause"), values, attributes))
 
 
 def table(split: Mapping[str, Mapping[str, float]], title: str) -> Table:
@@ -62,9 +62,9 @@ def dominant(causes: Mapping[str, float]) -> str:
 
 
 def make(name: str, split: Mapping[str, Mapping[str, float]], title: str) -> dict[str, bytes]:
-    """``<name>.png`` and ``.svg``: per quantity the causes stacked, as shares of their sum.
+    """``<name>.png`` and ``.svg``: per quantity the causes stacked, as fractions of their sum.
 
-    Shares show what to refine; the magnitudes stand beside the bars, since causes span many decades.
+    Shares show what to refine; the magnitudes are next to the bars, since causes span many decades.
     """
     with style():
         figure, axes = grid(1, 1, (9.5, 1.6 + 0.55 * len(split)))
@@ -76,12 +76,12 @@ def make(name: str, split: Mapping[str, Mapping[str, float]], title: str) -> dic
         ax.set_xlim(0.0, 1.9)
         ax.grid(visible=False, axis="y")
         ax.set_xticks([0.0, 0.5, 1.0], ["0", "50 %", "100 %"])
-        ax.set_xlabel("share of the sum of all errors", x=0.5 / 1.9)
+        ax.set_xlabel("fraction of the sum of all errors", x=0.5 / 1.9)
         ax.spines["bottom"].set_bounds(0.0, 1.0)
         handles, labels = ax.get_legend_handles_labels()
         unique = dict(zip(labels, handles, strict=True))
         figure.legend(unique.values(), unique.keys(), loc="outside lower center", ncols=4, fontsize=8.2)
-        heading(figure, title, "errors of the scene as it stands, relative to each quantity's size, by their cause")
+        heading(figure, title, "errors of the scene as it is, relative to each quantity's size, by their cause")
         return files(name, figure)
 
 

@@ -20,7 +20,7 @@ Made from the datasets `results/cost/<scene>/cost.nc` by
 
 Nothing on this page is typed in. Errors are the largest differences from a reference
 run over the whole run, or up to the horizon beyond which the motion of the scene cannot be predicted point by point;
-each is a share of the quantity's own size. Times are processor seconds of the integration of warm runs,
+each is a fraction of the quantity's own size. Times are processor seconds of the integration of warm runs,
 without their record, on one core of the machine that made the page: their ratios carry over to others, their values do
 not.
 """
@@ -54,8 +54,8 @@ def sections(scenes: tuple[Studied, ...]) -> str:
 
 def advice(study: xr.Dataset, tables: tuple[str, ...]) -> str:
     """One paragraph: the cheapest way to each accuracy, what a digit costs, how far it holds, what limits the scene."""
-    found = {target: cheapest(study, target) for target in TARGETS}
-    had = {target: choice for target, choice in found.items() if choice is not None}
+    choices = {target: cheapest(study, target) for target in TARGETS}
+    had = {target: choice for target, choice in choices.items() if choice is not None}
     text = "; ".join(f"{target:g} takes {c.name} ({c.evaluations:.0f} evaluations)" for target, c in had.items())
     said = [
         f"{text}." if had else "None of the accuracies asked for can be had for all quantities; see the tables below."
@@ -96,7 +96,7 @@ def _horizon(study: xr.Dataset, tables: tuple[str, ...]) -> str:
 
 
 def _limits(study: xr.Dataset) -> str:
-    """What to refine in the scene as it stands: the causes that dominate, each with its quantities."""
+    """What to refine in the scene as it is: the causes that dominate, each with its quantities."""
     if "error_by_cause" not in study:
         return ""
     by_cause: dict[str, list[str]] = {}
@@ -106,4 +106,4 @@ def _limits(study: xr.Dataset) -> str:
         )
         by_cause.setdefault(cause, []).append(str(name))
     parts = [f"{CAUSES[c]} ({c} limits {', '.join(q)})" for c, q in by_cause.items() if c in CAUSES]
-    return f"To refine the scene as it stands: {'; '.join(parts)}." if parts else ""
+    return f"To refine the scene as it is: {'; '.join(parts)}." if parts else ""

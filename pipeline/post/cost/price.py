@@ -25,14 +25,14 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
     """
     rows = []
     for target in TARGETS:
-        found = cheapest(study, target)
-        if found is None:
-            best = min(_choices(study), key=lambda c: c.error, default=NOTHING)
+        choice = cheapest(study, target)
+        if choice is None:
+            best = min(choices(study), key=lambda c: c.error, default=NOTHING)
             rows.append((f"{target:g}", _absent(study), "–", "–", f"{best.error:.1e} at best", best.worst))
         else:
-            seconds = f"{found.seconds:.3f}"
+            seconds = f"{choice.seconds:.3f}"
             rows.append(
-                (f"{target:g}", found.name, f"{found.evaluations:.0f}", seconds, f"{found.error:.1e}", found.worst)
+                (f"{target:g}", choice.name, f"{choice.evaluations:.0f}", seconds, f"{choice.error:.1e}", choice.worst)
             )
     return Table(title, COLUMNS, tuple(rows), (*_notes(study), *notes))
 
@@ -42,7 +42,7 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
     rows = []
     for name in study["quantity"].values:
         one = study.sel(quantity=[name])
-        best = min(_choices(one), key=lambda c: c.error, default=NOTHING)
+        best = min(choices(one), key=lambda c: c.error, default=NOTHING)
         cells = (_cell(cheapest(one, target), _absent(study)) for target in TARGETS)
         rows.append((str(name), *cells, f"{best.error:.1e}"))
     heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
@@ -62,7 +62,7 @@ def _cell(choice: Choice | None, absent: str) -> str:
 class Choice:
     """One way to integrate: its name, cost, largest relative error and the quantity that has it.
 
-    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be told.
+    error: distance to the reference and the reference's own uncertainty, so that it is not less than can be determined.
     """
 
     name: str
@@ -78,12 +78,13 @@ NOTHING = Choice("–", np.nan, np.nan, np.inf, "no run")
 
 def cheapest(study: xr.Dataset, target: float) -> Choice | None:
     """The choice with the fewest evaluations whose largest error is at most `target`; None if there is none."""
-    good = [choice for choice in _choices(study) if choice.error <= target]
+    good = [choice for choice in choices(study) if choice.error <= target]
     return min(good, key=lambda choice: choice.evaluations, default=None)
 
 
-def _choices(study: xr.Dataset) -> list[Choice]:
-    found = []
+def choices(study: xr.Dataset) -> list[Choice]:
+    """All ways to integrate whose error is known."""
+    choices = []
     unsure = study["reference_uncertainty"].fillna(0.0)
     for group, word in INTEGRATION.items():
         if f"error_by_{group}" not in study:
@@ -98,8 +99,8 @@ def _choices(study: xr.Dataset) -> list[Choice]:
                 worst = str(study["quantity"].values[int(np.argmax(error.values))])
                 evaluations, seconds = float(one[f"evaluations_by_{group}"]), float(one[f"cpu_seconds_by_{group}"])
                 unit = " s" if word == "step" else ""
-                found.append(Choice(f"{m}, {word} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
-    return found
+                choices.append(Choice(f"{m}, {word} {s:g}{unit}", evaluations, seconds, float(error.max()), worst))
+    return choices
 
 
 def _notes(study: xr.Dataset) -> list[str]:
@@ -107,7 +108,7 @@ def _notes(study: xr.Dataset) -> list[str]:
     notes = [
         "The error is the largest of all quantities: "
         + ", ".join(str(q) for q in study["quantity"].values)
-        + "; each as a share of its own size, the reference's uncertainty included.",
+        + "; each as a fraction of its own size, the reference's uncertainty included.",
         _confirmed(study),
     ]
     if recorded == recorded:
@@ -146,7 +147,7 @@ def _confirmed(study: xr.Dataset) -> str:
 def _why_not(study: xr.Dataset) -> str:
     """Whether the settings that were tried end too early, or rounding decides."""
     unsure = study["reference_uncertainty"].fillna(0.0)
-    best = min(_choices(study), key=lambda c: c.error, default=NOTHING)
+    best = min(choices(study), key=lambda c: c.error, default=NOTHING)
     if np.isinf(unsure).any():
         return "the reference and its confirmation do not agree on the number of impacts"
     if best is NOTHING:

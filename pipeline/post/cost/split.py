@@ -1,4 +1,4 @@
-"""The error of a scene as it stands, kept apart by cause: each from a pair of runs that differ in that cause only."""
+"""The error of a scene as it is, separated by cause: each from a pair of runs that differ in that cause only."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ def causes_of(
 ) -> dict[str, float]:
     """Relative error by cause (names of `causes.CAUSES`); NaN where the scene has no such cause.
 
-    located: share of the clearance to which contact events are located.  ensemble: at the tightest tolerance, of a
+    located: fraction of the clearance to which contact events are located.  ensemble: at the tightest tolerance, of a
     scene that has one; its spread is that of the whole run, all other errors are those up to the horizon.
     """
     there = [p for p in points if "refused" not in runs[p.key].attrs]
-    asis = next((runs[p.key] for p in there if p.group == "sampling" and p.key == "as it stands"), None)
+    asis = next((runs[p.key] for p in there if p.group == "sampling" and p.key == "as it is"), None)
     reference = next(runs[p.key] for p in there if p.group == "reference")
     growth = 0.0 if asis is None else float(asis.attrs.get("growth", 0.0))
     until = believed(there, runs)
@@ -57,8 +57,8 @@ Choice = Callable[[Sequence[Point]], Point | None]
 
 
 def _model(points: Sequence[Point], runs: Mapping[str, xr.Dataset], choice: Choice) -> xr.Dataset | None:
-    found = choice(points) if points else None
-    return None if found is None else runs[found.key]
+    chosen = choice(points) if points else None
+    return None if chosen is None else runs[chosen.key]
 
 
 def _own(points: Sequence[Point]) -> Point | None:

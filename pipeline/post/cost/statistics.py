@@ -15,7 +15,7 @@ RESAMPLES = 2000
 SEED = 7
 #: what is asked of a chaotic run, by contact, and its unit
 STATISTICS = {"peak_force": "N", "impact_count": "1", "contact_time_share": "1"}
-#: the smallest part of an ensemble of which a spread is told: resamples of fewer say little
+#: the smallest part of an ensemble of which a spread is reported: resamples of fewer say little
 FEWEST = 8
 LOOKS = (("#0072B2", "o"), ("#E69F00", "s"), ("#009E73", "^"), ("#D55E00", "v"))
 
@@ -38,9 +38,9 @@ def estimate(values: np.ndarray) -> Estimate:
 
 
 def relative_error(values: np.ndarray) -> float:
-    """Half the interval of the mean as a share of the mean; NaN where that is zero."""
-    found = estimate(values)
-    return 0.5 * (found.high - found.low) / abs(found.mean) if found.mean else np.nan
+    """Half the interval of the mean as a fraction of the mean; NaN where that is zero."""
+    mean = estimate(values)
+    return 0.5 * (mean.high - mean.low) / abs(mean.mean) if mean.mean else np.nan
 
 
 def growing(members: int) -> list[int]:
@@ -64,8 +64,8 @@ def make(name: str, ensembles: dict[str, xr.Dataset], title: str) -> dict[str, b
             _panel(ax, contact, statistic, ensembles)
         handles, labels = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=8.4)
-        told = "statistical error of ensemble means (half of the 95 % bootstrap interval), by the number of members; "
-        heading(figure, title, told + "not pointwise")
+        text = "statistical error of ensemble means (half of the 95 % bootstrap interval), by the number of members; "
+        heading(figure, title, text + "not pointwise")
         return files(name, figure)
 
 
@@ -94,10 +94,10 @@ def table(ensembles: dict[str, xr.Dataset], title: str) -> Table:
     for name, ensemble in ensembles.items():
         for contact in ensemble["contact"].values:
             for statistic, unit in STATISTICS.items():
-                found = estimate(ensemble[statistic].sel(contact=contact).values.astype(float))
-                interval = f"{found.low:.4g} to {found.high:.4g}"
+                mean = estimate(ensemble[statistic].sel(contact=contact).values.astype(float))
+                interval = f"{mean.low:.4g} to {mean.high:.4g}"
                 label = f"{contact} {statistic.replace('_', ' ')}" + (f" ({unit})" if unit != "1" else "")
-                rows.append((name, label, f"{found.mean:.4g}", f"{found.deviation:.2g}", interval))
+                rows.append((name, label, f"{mean.mean:.4g}", f"{mean.deviation:.2g}", interval))
     notes = (
         "Statistical errors of ensemble means, not pointwise errors: beyond its horizon a single run is one draw "
         f"out of many. Intervals: 95 %, bootstrap with {RESAMPLES} resamples of the members.",

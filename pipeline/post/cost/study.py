@@ -28,14 +28,14 @@ GROUPS: dict[str, tuple[str, ...]] = {
 #: the reference must agree with its independent confirmation this many times better than an error it measures
 MARGIN = 10.0
 LONG_NAMES = {
-    "error": "largest error up to the horizon, as a share of the quantity's size",
-    "distance": "largest distance from the scene's own run up to the horizon, as a share of the quantity's size",
+    "error": "largest error up to the horizon, as a fraction of the quantity's size",
+    "distance": "largest distance from the scene's own run up to the horizon, as a fraction of the quantity's size",
     "cpu_seconds": "processor time of the integration of a warm run, median of the repeats",
     "recording_seconds": "processor time of its record: rows and dataset",
     "cpu_spread": "largest minus smallest processor time of the repeats",
     "evaluations": "right-hand sides evaluated",
     "peak_memory": "largest resident memory of the process that made the run",
-    "own_error": "error of the scene's own run, the reference's uncertainty included, as a share of the size",
+    "own_error": "error of the scene's own run, the reference's uncertainty included, as a fraction of the size",
     "compile_seconds": "time to build and fetch or compile the kernels, not part of the run",
 }
 UNITS = {
@@ -81,14 +81,14 @@ def with_reference(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chos
     def apart(point: Point) -> float:
         return max(relative_errors(runs[point.key], reference, chosen, until).values(), default=0.0)
 
-    found = [*points, Point(best.key, "reference", {})]
-    return found + [Point(p.key, "confirmation", {}) for p in sorted(others, key=apart)[:1]]
+    result = [*points, Point(best.key, "reference", {})]
+    return result + [Point(p.key, "confirmation", {}) for p in sorted(others, key=apart)[:1]]
 
 
 def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> xr.Dataset:
     """The study's dataset; `runs` holds what each point left, by key.
 
-    A run that was refused has no values: its place is NaN and its reason stands in `refused`.
+    A run that was refused has no values: its entry is NaN and its reason is in `refused`.
     Raises SolverError when that is the reference.
     """
     reference = runs[next(p.key for p in points if p.group == "reference")]
@@ -108,7 +108,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     def errors(run: xr.Dataset, other: xr.Dataset = reference) -> np.ndarray:
         return np.array(list(relative_errors(run, other, chosen, until).values()))
 
-    asis = next((runs[p.key] for p in points if p.key == "as it stands"), None)
+    asis = next((runs[p.key] for p in points if p.key == "as it is"), None)
     confirmations = [runs[p.key] for p in points if p.group == "confirmation"]
     confirmed = [errors(run) for run in confirmations if "refused" not in run.attrs]
     floor = np.max(confirmed, axis=0) if confirmed else np.full(len(chosen), np.nan)
@@ -136,8 +136,8 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
 
 def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
     """Whether an error is so large that the reference can measure it; same shape as ``error_by_<group>``."""
-    found: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
-    return found
+    mask: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
+    return mask
 
 
 def _reason(refused: xr.Dataset) -> str:
@@ -163,14 +163,14 @@ def _span(
     costs = {name: np.full(shape, np.nan) for name in COSTS}
     for point in points:
         run = runs[point.key]
-        place = tuple(values[factor].index(point.factors[factor]) for factor in factors)
+        index = tuple(values[factor].index(point.factors[factor]) for factor in factors)
         if "refused" in run.attrs:
             continue
-        error[place] = errors(run)
+        error[index] = errors(run)
         if asis is not None:
-            distance[place] = errors(run, asis)
+            distance[index] = errors(run, asis)
         for name in COSTS:
-            costs[name][place] = cost(run, name)
+            costs[name][index] = cost(run, name)
     coordinates |= values
     data[f"error_by_{group}"] = ((*factors, "quantity"), error)
     data[f"distance_by_{group}"] = ((*factors, "quantity"), distance)
@@ -189,16 +189,16 @@ def cost(run: xr.Dataset, name: str) -> float:
 
 def recording(study: xr.Dataset) -> float:
     """Processor time of the record of one run [s]: of as many rows whatever the integration took, so one median."""
-    found = [study[f"recording_seconds_by_{group}"].values.ravel() for group in ("tolerance", "step")
+    times = [study[f"recording_seconds_by_{group}"].values.ravel() for group in ("tolerance", "step")
              if f"recording_seconds_by_{group}" in study]  # fmt: skip
-    values = np.concatenate([*found, [np.nan]])
+    values = np.concatenate([*times, [np.nan]])
     return float(np.nanmedian(values)) if np.isfinite(values).any() else float("nan")
 
 
 def relative_errors(
     run: xr.Dataset, reference: xr.Dataset, chosen: Sequence[Quantity], until: float
 ) -> dict[str, float]:
-    """Largest error up to a time [s] as a share of the quantity's size, by name."""
+    """Largest error up to a time [s] as a fraction of the quantity's size, by name."""
     return {
         q.name: relative(quantities.error(run, reference, q, until), quantities.scale(reference, q)) for q in chosen
     }
@@ -213,7 +213,7 @@ def believed(points: Sequence[Point], runs: Mapping[str, xr.Dataset]) -> float:
 
 
 def relative(error: float, scale: float) -> float:
-    """An error as a share of a size; the error itself where there is no size."""
+    """An error as a fraction of a size; the error itself where there is no size."""
     return error / scale if scale > 0.0 else error
 
 

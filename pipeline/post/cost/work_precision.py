@@ -26,12 +26,12 @@ COLUMNS = 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curve:
-    """One integrator over its settings: cost [s], relative errors (setting, quantity), and which can be told."""
+    """One integrator over its settings: cost [s], relative errors (setting, quantity), and which can be determined."""
 
     name: str
     seconds: np.ndarray
     error: np.ndarray
-    told: np.ndarray
+    resolved: np.ndarray
     note: str = ""
 
 
@@ -49,58 +49,58 @@ def make(
 ) -> dict[str, bytes]:
     """``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
     chosen = [str(q) for q in study["quantity"].values]
-    found = curves(study)
+    drawn = curves(study)
     rows, recorded = -(-len(chosen) // COLUMNS), recording(study)
     with style():
         figure, axes = grid(rows, COLUMNS, (10.5, 1.1 + 2.7 * rows))
         for k, ax in enumerate(axes.ravel()):
             if k < len(chosen):
                 bound = MARGIN * float(study["reference_uncertainty"].values[k])
-                _panel(ax, chosen[k], k, (found, others), marks, bound)
+                _panel(ax, chosen[k], k, (drawn, others), marks, bound)
                 _mark_recording(ax, recorded)
             else:
                 ax.set_visible(False)
-        _legend(figure, found, others, marks)
+        _legend(figure, drawn, others, marks)
         heading(figure, title, _subtitle(study))
         return files(name, figure)
 
 
 def curves(study: xr.Dataset) -> list[Curve]:
     """All integrators of a study, those with a tolerance and those with a step."""
-    found = []
+    lines = []
     for group in ("tolerance", "step"):
         if f"error_by_{group}" not in study:
             continue
         method = GROUPS[group][0]
-        told = resolved(study, group)
+        shown = resolved(study, group)
         for m in study[method].values:
             seconds = study[f"cpu_seconds_by_{group}"].sel({method: m}).values
             error = study[f"error_by_{group}"].sel({method: m}).values
-            found.append(Curve(str(m), seconds, error, told.sel({method: m}).values))
-    return found
+            lines.append(Curve(str(m), seconds, error, shown.sel({method: m}).values))
+    return lines
 
 
 def pareto(seconds: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Indices of the points that no other beats in both cost and error, by rising cost; NaN never wins."""
-    best, kept = np.inf, []
+    best, front = np.inf, []
     for k in np.lexsort((error, seconds)):
         if np.isfinite(seconds[k]) and np.isfinite(error[k]) and error[k] < best:
             best = error[k]
-            kept.append(int(k))
-    return np.array(kept, dtype=int)
+            front.append(int(k))
+    return np.array(front, dtype=int)
 
 
 def peers(study: xr.Dataset, tracks: Sequence[Mapping[str, Any]]) -> list[Curve]:
     """Curves of another program's runs. tracks: name, note, seconds [s] and errors [SI] by quantity."""
-    found = []
+    lines = []
     for track in tracks:
         seconds = np.array(track["seconds"], dtype=float)
         error = np.full((len(seconds), study.sizes["quantity"]), np.nan)
         for k, name in enumerate(study["quantity"].values):
             if str(name) in track["error"]:
                 error[:, k] = np.array(track["error"][str(name)], dtype=float) / float(study["scale"][k])
-        found.append(Curve(track["name"], seconds, error, np.isfinite(error), track["note"]))
-    return found
+        lines.append(Curve(track["name"], seconds, error, np.isfinite(error), track["note"]))
+    return lines
 
 
 def _panel(
@@ -111,14 +111,14 @@ def _panel(
     marks: tuple[Mark, ...],
     bound: float,
 ) -> None:
-    """One quantity. curves_of: ours, and others'. bound: error below which the reference tells nothing."""
-    found, others = curves_of
-    for curve in (*found, *others):
+    """One quantity. curves_of: ours, and others'. bound: error below which the reference says nothing."""
+    own, others = curves_of
+    for curve in (*own, *others):
         color, mark = look(curve, others)
-        pick = np.isfinite(curve.error[:, k]) & curve.told[:, k]
+        pick = np.isfinite(curve.error[:, k]) & curve.resolved[:, k]
         ax.plot(curve.seconds[pick], curve.error[pick, k], mark, color=color, linewidth=1.0, markersize=4.5, ls="-")
-    seconds = np.concatenate([c.seconds for c in found])
-    error = np.concatenate([np.where(c.told[:, k], c.error[:, k], np.nan) for c in found])
+    seconds = np.concatenate([c.seconds for c in own])
+    error = np.concatenate([np.where(c.resolved[:, k], c.error[:, k], np.nan) for c in own])
     front = pareto(seconds, error)
     ax.plot(seconds[front], error[front], color=INK, linewidth=3.0, alpha=0.18, zorder=0)
     for m in marks:
@@ -132,9 +132,9 @@ def _panel(
     ax.set(xscale="log", yscale="log", title=name)
     plain(ax.xaxis)
     if np.isinf(bound):
-        told = "cannot be told: reference and\nconfirmation have other impacts"
+        text = "cannot be determined: reference and\nconfirmation have other impacts"
         ax.set(yscale="linear", yticks=[])  # there is nothing to scale
-        ax.text(0.5, 0.5, told, transform=ax.transAxes, ha="center", va="center", fontsize=7.5, color=INK)
+        ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", fontsize=7.5, color=INK)
     elif bound > 0.0:
         ax.axhspan(0.3 * bound, bound, color=GRID, zorder=0)
         ax.set_ylim(bottom=0.3 * bound)
@@ -155,13 +155,13 @@ def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
     return SOFT, "xd+*"[list(others).index(curve) % 4] if curve in others else "x"
 
 
-def _legend(figure: object, found: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
+def _legend(figure: object, own: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
     handles: list[Artist] = []
-    for curve in (*found, *others):
+    for curve in (*own, *others):
         color, mark = look(curve, others)
         handles.append(Line2D([], [], color=color, marker=mark, label=curve.name))
     handles.append(Line2D([], [], color=INK, linewidth=3.0, alpha=0.18, label="Pareto front"))
-    handles.append(Patch(color=GRID, label="cannot be told"))
+    handles.append(Patch(color=GRID, label="cannot be determined"))
     handles.append(Line2D([], [], color=SOFT, linewidth=0.9, linestyle=":", label="recording, the same for all"))
     if marks:
         handles.append(Line2D([], [], color=INK, marker="*", linestyle="none", label="marked single runs"))
@@ -171,5 +171,5 @@ def _legend(figure: object, found: list[Curve], others: Sequence[Curve], marks: 
 def _subtitle(study: xr.Dataset) -> str:
     horizon = study.attrs["horizon"]
     span = "over the whole run" if horizon == "none" else f"up to the horizon, t = {horizon:.4g} s"
-    told = f"shaded: less than {MARGIN:g} times what the reference and its confirmation differ by"
-    return f"errors {span}, relative to each quantity's size; {told}"
+    text = f"shaded: less than {MARGIN:g} times what the reference and its confirmation differ by"
+    return f"errors {span}, relative to each quantity's size; {text}"

@@ -1,7 +1,7 @@
 """The paper's figures and tables. To add one: a module here with NEEDS and make, and a line below.
 
 ``NEEDS``: references of the artifacts it reads, ``<scene>:<artifact>[/<body>]``; a literal.
-They are kept in an index (`stages.figure`), since asking the modules takes the import of the plotting libraries.
+They are listed in an index (`stages.figure`), since asking the modules takes the import of the plotting libraries.
 ``make(data)``: artifacts by reference -> file contents by file name.
 """
 

@@ -17,7 +17,7 @@ LEGS = (1, 2, 3, 4)
 TOWARDS, UP = np.array([0.75, -1.35, 0.55]), np.array([0.0, 0.0, 1.0])
 #: radii of the parts that Table 1 decodes into [m]
 CYLINDER, ROD, BALL = 0.02, 0.01, 0.02
-#: where the legs' names stand beside the middle of their cylinders on the paper [m]
+#: where the legs' names are next to the middle of their cylinders on the paper [m]
 LABELS = {1: (0.07, 0.0), 2: (-0.065, 0.0), 3: (-0.055, 0.04), 4: (-0.07, 0.0)}
 STEEL, ALUMINIUM, PLATE, BASE = "#5b7fa6", "#b9c2cc", "#c9a66b", "#dfe5ec"
 
@@ -47,9 +47,9 @@ def plate(run: xr.Dataset) -> np.ndarray:
 
     Table 1's moments are those of a square plate 200 x 200 x 1 mm about its centre: m a^2/6 about the normal.
     """
-    told = parameters(run)["body"]["platform"]
-    inertia = np.array(told["inertia"])
-    half = 0.5 * np.sqrt(6.0 * inertia.max() / told["mass"])
+    platform = parameters(run)["body"]["platform"]
+    inertia = np.array(platform["inertia"])
+    half = 0.5 * np.sqrt(6.0 * inertia.max() / platform["mass"])
     around = half * np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0], [1, 1, 0]])
     return around + run.position.sel(body="platform").values[0]
 
@@ -67,7 +67,7 @@ def _mechanism(axes: Axes, seen: View, at: dict[str, np.ndarray], corners: np.nd
         clear = f"A{k}" == JOINT
         _ball(axes, seen, at[f"platform.A{k}"], CSJ.color if clear else "#3b4754", 8.0)
         _name(axes, seen, at[f"platform.A{k}"], f"A{k}" + (" (clearance)" if clear else ""), (0.012, 0.024))
-        # B3 is behind leg 2, and its name beside that
+        # B3 is behind leg 2, and its name next to that
         _name(axes, seen, at[f"ground.B{k}"], f"B{k}", (0.052, 0.0) if k == 3 else (0.018, -0.036))
     _ball(axes, seen, at["platform.C"], "#3b4754", 8.0)
     _name(axes, seen, at["platform.C"], "C", (0.012, 0.022))
@@ -108,8 +108,8 @@ def _centre(axes: Axes, seen: View, at: dict[str, np.ndarray], zorder: float) ->
 
 def _ball(axes: Axes, seen: View, centre: np.ndarray, color: str, zorder: float) -> None:
     turn = np.linspace(0.0, 2.0 * np.pi, 61)
-    place = seen.project(centre)
-    axes.fill(place[0] + BALL * np.cos(turn), place[1] + BALL * np.sin(turn), color=color, lw=0, zorder=zorder)
+    point = seen.project(centre)
+    axes.fill(point[0] + BALL * np.cos(turn), point[1] + BALL * np.sin(turn), color=color, lw=0, zorder=zorder)
 
 
 def _name(axes: Axes, seen: View, point: np.ndarray, text: str, shift: tuple[float, float]) -> None:
@@ -128,10 +128,10 @@ def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> N
         axes.plot(*foot[:2], "s", color="#3b4754", ms=7)
         axes.plot(*top[:2], "o", color=CSJ.color if f"A{k}" == JOINT else "#3b4754", ms=8)
         up = 1.0 if foot[1] > 0.0 else -1.0
-        for place, name, way in ((foot, f"B{k}", up), (top, f"A{k}", -up)):
-            text = f"{name}\n({place[0]:.1f}, {place[1]:.1f})"
+        for point, name, way in ((foot, f"B{k}", up), (top, f"A{k}", -up)):
+            text = f"{name}\n({point[0]:.1f}, {point[1]:.1f})"
             axes.annotate(
-                text, (place[0], place[1]), (0.0, 8.0 * way), textcoords="offset points", ha="center",
+                text, (point[0], point[1]), (0.0, 8.0 * way), textcoords="offset points", ha="center",
                 va="bottom" if way > 0.0 else "top", fontsize=8.2,
             )  # fmt: skip
     axes.plot(0.0, 0.0, "o", color="#3b4754", ms=8)

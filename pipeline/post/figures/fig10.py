@@ -1,4 +1,4 @@
-"""Figure 10: how the dynamics are computed, beside the paper's steps 1 to 9."""
+"""Figure 10: how the dynamics are computed, next to the paper's steps 1 to 9."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ NEEDS = ("sps4/far_csj_cb:run",)
 STRUCTURE = (
     ("recipe → mesh of beam elements", ""),
     ("modes under a reference condition,\nstatic shapes", "1"),
-    ("inertia invariants and stiffness\nof the modes, kept in a bundle", "1"),
+    ("inertia invariants and stiffness\nof the modes, stored in a bundle", "1"),
 )
 START = (
     ("joints → tree and closures,\nrigidly joined bodies merged", "2"),
@@ -32,7 +32,7 @@ BLUE, GREEN, ORANGE = "#0072B2", "#009E73", "#E69F00"
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig10.png and fig10.svg, with the counts of the paper's full model."""
-    told = data[f"{FAR_CSJ_CB.scene}:run"].attrs
+    attributes = data[f"{FAR_CSJ_CB.scene}:run"].attrs
     with style.style():
         figure, axes = style.grid(1, 3, (12.0, 6.2))
         for panel, boxes, color, title in zip(
@@ -49,8 +49,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
             figure,
             "Figure 10: contacts end steps where they begin and end; "
             "the paper looks at them at the ends of steps of 10 µs",
-            f"beside the boxes: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {told['steps']} steps, "
-            f"{told['evaluations']} evaluations, {told['projections']} projections",
+            f"next to the boxes: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {attributes['steps']} steps, "
+            f"{attributes['evaluations']} evaluations, {attributes['projections']} projections",
         )
         return style.files("fig10", figure)
 
@@ -65,8 +65,8 @@ def _column(axes: Axes, boxes: tuple[tuple[str, str], ...], color: str) -> None:
             bbox={"boxstyle": "round,pad=0.55", "fc": "white", "ec": color, "lw": 1.5},
         )  # fmt: skip
         if step:
-            told = f"step {step}" if step.isdigit() else f"steps {step}"
-            axes.text(0.0, y, told, ha="left", va="center", fontsize=7.2, color=color, fontweight="bold")
+            message = f"step {step}" if step.isdigit() else f"steps {step}"
+            axes.text(0.0, y, message, ha="left", va="center", fontsize=7.2, color=color, fontweight="bold")
         if k + 1 < len(boxes):
             axes.annotate(
                 "", (0.47, y - height + 0.062), (0.47, y - 0.062),

@@ -39,5 +39,5 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
 
 
 def _little(micrometres: float) -> str:
-    """A size, or that there is none beside rounding."""
+    """A size, or that there is none next to rounding."""
     return f"{micrometres:.1g} µm" if micrometres > 1e-6 else "nothing"

@@ -11,9 +11,9 @@ from flexclear.pipeline.core.quantities import common_times
 from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
 from flexclear.pipeline.post.models import BALL_FRAME, IDEAL, JOINT, PLATFORM, Model
 
-#: two answers differ by more than this share, and those of two ensembles also by this many standard deviations of the
-#: members
-SLIGHT, APART = 0.1, 2.0
+#: two answers differ by more than this fraction, and those of two ensembles also by this many standard deviations of
+#: the members
+SLIGHT, SEPARATION = 0.1, 2.0
 #: artifacts by reference, such as ``sps4/csj:run``
 Data = Mapping[str, xr.Dataset]
 
@@ -40,7 +40,7 @@ def sizes(data: Data, ideal_model: Model = IDEAL) -> Deviation:
 def effects(data: Data, model: Model) -> dict[str, float]:
     """Largest differences from the ideal model, that of the force at A1 [N] among them."""
     most = moved(data, model)
-    newtons = float(np.linalg.norm(apart(data, model, force), axis=1).max())
+    newtons = float(np.linalg.norm(difference(data, model, force), axis=1).max())
     return {"angle": most.angle, "displacement": most.displacement, "velocity": most.velocity, "force": newtons}
 
 
@@ -59,7 +59,7 @@ def acceleration(data: Data, model: Model) -> float:
     return float(data[f"{model.scene}:post"].peak_acceleration.sel(body=PLATFORM, axis="z"))
 
 
-def apart(data: Data, model: Model, of: Callable[[xr.Dataset], np.ndarray]) -> np.ndarray:
+def difference(data: Data, model: Model, of: Callable[[xr.Dataset], np.ndarray]) -> np.ndarray:
     """Sizes of the differences from the ideal model at the outputs that both have."""
     run, ideal = data[f"{model.scene}:run"], data[f"{IDEAL.scene}:run"]
     i, j = common_times(run.time.values, ideal.time.values)
@@ -87,7 +87,7 @@ def force(run: xr.Dataset) -> np.ndarray:
 def differ(a: np.ndarray, b: np.ndarray) -> bool:
     """Whether the means of two ensembles' members do, by `SLIGHT` and by `APART`."""
     gap, spread = abs(a.mean() - b.mean()), max(a.std(ddof=1), b.std(ddof=1))
-    return bool(gap > SLIGHT * abs(b.mean()) and gap > APART * spread)
+    return bool(gap > SLIGHT * abs(b.mean()) and gap > SEPARATION * spread)
 
 
 def mode_set(model: Model) -> str:

@@ -13,8 +13,8 @@ from flexclear.pipeline.post.plotting.drawing import View, shell, triad, view
 from flexclear.pipeline.post.rod_shape import scale_to, surface
 
 COUNT = 4
-#: drawn size of the largest displacement, as a share of the body's length
-SHARE = 0.16
+#: drawn size of the largest displacement, as a fraction of the body's length
+FRACTION = 0.16
 #: of the pictures [m]
 MARGIN = 0.008
 #: the rod lies across the picture, seen from above and in front; both planes of bending are seen
@@ -47,7 +47,7 @@ def make(name: str, finding: str, bundle: xr.Dataset, printed: tuple[float, ...]
         style.heading(
             figure,
             finding,
-            "mass-normalised shapes of the round section (in kg$^{-1/2}$) times the factor beside each; grey: "
+            "mass-normalised shapes of the round section (in kg$^{-1/2}$) times the factor next to each; grey: "
             "undeformed",
         )
         return style.files(name, figure)
@@ -61,7 +61,7 @@ def _shape(axes: Axes, seen: View, bundle: xr.Dataset, mode: int) -> tuple[float
     q = np.zeros(bundle.sizes["mode"])
     ghost, _ = surface(bundle, q)
     q[mode] = 1.0
-    factor = scale_to(bundle, q, SHARE)
+    factor = scale_to(bundle, q, FRACTION)
     rings, size = surface(bundle, q, factor)
     shell(axes, seen, ghost, None, alpha=0.22, antialiased=False, zorder=1)
     shell(axes, seen, rings, size / max(float(size.max()), 1e-300), zorder=2)

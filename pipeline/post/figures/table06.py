@@ -15,8 +15,8 @@ NEEDS = ("sps4/csj:run",)
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """table06.csv and table06.md."""
     run = data[f"{CSJ.scene}:run"]
-    told = parameters(run)
-    joint, solver = told["joint"][JOINT], told.get("solver", {})
+    given = parameters(run)
+    joint, solver = given["joint"][JOINT], given.get("solver", {})
     friction = joint["friction"]
     steps = run.attrs.get("steps", 0)
     chosen = f"chosen by the tolerance: {steps} steps in the CSJ run" if steps else "chosen by the tolerance"

@@ -54,7 +54,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         notes.append(
             "Fixed-fixed normal modes vanish at both ends of the rod. With the joints at the end nodes the rod "
             "then cannot lengthen between "
-            "its joints and the platform moves exactly as with a rigid rod, however many such modes are kept; "
+            "its joints and the platform moves exactly as with a rigid rod, however many such modes are retained; "
             "the paper's non-zero errors need "
             "a joint elsewhere on the rod, which it does not place, or other sources of error."
         )
@@ -73,7 +73,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
 
 
 def _contradiction(ours: Deviation) -> str:
-    """The paper's two rows beside what a change of leg 1's length can do."""
+    """The paper's two rows next to what a change of leg 1's length can do."""
     printed = TABLE7["free-free"]
     return (
         f"The paper's two rows contradict each other: {printed.angle:.3g} rad with {printed.displacement:.3g} mm is "

@@ -70,12 +70,12 @@ def _pair(data: dict[str, xr.Dataset], model: Model, ideal: Model) -> tuple[Devi
 
 
 def _velocity(ours: Deviation, first: Deviation) -> str:
-    """The row that is a prediction, beside what the layout predicted that was assumed before."""
-    found, before = 1e3 * ours.velocity / TABLE8.velocity, 1e3 * first.velocity / TABLE8.velocity
+    """The row that is a prediction, next to what the layout predicted that was assumed before."""
+    ratio, before = 1e3 * ours.velocity / TABLE8.velocity, 1e3 * first.velocity / TABLE8.velocity
     missed = 1e3 * first.displacement / TABLE8.displacement
-    agrees = 1.0 / VELOCITY < found < VELOCITY
+    agrees = 1.0 / VELOCITY < ratio < VELOCITY
     return (
-        f"The velocity is a prediction{'' if agrees else ', and the paper contradicts it'}: it is {found:.2g} times "
+        f"The velocity is a prediction{'' if agrees else ', and the paper contradicts it'}: it is {ratio:.2g} times "
         f"the printed one. The first layout, which was assumed before, has {before:.2g} times the printed velocity and "
         f"{missed:.2g} times the printed displacement. What restitution, gravity and the start of the ball change is "
         "in [geometry.md](geometry.md)."

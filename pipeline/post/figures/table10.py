@@ -46,7 +46,7 @@ def _row(timing: xr.Dataset, name: str) -> tuple[str, ...]:
 
 
 def _steps(timing: xr.Dataset, name: str, reading: str = "tolerance") -> float:
-    """Steps at the paper's tolerance over the ideal model's. reading: a share of the stroke, or of the `size`."""
+    """Steps at the paper's tolerance over the ideal model's. reading: a fraction of the stroke, or of the `size`."""
     steps = timing[f"{reading}_steps"]
     return float(steps.sel(scene=name) / steps.sel(scene=REFERENCE))
 
@@ -85,29 +85,29 @@ def _ratio(timing: xr.Dataset, way: str, name: str) -> str:
 def ratios(timing: xr.Dataset, way: str) -> dict[str, float]:
     """CPU time of the integration over the ideal model's, of the models that the paper's table has."""
     base = made(timing[f"{way}_integration_seconds"].sel(scene=REFERENCE))
-    found = {}
+    by_scene = {}
     for scene in TABLE10:
         own = made(timing[f"{way}_integration_seconds"].sel(scene=scene)) if scene in timing.scene.values else base[:0]
         if scene != REFERENCE and own.size and base.size:
-            found[scene] = float(np.median(own) / np.median(base))
-    return found
+            by_scene[scene] = float(np.median(own) / np.median(base))
+    return by_scene
 
 
 def _notes(timing: xr.Dataset) -> tuple[str, ...]:
-    told = timing.attrs
+    facts = timing.attrs
     notes = [
         "Times are processor time of the integration alone; recording (evaluating the rows of the output, and the "
-        "dataset) costs the same whatever the way, stands in a column of its own and is in no ratio. Medians of warm "
-        "repeats in one process, beside other work of the machine, ± half their range; a ratio's "
+        "dataset) costs the same whatever the way, is in a column of its own and is in no ratio. Medians of warm "
+        "repeats in one process, with other programs running, ± half their range; a ratio's "
         "± is half of what the ranges of both times leave it.",
         f"Equal error: each model runs at the tolerance that gives the platform's velocity a relative error of "
-        f"{told['equal_error']:g} at most over the first {100 * told['share']:.0f} % of the stroke, where all models "
+        f"{facts['equal_error']:g} at most over the first {100 * facts['share']:.0f} % of the stroke, where all models "
         "can be predicted point by point (the smooth ideal stroke has far less at any tolerance); one whose energy "
         "ledger does not close at it, at the next decade at which it does. "
-        f"Paper's step: a predictor-corrector at Table 6's step of {told['step']:g} s, contacts noticed at the ends of "
-        f"steps, whatever the error. Paper's tolerance: {told['damped']}, a damped implicit method of variable "
-        "step, at "
-        f"Table 6's integration tolerance of {1e3 * told['tolerance']:g} mm as a share of the drives' stroke "
+        f"Paper's step: a predictor-corrector at Table 6's step of {facts['step']:g} s, contacts noticed at "
+        f"the ends of steps, whatever the error. Paper's tolerance: {facts['damped']}, a damped implicit method of "
+        f"variable step, at Table 6's integration tolerance of {1e3 * facts['tolerance']:g} mm as a fraction of the "
+        "drives' stroke "
         f"(rtol {float(timing.tolerance_rtol.median()):.1e}), whatever becomes of the energy (up to "
         f"{float(timing.tolerance_energy_error.max()):.1g} J).",
         *(_verdict(timing, way) for way in WAYS),
@@ -117,18 +117,18 @@ def _notes(timing: xr.Dataset) -> tuple[str, ...]:
         "steps, the fastest mode of a flexible rod limits the step of an explicit method even where nothing happens, "
         "and every impact is located and resolved.",
     ]
-    if told["refused"]:
-        notes += [f"What could not be integrated: {told['refused']}.", _unstable(float(told["step"]))]
+    if facts["refused"]:
+        notes += [f"What could not be integrated: {facts['refused']}.", _unstable(float(facts["step"]))]
     return tuple(notes)
 
 
 def _unstable(step: float) -> str:
     """Why a predictor-corrector at the paper's step is no way to integrate a rod that rings undamped."""
     highest, steps = max(TABLE4_NORMAL_MODE), TABLE6["time_span"] / step
-    share = growth(2.0 * np.pi * highest * step) - 1.0
+    more = growth(2.0 * np.pi * highest * step) - 1.0
     return (
         f"At {step:g} s the predictor-corrector makes an undamped vibration of {1e-3 * highest:.3g} kHz, the sixth of "
-        f"Table 4, larger by {100.0 * share:.2g} % in each step: by a factor of 1e{steps * np.log10(1.0 + share):.0f} "
+        f"Table 4, larger by {100.0 * more:.2g} % in each step: by a factor of 1e{steps * np.log10(1.0 + more):.0f} "
         "over the stroke. So it is the method that ends runs of a flexible rod at this step, whatever the reason given."
     )
 
@@ -148,26 +148,26 @@ def growth(angle: float) -> float:
 
 def _verdict(timing: xr.Dataset, way: str) -> str:
     """Our ratios by one way against the paper's, as one range."""
-    found = {scene: ratio / TABLE10[scene] for scene, ratio in ratios(timing, way).items()}
-    if not found:
+    deviations = {scene: ratio / TABLE10[scene] for scene, ratio in ratios(timing, way).items()}
+    if not deviations:
         return f"{WAYS[way].capitalize()}: no model of the paper's table besides the ideal one could be timed."
-    least, most = min(found, key=found.__getitem__), max(found, key=found.__getitem__)
+    least, most = min(deviations, key=deviations.__getitem__), max(deviations, key=deviations.__getitem__)
     return (
         f"{WAYS[way].capitalize()}: our ratios are "
-        f"{rounded(found[least], 2)} ({least}) to {rounded(found[most], 2)} ({most}) "
+        f"{rounded(deviations[least], 2)} ({least}) to {rounded(deviations[most], 2)} ({most}) "
         "times the paper's."
     )
 
 
 def _which(timing: xr.Dataset) -> str:
     """Which of the paper's ratios come out of counting the steps of a damped method at its tolerance."""
-    found = {s: _steps(timing, s) for s in TABLE10 if s in timing.scene.values and s != REFERENCE}
-    told = ", ".join(f"{scene} {_number(ratio)} (paper {TABLE10[scene]:g})" for scene, ratio in found.items())
-    near = [s for s, ratio in found.items() if 1.0 / NEAR < ratio / TABLE10[s] < NEAR]
-    other = ", ".join(f"{scene} {_number(_steps(timing, scene, 'size'))}" for scene in found)
+    steps = {s: _steps(timing, s) for s in TABLE10 if s in timing.scene.values and s != REFERENCE}
+    text = ", ".join(f"{scene} {_number(ratio)} (paper {TABLE10[scene]:g})" for scene, ratio in steps.items())
+    similar = [s for s, ratio in steps.items() if 1.0 / NEAR < ratio / TABLE10[s] < NEAR]
+    other = ", ".join(f"{scene} {_number(_steps(timing, scene, 'size'))}" for scene in steps)
     return (
-        f"Steps at the paper's tolerance over the ideal model's: {told}. Within a factor of {NEAR:g} of the paper's "
-        f"ratio: {', '.join(near) or 'none'}. Read as a share of the mechanism's size (rtol "
+        f"Steps at the paper's tolerance over the ideal model's: {text}. Within a factor of {NEAR:g} of the paper's "
+        f"ratio: {', '.join(similar) or 'none'}. Read as a fraction of the mechanism's size (rtol "
         f"{float(timing.size_rtol.median()):.1e}) the same tolerance gives {other}: where the method begins to follow "
         "the rod's vibrations, these ratios are a matter of the reading."
     )

@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.paths import TREE
 from flexclear.pipeline.post.figures import measured
-from flexclear.pipeline.post.figures.measured import APART, SLIGHT, Data, apart, mode_set
+from flexclear.pipeline.post.figures.measured import SEPARATION, SLIGHT, Data, difference, mode_set
 from flexclear.pipeline.post.figures.table10 import ratios
 from flexclear.pipeline.post.models import (
     CSJ,
@@ -60,7 +60,7 @@ NEEDS = (
 
 #: verdicts on the repeated stroke, which take two hours and stand in the repository (`make chaos`)
 SECTIONS = TREE / "docs/chaos/verdicts.csv"
-#: an effect that has no influence is below this share; one that is slight, and answers that agree, below SLIGHT
+#: an effect that has no influence is below this fraction; one that is slight, and answers that agree, below SLIGHT
 SMALL = 0.05
 #: a cost agrees with the paper's within this factor
 NEAR = 1.5
@@ -85,11 +85,11 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
         f"Of ensembles the mean over the members, which differ where they do by more than {100 * SLIGHT:g} % and "
-        f"{APART:g} standard deviations. Costs agree within a factor of {NEAR:g}. In brackets: numbers of the layout "
-        "that was assumed before one was identified from Table 8; the verdict is on the others. The prismatic joint is "
+        f"{SEPARATION:g} standard deviations. Costs agree within a factor of {NEAR:g}. In brackets: numbers of the "
+        "layout assumed before one was identified from Table 8; the verdict is on the others. The prismatic joint is "
         "at the rod's lower end here; [reference-conditions.md](reference-conditions.md) judges mode sets at other "
-        "places, over layouts of the mechanism, and against the full rod, [chaos.md](chaos.md) the motion under a "
-        "repeated stroke, [geometry.md](geometry.md) what Table 8 tells of the joint coordinates. Tables 4 "
+        "positions, over layouts of the mechanism, and against the full rod, [chaos.md](chaos.md) the motion under a "
+        "repeated stroke, [geometry.md](geometry.md) what Table 8 says of the joint coordinates. Tables 4 "
         "and 5 have verdicts of their own below them.",
     )
     return files("table_verdicts", Table("Verdicts on the paper's statements (added)", HEADS, rows, notes))
@@ -103,37 +103,41 @@ def _verdict(*tests: bool) -> str:
 
 
 def _same_motion(data: Data) -> Outcome:
-    own, shares = measured.sizes(data), []
+    own, fractions = measured.sizes(data), []
     for model in FAR:
         moved = measured.moved(data, model)
-        shares.append(
+        fractions.append(
             max(moved.angle / own.angle, moved.displacement / own.displacement, moved.velocity / own.velocity)
         )
     return _verdict(
-        *(s < SMALL for s in shares)
-    ), f"angle, displacement and velocity change by {100 * max(shares):.1g} % of their largest values at most"
+        *(s < SMALL for s in fractions)
+    ), f"angle, displacement and velocity change by {100 * max(fractions):.1g} % of their largest values at most"
 
 
 def _same_acceleration(data: Data) -> Outcome:
     largest = measured.acceleration(data, IDEAL)
-    shares = {model: apart(data, model, measured.vertical).max() / largest for model in FAR}
-    told = ", ".join(f"{100 * share:.2g} % ({mode_set(model)})" for model, share in shares.items() if share > ROUNDING)
-    return _verdict(*(share < SMALL for share in shares.values())), f"it changes by {told or 'nothing'} of the largest"
+    fractions = {model: difference(data, model, measured.vertical).max() / largest for model in FAR}
+    text = ", ".join(
+        f"{100 * fraction:.2g} % ({mode_set(model)})" for model, fraction in fractions.items() if fraction > ROUNDING
+    )
+    return _verdict(
+        *(fraction < SMALL for fraction in fractions.values())
+    ), f"it changes by {text or 'nothing'} of the largest"
 
 
 def _same_path(*models: Model) -> Callable[[Data], Outcome]:
-    """Whether the ball's centre stays beside the ideal model's; as a share of how far that moves."""
+    """Whether the ball's centre stays next to the ideal model's; as a fraction of how far that moves."""
 
-    def told(data: Data) -> Outcome:
+    def outcome(data: Data) -> Outcome:
         ideal = measured.centre(data[f"{IDEAL.scene}:run"])
         stroke = float(np.linalg.norm(ideal - ideal[0], axis=1).max())
-        off = {model: float(np.linalg.norm(apart(data, model, measured.centre), axis=1).max()) for model in models}
+        off = {model: float(np.linalg.norm(difference(data, model, measured.centre), axis=1).max()) for model in models}
         words = ", ".join(f"{mode_set(model) or model.label} {_length(far)}" for model, far in off.items())
         return _verdict(*(far < SMALL * stroke for far in off.values())), (
             f"off by {words} at most, of a path that goes {1e3 * stroke:.0f} mm far"
         )
 
-    return told
+    return outcome
 
 
 def _other_path(data: Data) -> Outcome:
@@ -148,18 +152,18 @@ def _length(far: float) -> str:
 
 def _slight_vibration(data: Data) -> Outcome:
     ideal = measured.reaction(data, IDEAL)
-    found = {m: measured.reaction(data, m) for m in FAR}
-    told = ", ".join(f"{mode_set(m)} {force:.0f} N" for m, force in found.items())
-    return _verdict(*(force / ideal - 1.0 < SLIGHT for force in found.values())), f"ideal {ideal:.0f} N; {told}"
+    reactions = {m: measured.reaction(data, m) for m in FAR}
+    text = ", ".join(f"{mode_set(m)} {force:.0f} N" for m, force in reactions.items())
+    return _verdict(*(force / ideal - 1.0 < SLIGHT for force in reactions.values())), f"ideal {ideal:.0f} N; {text}"
 
 
 def _consistent(data: Data) -> Outcome:
     free, fixed, full = (measured.effects(data, model) for model in (FAR_FREE, FAR_FIXED, FAR_CB))
-    shares = {name: abs(free[name] - fixed[name]) / size for name, size in full.items() if size > 0.0}
+    fractions = {name: abs(free[name] - fixed[name]) / size for name, size in full.items() if size > 0.0}
     missed = max(free["velocity"], fixed["velocity"]) < SLIGHT * full["velocity"]
-    told = ", ".join(f"{100 * share:.2g} % ({name})" for name, share in shares.items())
-    return _verdict(*(share < SLIGHT for share in shares.values())), (
-        f"they differ by {told} of the effect that a basis with all static compliance finds"
+    text = ", ".join(f"{100 * fraction:.2g} % ({name})" for name, fraction in fractions.items())
+    return _verdict(*(fraction < SLIGHT for fraction in fractions.values())), (
+        f"they differ by {text} of the effect that a basis with all static compliance finds"
         f"{'; of that on the velocity both miss nearly all' if missed else ''}"
     )
 
@@ -175,24 +179,24 @@ def _free_suitable(data: Data) -> Outcome:
 def _in_both_layouts(outcome: Callable[[Data, Model, Model], Outcome]) -> Callable[[Data], Outcome]:
     """The outcome in the scenes' layout, with the first one's numbers behind it."""
 
-    def told(data: Data) -> Outcome:
+    def in_both(data: Data) -> Outcome:
         (verdict, numbers), (_, first) = outcome(data, CSJ, IDEAL), outcome(data, FIRST_CSJ, FIRST_IDEAL)
         return verdict, f"{numbers} ({first})"
 
-    return told
+    return in_both
 
 
 def _no_influence(data: Data, csj: Model, ideal: Model) -> Outcome:
     own, moved = measured.sizes(data, ideal), measured.moved(data, csj, ideal)
-    shares = moved.angle / own.angle, moved.displacement / own.displacement
+    fractions = moved.angle / own.angle, moved.displacement / own.displacement
     return _verdict(
-        *(s < SMALL for s in shares)
-    ), f"angle {100 * shares[0]:.1f} %, displacement {100 * shares[1]:.1f} %"
+        *(s < SMALL for s in fractions)
+    ), f"angle {100 * fractions[0]:.1f} %, displacement {100 * fractions[1]:.1f} %"
 
 
 def _velocity_free(data: Data, csj: Model, ideal: Model) -> Outcome:
-    share = measured.moved(data, csj, ideal).velocity / measured.sizes(data, ideal).velocity
-    return _verdict(share < SMALL), f"{100 * share:.1f} % of the largest velocity"
+    fraction = measured.moved(data, csj, ideal).velocity / measured.sizes(data, ideal).velocity
+    return _verdict(fraction < SMALL), f"{100 * fraction:.1f} % of the largest velocity"
 
 
 def _conspicuous(data: Data, csj: Model, ideal: Model) -> Outcome:
@@ -207,21 +211,21 @@ def _lowered(data: Data) -> Outcome:
     models = (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)
     force = [measured.reaction(data, m) for m in models]
     acceleration = [measured.acceleration(data, m) for m in models]
-    told = "; ".join(
+    text = "; ".join(
         f"{mode_set(m)} {f:.0f} N, {a:.0f} m/s²" for m, f, a in zip(models, force, acceleration, strict=True)
     )
     rigid = measured.reaction(data, CSJ), measured.acceleration(data, CSJ)
     tests = [f < rigid[0] and a < rigid[1] for f, a in zip(force, acceleration, strict=True)]
-    return _verdict(*tests), f"CSJ {rigid[0]:.0f} N, {rigid[1]:.0f} m/s²; {told}"
+    return _verdict(*tests), f"CSJ {rigid[0]:.0f} N, {rigid[1]:.0f} m/s²; {text}"
 
 
 def _motion_kept(data: Data) -> Outcome:
     """Angle and displacement are those of the ideal model, and none depends on the mode set."""
-    own, shares = measured.sizes(data), []
+    own, fractions = measured.sizes(data), []
     moved = {model: measured.moved(data, model) for model in FAR_CSJ}
     for m in moved.values():
-        shares.append([m.angle / own.angle, m.displacement / own.displacement, m.velocity / own.velocity])
-    largest = np.max(shares, axis=0)
+        fractions.append([m.angle / own.angle, m.displacement / own.displacement, m.velocity / own.velocity])
+    largest = np.max(fractions, axis=0)
     free, fixed = moved[FAR_CSJ_FREE], moved[FAR_CSJ_FIXED]
     sets = [abs(getattr(free, n) / getattr(fixed, n) - 1.0) for n in ("angle", "displacement", "velocity")]
     return _verdict(*(s < SMALL for s in largest), *(s < SLIGHT for s in sets)), (
@@ -235,37 +239,37 @@ def _paths_differ(data: Data) -> Outcome:
     free, fixed = (data[f"{model.scene}:ensemble"].sel(contact=JOINT) for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED))
     names = {"impact_count": ("impacts", 1.0), "contact_time_share": ("% of the time in contact", 100.0)}
     tests = [measured.differ(free[name].values, fixed[name].values) for name in names]
-    told = [
+    texts = [
         f"{factor * free[n].mean():.0f} ± {factor * free[n].std(ddof=1):.0f} and "
         f"{factor * fixed[n].mean():.0f} ± {factor * fixed[n].std(ddof=1):.0f} {words}"
         for n, (words, factor) in names.items()
     ]
-    return _verdict(*tests), f"free-free and fixed-fixed: {'; '.join(told)}"
+    return _verdict(*tests), f"free-free and fixed-fixed: {'; '.join(texts)}"
 
 
 def _dashpot(data: Data) -> Outcome:
     """Vibration as the root mean square of the platform's acceleration minus the ideal one, at the outputs."""
     ideal = measured.vertical(data[f"{IDEAL.scene}:run"])
-    rigid = float(np.sqrt(np.mean(apart(data, CSJ, measured.vertical) ** 2)))
-    found = {}
+    rigid = float(np.sqrt(np.mean(difference(data, CSJ, measured.vertical) ** 2)))
+    rows = {}
     for model in FAR_CSJ:
         members = data[f"{model.scene}:ensemble"].acceleration.sel(body=PLATFORM, axis="z").values
-        found[model] = float(np.sqrt(np.mean((members - ideal) ** 2, axis=1)).mean())
+        rows[model] = float(np.sqrt(np.mean((members - ideal) ** 2, axis=1)).mean())
     count = {m: float(data[f"{m.scene}:ensemble"].impact_count.sel(contact=JOINT).mean()) for m in FAR_CSJ}
-    told = "; ".join(f"{mode_set(m)} {found[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in FAR_CSJ)
-    return _verdict(*(size < rigid for size in found.values())), (
+    text = "; ".join(f"{mode_set(m)} {rows[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in FAR_CSJ)
+    return _verdict(*(size < rigid for size in rows.values())), (
         f"vibration CSJ {rigid:.0f} m/s² and {int(data[f'{CSJ.scene}:post'].impact_count.sel(contact=JOINT))} impacts; "
-        f"{told}; without structural damping the rod takes no energy out of the mechanism"
+        f"{text}; without structural damping the rod takes no energy out of the mechanism"
     )
 
 
 def _sets_differ(data: Data) -> Outcome:
     force = [measured.reaction(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
     acceleration = [measured.acceleration(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
-    apart = [abs(a / b - 1.0) for a, b in (force, acceleration)]
+    differences = [abs(a / b - 1.0) for a, b in (force, acceleration)]
     return _verdict(
-        *(a > SLIGHT for a in apart)
-    ), f"by {100 * apart[0]:.0f} % in force, {100 * apart[1]:.0f} % in acceleration"
+        *(a > SLIGHT for a in differences)
+    ), f"by {100 * differences[0]:.0f} % in force, {100 * differences[1]:.0f} % in acceleration"
 
 
 def _fixed_right(data: Data) -> Outcome:
@@ -282,36 +286,36 @@ def _fixed_right(data: Data) -> Outcome:
 
 def _clearance_dominates(data: Data) -> Outcome:
     rod, clearance = measured.moved(data, FAR_CB), measured.moved(data, CSJ)
-    shares = [getattr(rod, n) / getattr(clearance, n) for n in ("angle", "displacement", "velocity")]
-    return _verdict(*(s < SLIGHT for s in shares)), (
-        f"the rod's part of the clearance's: angle {100 * shares[0]:.2g} %, displacement {100 * shares[1]:.2g} %, "
-        f"velocity {100 * shares[2]:.2g} %"
+    parts = [getattr(rod, n) / getattr(clearance, n) for n in ("angle", "displacement", "velocity")]
+    return _verdict(*(s < SLIGHT for s in parts)), (
+        f"the rod's part of the clearance's: angle {100 * parts[0]:.2g} %, displacement {100 * parts[1]:.2g} %, "
+        f"velocity {100 * parts[2]:.2g} %"
     )
 
 
 def _enlarged(data: Data) -> Outcome:
-    rigid, tests, told = measured.moved(data, CSJ), [], []
+    rigid, tests, texts = measured.moved(data, CSJ), [], []
     for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB):
         moved = measured.moved(data, model)
         rise = [getattr(moved, n) / getattr(rigid, n) - 1.0 for n in ("angle", "displacement", "velocity")]
         tests.append(min(rise) > 0.0)
-        told.append(f"{mode_set(model)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise))
-    return _verdict(*tests), f"angle, displacement, velocity: {'; '.join(told)}"
+        texts.append(f"{mode_set(model)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise))
+    return _verdict(*tests), f"angle, displacement, velocity: {'; '.join(texts)}"
 
 
 def _costs(*models: Model) -> Callable[[Data], Outcome]:
     """Whether costs over the ideal model's are the paper's, by each way in which Table 10 tells them."""
 
-    def told(data: Data) -> Outcome:
+    def outcome(data: Data) -> Outcome:
         tests, words = [], []
         for way, name in (("equal", "equal error"), ("step", "the paper's step"), ("tolerance", "its tolerance")):
-            found = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
-            tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in found.items()))
-            words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {_ratio(r)}" for m, r in found.items()))
+            costs = {m: ratios(data["sps4:timing"], way).get(m.scene, np.nan) for m in models}
+            tests.append(all(1.0 / NEAR < ratio / TABLE10[m.scene] < NEAR for m, ratio in costs.items()))
+            words.append(f"{name}: " + ", ".join(f"{mode_set(m) or m.label} {_ratio(r)}" for m, r in costs.items()))
         printed = ", ".join(f"{TABLE10[m.scene]:g}" for m in models)
         return _verdict(*tests), f"printed {printed}; at {'; at '.join(words)}"
 
-    return told
+    return outcome
 
 
 def _ratio(value: float) -> str:
@@ -323,11 +327,11 @@ def _becomes_chaotic(data: Data) -> Outcome:
     if not SECTIONS.is_file():
         return _one_stroke(data)
     with SECTIONS.open(newline="", encoding="utf-8") as file:
-        found = {row["scene"]: row for row in csv.DictReader(file)}
-    wanted = {CSJ: "quasi-periodic", FAR_CSJ_FREE: "chaotic", FAR_CSJ_FIXED: "chaotic", FAR_CSJ_CB: "chaotic"}
-    told = [f"{mode_set(model) or model.label} {_motion(found[model.scene])}" for model in wanted]
-    return _verdict(*(found[model.scene]["verdict"] == motion for model, motion in wanted.items())), (
-        f"over {found[CSJ.scene]['periods']} repeated strokes: {'; '.join(told)} (chaos.md)"
+        rows = {row["scene"]: row for row in csv.DictReader(file)}
+    requested = {CSJ: "quasi-periodic", FAR_CSJ_FREE: "chaotic", FAR_CSJ_FIXED: "chaotic", FAR_CSJ_CB: "chaotic"}
+    texts = [f"{mode_set(model) or model.label} {_motion(rows[model.scene])}" for model in requested]
+    return _verdict(*(rows[model.scene]["verdict"] == motion for model, motion in requested.items())), (
+        f"over {rows[CSJ.scene]['periods']} repeated strokes: {'; '.join(texts)} (chaos.md)"
     )
 
 
@@ -342,7 +346,7 @@ def _one_stroke(data: Data) -> Outcome:
     end = float(data[f"{CSJ.scene}:run"].time.values[-1])
     horizon = float(data[f"{CSJ.scene}:post"].horizon)
     parts = [1e3 * float(data[f"{m.scene}:post"].ensemble_horizon) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)]
-    return "cannot be told from one stroke", (
+    return "cannot be determined from one stroke", (
         f"neighbours of the CSJ run stay together to {1e3 * horizon:.0f} of {1e3 * end:.0f} ms; of the undamped "
         "FAR-CSJ "
         f"runs they part after {min(parts):.0f} to {max(parts):.0f} ms. Sections of a repeated stroke: chaos.md"

@@ -1,1 +1,1 @@
-"""What one sees of any mechanism: figures of a run, runs beside each other, and the page with both."""
+"""What one sees of any mechanism: figures of a run, runs next to each other, and the page with both."""

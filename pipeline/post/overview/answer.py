@@ -16,11 +16,11 @@ from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
 from flexclear.pipeline.post.series import parameters
 from flexclear.pipeline.post.stability import ENERGY, largest_energy
 
-#: a difference is told from none where it is so many times larger than both runs' own errors
-TOLD_APART = 2.0
-#: below this share of the largest value an effect is called slight
+#: a difference is reported from none where it is so many times larger than both runs' own errors
+DISTINGUISHED = 2.0
+#: below this fraction of the largest value an effect is called slight
 SLIGHT = 0.01
-#: below this share, both runs' own errors included, there is none, as of a body that a drive leads
+#: below this fraction, both runs' own errors included, there is none, as of a body that a drive leads
 NOTHING = 1e-6
 NEITHER = "The scene has neither clearance nor flexible bodies"
 
@@ -35,7 +35,7 @@ def answer(
 
     compared: of `overview.comparison`, the ideal counterpart first and the scene last; None where there is none.
     run: schema RUN of the scene.  doubts: warnings of the run.  changes: sentences of `post.matters` on what
-    differs from the ideal mechanism, which take the place of those that two runs alone allow.
+    differs from the ideal mechanism, which replace those that two runs alone allow.
     """
     said = [] if compared is None else [*changes] or _effects(compared)
     if compared is None and run is not None:
@@ -51,8 +51,8 @@ def answer(
 
 
 def _effects(compared: xr.Dataset) -> list[str]:
-    """A sentence for each quantity: by how much the scene differs from its ideal, and whether that is told apart."""
-    found = []
+    """A sentence for each quantity: the difference from the ideal mechanism, and whether it exceeds the error."""
+    sentences = []
     last = compared.sizes["run"] - 1
     for j, name in enumerate(str(q) for q in compared["quantity"].values):
         unit = str(compared["unit"].values[j])
@@ -62,36 +62,36 @@ def _effects(compared: xr.Dataset) -> list[str]:
         errors = [float(compared["error"][i, j]) for i in (0, last)]
         error = sum(errors) if np.isfinite(errors).all() else np.nan
         size = float(compared["largest"][0, j])
-        share = difference / size if size > 0.0 else np.nan
+        fraction = difference / size if size > 0.0 else np.nan
         value = measured(difference, error, unit)
-        known = np.isfinite(share) and share < 100.0
-        part = f", which is {rounded(100.0 * share, 2)} % of its largest value in the ideal run" if known else ""
+        known = np.isfinite(fraction) and fraction < 100.0
+        part = f", which is {rounded(100.0 * fraction, 2)} % of its largest value in the ideal run" if known else ""
         if np.isfinite(error) and difference + error < NOTHING * size:
-            told = f"does not change: the runs agree to <b class='n'>{measured(difference + error, np.nan, unit)}</b>"
-        elif np.isfinite(error) and difference < TOLD_APART * error:
-            told = (
+            text = f"does not change: the runs agree to <b class='n'>{measured(difference + error, np.nan, unit)}</b>"
+        elif np.isfinite(error) and difference < DISTINGUISHED * error:
+            text = (
                 f"the runs are not exact enough to tell an effect: their difference ({value}) is less "
-                f"than {TOLD_APART:g} times their errors together"
+                f"than {DISTINGUISHED:g} times their errors together"
             )
-        elif np.isfinite(share) and share < SLIGHT:
-            told = f"changes slightly, by up to <b class='n'>{value}</b>{part}"
+        elif np.isfinite(fraction) and fraction < SLIGHT:
+            text = f"changes slightly, by up to <b class='n'>{value}</b>{part}"
         else:
-            told = f"changes by up to <b class='n'>{value}</b>{part}"
-        found.append(f"<b>{html.escape(name)}</b>: {told}.")
-    return found
+            text = f"changes by up to <b class='n'>{value}</b>{part}"
+        sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
+    return sentences
 
 
 def _impacts(run: xr.Dataset) -> list[str]:
     """A sentence for each contact of the scene, ends of stops among them."""
-    found = []
+    sentences = []
     for name in (str(c) for c in run["contact"].values) if "contact" in run.coords else ():
         unit = quantities.unit(run, Quantity(name, "peak_force"))
         count, peak = (quantities.events(run, Quantity(name, kind)) for kind in ("impact_times", "peak_force"))
-        found.append(
+        sentences.append(
             f"<b>{html.escape(name)}</b>: {impacts(len(count)).capitalize()}; the contact "
             f"{'force' if unit == 'N' else 'torque'} reaches <b class='n'>{measured(float(peak[0]), np.nan, unit)}</b>."
         )
-    return found
+    return sentences
 
 
 def _horizon(run: xr.Dataset) -> list[str]:
@@ -108,9 +108,11 @@ def _horizon(run: xr.Dataset) -> list[str]:
 
 def _trust(run: xr.Dataset) -> list[str]:
     largest, missed = largest_energy(run), float(np.abs(run["energy_error"].values).max())
-    share = missed / largest if largest > 0.0 else 0.0
-    word = "<span class='good'>closes</span>" if share < ENERGY else "<span class='bad'>does not close</span>"
-    return [f"The energy balance {word}: <span class='n'>{share:.1e}</span> of the largest energy is unaccounted for."]
+    fraction = missed / largest if largest > 0.0 else 0.0
+    word = "<span class='good'>closes</span>" if fraction < ENERGY else "<span class='bad'>does not close</span>"
+    return [
+        f"The energy balance {word}: <span class='n'>{fraction:.1e}</span> of the largest energy is unaccounted for."
+    ]
 
 
 def effects(scene: Mapping[str, Any]) -> dict[str, str]:
@@ -137,7 +139,7 @@ def effects(scene: Mapping[str, Any]) -> dict[str, str]:
         "stops": list(scene.get("stop", {})),
         "gears": list(scene.get("gear", {})),
     }
-    return {name: ", ".join(found) if found else "not in the scene" for name, found in there.items()}
+    return {name: ", ".join(listed) if listed else "not in the scene" for name, listed in there.items()}
 
 
 def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[str, str]:
@@ -146,8 +148,8 @@ def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[st
     loose = {n for n, j in scene.get("joint", {}).items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"}
     flexible = {n for n, b in scene.get("body", {}).items() if b["type"] == "flexible"}
 
-    def weight(place: str) -> int:
-        family, _, rest = place.partition(".")
+    def weight(path: str) -> int:
+        family, _, rest = path.partition(".")
         part = rest.partition(".")[0]
         if (family, part in loose) == ("joint", True):
             return 0

@@ -1,4 +1,4 @@
-"""Runs beside each other: what they differ by, and by how much each may be wrong itself.
+"""Runs next to each other: what they differ by, and by how much each may be wrong itself.
 
 Differences are taken at the output times that all runs have, never interpolated. The first run is the reference.
 Peaks of an impact lie between those times. Where a force or velocity is larger in one run than it ever is in the other,
@@ -21,7 +21,7 @@ from flexclear.pipeline.post.horizon import sentence
 from flexclear.pipeline.post.overview.curves import curves, has, measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table
 
-#: what a run tells of its price, by its attribute
+#: what a run reports of its cost, by its attribute
 COSTS = {"evaluations": "evaluations", "steps": "steps", "rejected_steps": "rejected steps"}
 #: kinds whose largest value is that of their change from the start
 FROM_THE_START = ("position", "orientation")
@@ -88,10 +88,10 @@ def _difference_of(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -
 
     For vectors a, b over time, max |a - b| >= | max |a| - max |b| |, taken at the time of the larger one.
     """
-    apart = quantities.error(run, reference, quantity)
+    difference = quantities.error(run, reference, quantity)
     if not quantities.is_series(quantity) or quantity.kind in FROM_THE_START:
-        return apart
-    return max(apart, abs(quantities.scale(run, quantity) - quantities.scale(reference, quantity)))
+        return difference
+    return max(difference, abs(quantities.scale(run, quantity) - quantities.scale(reference, quantity)))
 
 
 def _unit(runs: Mapping[str, xr.Dataset], quantity: Quantity) -> str:
@@ -113,15 +113,15 @@ def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
     return time
 
 
-def _at(own: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _at(own: np.ndarray, requested: np.ndarray) -> np.ndarray:
     """Indices into a run's times of the common ones."""
-    first: np.ndarray = quantities.common_times(own, wanted)[0]
+    first: np.ndarray = quantities.common_times(own, requested)[0]
     return first
 
 
 def _contacts(runs: Mapping[str, xr.Dataset]) -> list[str]:
-    found = [str(name) for run in runs.values() if "contact" in run.coords for name in run["contact"].values]
-    return list(dict.fromkeys(found))
+    names = [str(name) for run in runs.values() if "contact" in run.coords for name in run["contact"].values]
+    return list(dict.fromkeys(names))
 
 
 def _impacts(runs: Mapping[str, xr.Dataset]) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
@@ -158,8 +158,8 @@ def table(compared: xr.Dataset) -> Table:
                 rows.append((str(name), label, "–", "–", "–"))
                 continue
             error = float(part["error"])
-            apart = "reference" if i == 0 else _difference(compared, i, j, unit)
-            rows.append((str(name), label, _number(float(part["largest"]), unit), _own(error, unit), apart))
+            against = "reference" if i == 0 else _difference(compared, i, j, unit)
+            rows.append((str(name), label, _number(float(part["largest"]), unit), _own(error, unit), against))
     notes = [
         "Own error: the largest difference between this run and the same run at a hundred times tighter tolerance "
         "(with fixed steps: at half the step). Difference: the largest difference from the reference run at the output "

@@ -46,8 +46,8 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
         return [_force(run, quantity.owner) for run in runs]
     if quantity.kind == "orientation":
         return [_turned(run, quantity) if has(run, quantity) else None for run in runs]
-    found = [quantities.series(run, quantity) if has(run, quantity) else None for run in runs]
-    there = [values for values in found if values is not None]
+    lines = [quantities.series(run, quantity) if has(run, quantity) else None for run in runs]
+    there = [values for values in lines if values is not None]
     if quantity.kind in BY_COMPONENT and there:
         k = int(first_largest(np.max([np.ptp(values, axis=0) for values in there], axis=0)))
         title = f"{quantity.owner}: {quantity.kind.replace('_', ' ')} along {'xyz'[k]}"
@@ -58,7 +58,7 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
         None
         if values is None
         else Curve(title, quantities.unit(run, quantity), run["time"].values, _drawn(values, quantity, k), NONE)
-        for run, values in zip(runs, found, strict=True)
+        for run, values in zip(runs, lines, strict=True)
     ]
 
 
@@ -128,8 +128,8 @@ def scaled(largest: float, unit: str) -> tuple[float, str]:
 
 def rounded(value: float, digits: int) -> str:
     """A number to so many significant digits; no exponent where up to seven digits before the point do without it."""
-    near = float(f"{value:.{digits}g}")
-    return f"{near:.0f}" if 10.0**digits <= abs(near) < 1e7 else f"{value:.{digits}g}"
+    written = float(f"{value:.{digits}g}")
+    return f"{written:.0f}" if 10.0**digits <= abs(written) < 1e7 else f"{value:.{digits}g}"
 
 
 def measured(value: float, error: float, unit: str) -> str:
@@ -144,11 +144,11 @@ def measured(value: float, error: float, unit: str) -> str:
         return f"{rounded(value, 4)} {written}"
     if error <= 0.0 or np.isinf(error):
         return f"{rounded(value, 4)} ± {error:g} {written}"
-    places = 1 - int(np.floor(np.log10(error)))
-    if places > 6 or error < 1e-4 * abs(value):
+    decimals = 1 - int(np.floor(np.log10(error)))
+    if decimals > 6 or error < 1e-4 * abs(value):
         return f"{rounded(value, 4)} ± {rounded(error, 2)} {written}"
-    shown = max(places, 0)
-    return f"{round(value, places):.{shown}f} ± {round(error, places):.{shown}f} {written}"
+    shown = max(decimals, 0)
+    return f"{round(value, decimals):.{shown}f} ± {round(error, decimals):.{shown}f} {written}"
 
 
 def impacts(count: int) -> str:

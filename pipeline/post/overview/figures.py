@@ -31,7 +31,7 @@ ENERGIES = {
 }
 #: what holds a pin, by type of joint; a ball is in a socket
 HOLDERS = {"clearance-revolute": "journal", "clearance-slot": "slot"}
-#: of an energy that is not drawn: its share of the largest one
+#: of an energy that is not drawn: its fraction of the largest one
 UNSEEN = 1e-6
 
 
@@ -44,16 +44,16 @@ def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | N
     post = derive(run) if post is None else post
     first = [quantity.owner for quantity in watched]
     with style.style():
-        found = _motion(run, post, first) | _energy(run)
+        panels = _motion(run, post, first) | _energy(run)
         if post.sizes["joint"]:
-            found |= _reactions(run, post, first)
+            panels |= _reactions(run, post, first)
         if "contact" in run.sizes:
-            found |= contacts(run, post, first)
+            panels |= contacts(run, post, first)
         if "wear_volume" in post:
-            found |= _wear(run, post)
+            panels |= _wear(run, post)
         if "joint_bearing_load" in run:
-            found |= _friction(run, first)
-    return found
+            panels |= _friction(run, first)
+    return panels
 
 
 def _chosen(names: Sequence[str], first: Sequence[str], size: np.ndarray, most: int) -> list[int]:
@@ -135,14 +135,14 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         _over_time(row[1], run, 1e6 * run["contact_gap"].values[:, k], f"{names[k]}: gap ({small})")
         row[1].axhline(0.0, color=style.SOFT, lw=0.8)
         count = impacts(int(post["impact_count"].values[k]))
-        share = float(post["contact_time_share"].values[k])
+        fraction = float(post["contact_time_share"].values[k])
         peak = float(post["peak_force"].values[k])
         pushes = "normal force" if unit == "N" else "torque"
         _over_time(row[2], run, run["contact_normal_force"].values[:, k])
         row[2].set_title(f"{names[k]}: {pushes} ({unit})", pad=16)
-        # a line of its own: beside the title it would be cut off
-        told = f"{count}, peak {measured(peak, np.nan, unit)}, {share:.0%} of the time in contact"
-        row[2].text(0.0, 1.015, told, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
+        # a line of its own: next to the title it would be cut off
+        text = f"{count}, peak {measured(peak, np.nan, unit)}, {fraction:.0%} of the time in contact"
+        row[2].text(0.0, 1.015, text, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
     style.heading(figure, f"Joints with clearance{_rest(len(names), CONTACTS)}")
     return style.files("contacts", figure)
 

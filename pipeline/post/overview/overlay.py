@@ -1,4 +1,4 @@
-"""The figure of runs beside each other: each watched quantity, and how far the others are from the reference."""
+"""The figure of runs next to each other: each watched quantity, and how far the others are from the reference."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.series import derive, parameters
 
-#: of the runs, the reference first: told apart by colour-blind readers, too
+#: of the runs, the reference first: distinguished by colour-blind readers, too
 COLORS = ("#111111", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-#: of models of one mechanism, by what they have beside the ideal one; the same as in the figures about the paper
+#: of models of one mechanism, by what they have next to the ideal one; the same as in the figures about the paper
 IDEAL, CLEARANCE = "#111111", "#E69F00"
 MODES = {"free-free": "#0072B2", "fixed-fixed": "#D55E00", "craig-bampton": "#009E73"}
 #: opacity of a curve beyond the horizon of its run
@@ -26,14 +26,14 @@ PALE = 0.35
 
 def colors(runs: Mapping[str, xr.Dataset]) -> list[str]:
     """A colour for each run: that of its model, where it is the first with that; else one that none has."""
-    found: list[str] = []
+    chosen: list[str] = []
     for run in runs.values():
-        told = parameters(run)
-        flexible = [body["modes"]["reference"] for body in told.get("body", {}).values() if body["type"] == "flexible"]
+        parts = parameters(run)
+        flexible = [body["modes"]["reference"] for body in parts.get("body", {}).values() if body["type"] == "flexible"]
         own = MODES.get(flexible[0], COLORS[4]) if flexible else CLEARANCE if "contact" in run.sizes else IDEAL
-        free = [color for color in COLORS if color not in found] or list(COLORS)
-        found.append(own if own not in found else free[0])
-    return found
+        free = [color for color in COLORS if color not in chosen] or list(COLORS)
+        chosen.append(own if own not in chosen else free[0])
+    return chosen
 
 
 def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> dict[str, bytes]:
@@ -41,32 +41,32 @@ def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) 
     drawn = _panels(runs, chosen)
     with style.style():
         figure, axes = style.grid(len(drawn), 2, (11.0, 1.0 + 2.3 * len(drawn)), width_ratios=[1.5, 1.0])
-        for row, (quantity, found) in zip(axes, drawn, strict=True):
-            _overlay(row[0], runs, found)
-            _apart(row[1], runs, quantity, found)
+        for row, (quantity, lines) in zip(axes, drawn, strict=True):
+            _overlay(row[0], runs, lines)
+            _apart(row[1], runs, quantity, lines)
         style.shared_legend(figure, axes[0, 0], min(len(runs), 3))
         pale = "; pale: beyond the horizon of a run" if any("horizon" in run for run in runs.values()) else ""
-        style.heading(figure, "Runs beside each other", f"right: distance from {next(iter(runs))}{pale}")
+        style.heading(figure, "Runs next to each other", f"right: distance from {next(iter(runs))}{pale}")
         files = style.files(name, figure)
         return files | _orbits(f"{name}_contacts", runs)
 
 
 def _panels(runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) -> list[tuple[Quantity, list[Curve | None]]]:
     """Each quantity with its curves; what a contact has several of is drawn once."""
-    found: dict[str, tuple[Quantity, list[Curve | None]]] = {}
+    panels: dict[str, tuple[Quantity, list[Curve | None]]] = {}
     for quantity in chosen:
         mine = curves(list(runs.values()), quantity)
         title = next((curve.title for curve in mine if curve is not None), None)
         if title is not None:
-            found.setdefault(title, (quantity, mine))
-    return list(found.values())
+            panels.setdefault(title, (quantity, mine))
+    return list(panels.values())
 
 
-def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], found: Sequence[Curve | None]) -> None:
-    there = [curve for curve in found if curve is not None]
+def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], lines: Sequence[Curve | None]) -> None:
+    there = [curve for curve in lines if curve is not None]
     factor, unit = scaled(max(float(np.abs(curve.values).max(initial=0.0)) for curve in there), there[0].unit)
     own = colors(runs)
-    for k, ((label, run), curve) in enumerate(zip(runs.items(), found, strict=True)):
+    for k, ((label, run), curve) in enumerate(zip(runs.items(), lines, strict=True)):
         if curve is None:
             continue
         color, last = own[k], _horizon(run)
@@ -83,20 +83,22 @@ def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], found: Sequence[C
     axes.set_title(f"{there[0].title} ({unit})")
 
 
-def _apart(axes: style.Axes, runs: Mapping[str, xr.Dataset], quantity: Quantity, found: Sequence[Curve | None]) -> None:
+def _apart(
+    axes: style.Axes, runs: Mapping[str, xr.Dataset], quantity: Quantity, curves_drawn: Sequence[Curve | None]
+) -> None:
     """Distance of the whole quantity, all its components, from the reference; of a force its difference."""
     (_, reference), *others = runs.items()
     lines: list[tuple[int, np.ndarray, np.ndarray]] = []
     for k, (_, run) in enumerate(others, start=1):
         if quantities.is_series(quantity) and has(run, quantity) and has(reference, quantity):
             lines.append((k, *quantities.deviation(run, reference, quantity)))
-        elif (mine := found[k]) is not None and (theirs := found[0]) is not None:
+        elif (mine := curves_drawn[k]) is not None and (theirs := curves_drawn[0]) is not None:
             i, j = quantities.common_times(mine.time, theirs.time)
             lines.append((k, mine.time[i], np.abs(mine.values[i] - theirs.values[j])))
     if not lines:
         axes.set_visible(False)
         return
-    unit = next(curve.unit for curve in found if curve is not None)
+    unit = next(curve.unit for curve in curves_drawn if curve is not None)
     factor, written = scaled(max(float(values.max(initial=0.0)) for _, _, values in lines), unit)
     own = colors(runs)
     for k, time, values in lines:
@@ -108,21 +110,21 @@ def _apart(axes: style.Axes, runs: Mapping[str, xr.Dataset], quantity: Quantity,
 
 
 def _orbits(name: str, runs: Mapping[str, xr.Dataset]) -> dict[str, bytes]:
-    found = [
+    orbits = [
         (label, run, k)
         for label, run in runs.items()
         if "contact" in run.sizes
         for k in range(min(run.sizes["contact"], CONTACTS))
     ]
-    if not found:
+    if not orbits:
         return {}
-    columns = min(len(found), 4)
-    rows = -(-len(found) // columns)
+    columns = min(len(orbits), 4)
+    rows = -(-len(orbits) // columns)
     figure, axes = style.grid(rows, columns, (max(4.0, 2.75 * columns), 0.6 + 3.0 * rows))
-    for panel, (label, run, k) in zip(axes.flat, found, strict=False):
+    for panel, (label, run, k) in zip(axes.flat, orbits, strict=False):
         orbit(panel, run, float(derive(run)["clearance"].values[k]), k)
         panel.set_title(f"{run['contact'].values[k]}: {label}\n{centre(run, k)}")
-    for panel in axes.flat[len(found) :]:
+    for panel in axes.flat[len(orbits) :]:
         panel.set_visible(False)
     return style.files(name, figure)
 

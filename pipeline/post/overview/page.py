@@ -57,24 +57,24 @@ def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> byte
 
 
 def viewer_page(title: str, views: Sequence[str], below: str = "") -> bytes:
-    """A page with views that can be turned (`pipeline.post.pages.viewer`), and what stands below them as HTML."""
-    return page(title, "", [Part("view", "View" if len(views) == 1 else "Views", beside(views) + below)])
+    """A page with views that can be turned (`pipeline.post.pages.viewer`), and what is below them as HTML."""
+    return page(title, "", [Part("view", "View" if len(views) == 1 else "Views", in_columns(views) + below)])
 
 
-def beside(figures: Sequence[str]) -> str:
-    """Figures beside each other where there is room for that."""
-    return "".join(figures) if len(figures) < 2 else f"<div class='beside'>{''.join(figures)}</div>\n"
+def in_columns(figures: Sequence[str]) -> str:
+    """Figures next to each other where there is room for that."""
+    return "".join(figures) if len(figures) < 2 else f"<div class='side-by-side'>{''.join(figures)}</div>\n"
 
 
 def media(name: str, content: bytes, caption: str, alt: str = "") -> str:
     """A picture or film, inside of the page; alt: what it shows, where the caption does not say it all."""
     kind = TYPES[name.rpartition(".")[2]]
     data = f"data:{kind};base64,{base64.b64encode(content).decode()}"
-    told = html.escape(alt or caption, quote=True)
+    alt_text = html.escape(alt or caption, quote=True)
     shown = (
-        f"<video src='{data}' controls loop muted playsinline aria-label='{told}'></video>"
+        f"<video src='{data}' controls loop muted playsinline aria-label='{alt_text}'></video>"
         if kind.startswith("video")
-        else f"<img src='{data}' alt='{told}'>"
+        else f"<img src='{data}' alt='{alt_text}'>"
     )
     look = "" if kind.startswith("video") else " class='plot'"
     return f"<figure{look}><figcaption>{html.escape(caption)}</figcaption>{shown}</figure>\n"
@@ -109,18 +109,18 @@ def downloads(files: Mapping[str, bytes]) -> str:
 
 
 def in_folder(page: bytes) -> dict[str, bytes]:
-    """The same page as ``index.html`` with its pictures and films as files beside it, by name."""
-    found: dict[str, bytes] = {}
+    """The same page as ``index.html`` with its pictures and films as files next to it, by name."""
+    files: dict[str, bytes] = {}
     suffix = {kind: name for name, kind in TYPES.items()}
 
     def apart(match: re.Match[str]) -> str:
         content = base64.b64decode(match[2])
-        name = f"files/{len(found) + 1:03d}.{suffix[match[1]]}"
-        found[name] = content
+        name = f"files/{len(files) + 1:03d}.{suffix[match[1]]}"
+        files[name] = content
         return f"src='{name}'"
 
     text = re.sub(r"src='data:((?:image|video)/[\w+.-]+);base64,([A-Za-z0-9+/=]+)'", apart, page.decode())
-    return {"index.html": text.encode(), **found}
+    return {"index.html": text.encode(), **files}
 
 
 def _code(text: str) -> str:

@@ -17,25 +17,25 @@ def asset(name: str) -> str:
     return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
 
-def viewer(told: dict[str, Any], caption: str, *, play: bool = False) -> str:
+def viewer(content: dict[str, Any], caption: str, *, play: bool = False) -> str:
     """A view that can be turned, as a figure; the page needs its script.
 
     told: what `pipeline.post.render.player` makes.  play: whether it moves at once, unless the system asks for rest.
     """
-    moving = "shapes" not in told
-    still = moving and len(told["times"]) < 2
+    moving = "shapes" not in content
+    still = moving and len(content["times"]) < 2
     tools = [] if still else ["<button type='button' data-part='play' aria-pressed='false'>Play</button>"]
-    last = len(told["times"]) - 1 if moving else 0
+    last = len(content["times"]) - 1 if moving else 0
     if still:
         tools.append("<label><input type='checkbox' data-part='names' checked> names</label>")
     elif moving:
         tools.append(f"<label>time <input type='range' data-part='time' min='0' max='{last}' value='0'></label>")
-    elif len(told["shapes"]) > 1:
+    elif len(content["shapes"]) > 1:
         options = "".join(
-            f"<option value='{k}'>{html.escape(shape['label'])}</option>" for k, shape in enumerate(told["shapes"])
+            f"<option value='{k}'>{html.escape(shape['label'])}</option>" for k, shape in enumerate(content["shapes"])
         )
         tools.append(f"<label>mode <select data-part='shape'>{options}</select></label>")
-    if any("fields" in mesh for mesh in told["meshes"]):
+    if any("fields" in mesh for mesh in content["meshes"]):
         tools.append(
             "<label>deformation <input type='range' data-part='factor' min='-1' max='1' step='0.05' value='0'></label>"
         )
@@ -43,7 +43,7 @@ def viewer(told: dict[str, Any], caption: str, *, play: bool = False) -> str:
     tools.append("<button type='button' data-part='home'>Reset view</button>")
     label = f"{caption}: drag or arrow keys turn, plus and minus zoom, space plays"
     # a closing tag inside of the data would end the script
-    data = json.dumps(told, separators=(",", ":")).replace("</", "<\\/")
+    data = json.dumps(content, separators=(",", ":")).replace("</", "<\\/")
     return (
         f"<figure><figcaption>{html.escape(caption)}</figcaption>"
         f"<div class='viewer' data-play='{'yes' if play else 'no'}'>"

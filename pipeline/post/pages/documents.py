@@ -14,7 +14,7 @@ COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
 def section(page: Path, headings: Sequence[str] = (), pictures: Sequence[str] | None = None) -> str:
     """The text of a page below its title, as HTML; empty where there is no such page.
 
-    headings: only what stands below these; "" is what stands before the first of them.  pictures: endings of the
+    headings: only what is below these; "" is what is before the first of them.  pictures: endings of the
     names of those that are shown; default: all.
     """
     if not page.is_file():
@@ -44,11 +44,11 @@ def _html(text: str) -> str:
     return made
 
 
-def _pictures(text: str, folder: Path, wanted: Sequence[str] | None) -> str:
-    def shown(found: re.Match[str]) -> str:
-        name, alt = found[1], found[2]
+def _pictures(text: str, folder: Path, requested: Sequence[str] | None) -> str:
+    def shown(match: re.Match[str]) -> str:
+        name, alt = match[1], match[2]
         path = folder / name
-        if not path.is_file() or (wanted is not None and not name.endswith(tuple(wanted))):
+        if not path.is_file() or (requested is not None and not name.endswith(tuple(requested))):
             return ""
         data = base64.b64encode(path.read_bytes()).decode()
         return f"<figure class='plot'><img src='data:image/png;base64,{data}' alt='{alt}'></figure>"

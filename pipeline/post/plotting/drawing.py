@@ -35,10 +35,10 @@ class View:
 
 def view(towards: np.ndarray, up: np.ndarray) -> View:
     """The view of an observer in direction `towards`; `up` is upwards on the paper."""
-    near = towards / np.linalg.norm(towards)
-    right = np.cross(up, near)
+    towards_eye = towards / np.linalg.norm(towards)
+    right = np.cross(up, towards_eye)
     right /= np.linalg.norm(right)
-    return View(np.array([right, np.cross(near, right), near]))
+    return View(np.array([right, np.cross(towards_eye, right), towards_eye]))
 
 
 def shell(
@@ -92,9 +92,9 @@ def _outwards(rings: np.ndarray, normal: np.ndarray, corners: np.ndarray) -> flo
     sides = np.linalg.norm(
         np.cross(rings[1:, :-1] - rings[:-1, :-1], rings[:-1, 1:] - rings[:-1, :-1]), axis=-1
     ).ravel()
-    kept = centre[: len(sides)][sides > 0.0]
-    n = min(len(kept), len(normal))
-    return 1.0 if ((corners[:n].mean(axis=1) - kept[:n]) * normal[:n]).sum() >= 0.0 else -1.0
+    visible = centre[: len(sides)][sides > 0.0]
+    n = min(len(visible), len(normal))
+    return 1.0 if ((corners[:n].mean(axis=1) - visible[:n]) * normal[:n]).sum() >= 0.0 else -1.0
 
 
 def tube(start: np.ndarray, end: np.ndarray, radius: float, around: int = 24) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""What tables 7-9 share: rows of largest deviations, ours beside the paper's, and how far apart they are."""
+"""What tables 7-9 share: rows of largest deviations, ours next to the paper's, and how far apart they are."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ ROWS: tuple[tuple[str, str, float, str | None], ...] = (
     ("velocity z0 (mm/s)", "velocity", 1e3, "velocity"),
 )
 ABSENT = "–"
-#: deviations below this share of the printed ones are called zero: the paper prints four digits
+#: deviations below this fraction of the printed ones are called zero: the paper prints four digits
 NOTHING = 1e-4
 #: values below this are rounding of the runs and differ between machines (positions of 0.1 m to 16 digits, in mm)
 NOISE = 1e-10
@@ -83,10 +83,10 @@ MEANING = (
 
 def comparison(who: str, deviation: Deviation, printed: MaximumError) -> str:
     """A sentence with the ratios; says zero where there is nothing to divide."""
-    found = ratios(deviation, printed)
-    if max(found.values()) < NOTHING:
+    percentages = ratios(deviation, printed)
+    if max(percentages.values()) < NOTHING:
         return f"{who}: ours are zero, up to rounding."
-    text = ", ".join(f"{name} {ratio:.2g}" for name, ratio in found.items())
+    text = ", ".join(f"{name} {ratio:.2g}" for name, ratio in percentages.items())
     return f"{who}: ours over the paper's: {text}."
 
 

@@ -1,4 +1,4 @@
-"""What tables 4 and 5 share: the paper's frequencies beside ours and the exact ones."""
+"""What tables 4 and 5 share: the paper's frequencies next to ours and the exact ones."""
 
 from __future__ import annotations
 

@@ -18,8 +18,8 @@ from flexclear.pipeline.post.plotting.drawing import View, shell, skin, view
 from flexclear.pipeline.post.plotting.style import SOFT
 from flexclear.pipeline.post.rod_shape import AROUND
 
-#: modes beside each other, and drawn size of the largest displacement as a share of the body's length
-COLUMNS, SHARE = 3, 0.14
+#: modes next to each other, and drawn size of the largest displacement as a fraction of the body's length
+COLUMNS, FRACTION = 3, 0.14
 #: of the points around a rod every so many are drawn: a sheet shows its modes small
 EVERY = 2
 #: pictures of one vibration in a film
@@ -38,13 +38,13 @@ def frames(body: str, bundle: xr.Dataset, towards: np.ndarray, up: np.ndarray) -
         seen = view(towards, up)
         drawn: dict[float, np.ndarray] = {}  # on the way back bodies look as on the way out
         for phase in np.linspace(0.0, 2.0 * np.pi, FRAMES, endpoint=False):
-            share = round(float(np.sin(phase)), 6)
-            if share not in drawn:
-                drawn[share] = _pixels(_sheet(body, bundle, seen, share))
-            yield drawn[share]
+            fraction = round(float(np.sin(phase)), 6)
+            if fraction not in drawn:
+                drawn[fraction] = _pixels(_sheet(body, bundle, seen, fraction))
+            yield drawn[fraction]
 
 
-def told(bundle: xr.Dataset) -> str:
+def range_text(bundle: xr.Dataset) -> str:
     """Which modes these are, in words."""
     kind = str(bundle.attrs.get("reference", ""))
     return f"{bundle.sizes['mode']} modes{f', {kind}' if kind else ''}"
@@ -61,35 +61,35 @@ def _pixels(figure: Figure) -> np.ndarray:
     return pixels[: height - height % 2, : width - width % 2, :3].copy()
 
 
-def _sheet(body: str, bundle: xr.Dataset, seen: View, share: float) -> Figure:
+def _sheet(body: str, bundle: xr.Dataset, seen: View, fraction: float) -> Figure:
     count = bundle.sizes["mode"]
     rows = -(-count // COLUMNS)
     rest, _ = surface(bundle, np.zeros(count))
     places = seen.project(rest)
     span = np.ptp(places, axis=0)
-    ratio = float(np.clip((span[1] + 2.2 * SHARE * span.max()) / (span[0] + 0.1 * span.max()), 0.25, 1.6))
+    ratio = float(np.clip((span[1] + 2.2 * FRACTION * span.max()) / (span[0] + 0.1 * span.max()), 0.25, 1.6))
     width = 11.0
     figure, axes = style.grid(rows, COLUMNS, (width, 1.1 + rows * (0.35 + ratio * width / COLUMNS * 0.92)))
     for k, panel in enumerate(axes.flat):
         if k < count:
-            _mode(panel, bundle, seen, k, share, rest)
+            _mode(panel, bundle, seen, k, fraction, rest)
         else:
             panel.set_visible(False)
     bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), "viridis"), ax=axes, shrink=0.6, pad=0.01, aspect=30)
     bar.set_label("displacement, largest = 1")
     style.heading(
         figure,
-        f"{body}: {told(bundle)}",
-        "mass-normalised shapes (in kg^-1/2) times the factor beside each; dashed: at rest",
+        f"{body}: {range_text(bundle)}",
+        "mass-normalised shapes (in kg^-1/2) times the factor next to each; dashed: at rest",
     )
     return figure
 
 
-def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, share: float, rest: np.ndarray) -> None:
+def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, fraction: float, rest: np.ndarray) -> None:
     q = np.zeros(bundle.sizes["mode"])
     q[mode] = 1.0
-    factor = scale_to(bundle, q, SHARE)
-    points, size = surface(bundle, q, share * factor)
+    factor = scale_to(bundle, q, FRACTION)
+    points, size = surface(bundle, q, fraction * factor)
     moved = size if size.max() > 1e-9 * np.ptp(rest) else np.linalg.norm(points - rest, axis=1)
     largest = float(scale_to_size(bundle, q, factor, rest))
     index = faces(bundle)
@@ -112,8 +112,8 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, share: f
     panel.set_aspect("equal")
     panel.set_axis_off()
     frequency = float(bundle["frequency"].values[mode])
-    told = f"{frequency:.5g} Hz" if frequency > 0.0 else "static"
-    panel.set_title(f"mode {mode + 1}: {told}, × {factor:.2g} √kg m", fontsize=8.8)
+    text = f"{frequency:.5g} Hz" if frequency > 0.0 else "static"
+    panel.set_title(f"mode {mode + 1}: {text}, × {factor:.2g} √kg m", fontsize=8.8)
 
 
 def scale_to_size(bundle: xr.Dataset, q: np.ndarray, factor: float, rest: np.ndarray) -> float:

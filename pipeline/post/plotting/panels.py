@@ -21,8 +21,8 @@ FIRM, ADDED, PALE = 0.95, 0.4, 0.28
 #: cover the paper's own curves
 STRETCHES = 120
 #: differences whose sizes are further apart than this are drawn on a logarithmic scale around zero
-APART = 20.0
-#: differences below this share of the largest are rounding
+SEPARATION = 20.0
+#: differences below this fraction of the largest are rounding
 ROUNDING = 1e-6
 
 
@@ -80,7 +80,7 @@ def six_panels(
     axes[4, 1].set_title("(f) centre of ball A1, minus ideal, global frame")
     ball_distance(axes[5, 1], reference, others)
     for panel in axes.flat:
-        # the same place in every panel; aligning by the tick labels' sizes takes seconds
+        # the same position in every panel; aligning by the tick labels' sizes takes seconds
         panel.yaxis.set_label_coords(-0.105, 0.5)
     return figure, axes[0, 0]
 
@@ -121,21 +121,21 @@ def difference(
     axes.margins(y=0.12)
     for motion, post in zip(others, posts, strict=bool(posts)):
         _band(axes, quantity, motion, post, reference)
-    found = {motion.model.scene: deviation(quantity, motion, reference) for motion in others}
+    differences = {motion.model.scene: deviation(quantity, motion, reference) for motion in others}
     for motion in others:
-        time, values = found[motion.model.scene]
+        time, values = differences[motion.model.scene]
         _curve(axes, motion, values, 0.9, time)
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_xlabel("time (s)")
     axes.set_ylabel(f"minus ideal\n{quantity.unit}")
-    _scale(axes, [float(np.abs(values).max()) for _, values in found.values()])
+    _scale(axes, [float(np.abs(values).max()) for _, values in differences.values()])
 
 
 def _scale(axes: Axes, sizes: Sequence[float]) -> None:
     """A scale on which all differences are seen, of whatever size."""
     largest = max(sizes, default=0.0)
     smallest = min((size for size in sizes if size > ROUNDING * largest), default=largest)
-    if largest <= APART * smallest:
+    if largest <= SEPARATION * smallest:
         axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
         return
     linear = 10.0 ** np.floor(np.log10(smallest))
@@ -144,8 +144,8 @@ def _scale(axes: Axes, sizes: Sequence[float]) -> None:
     axes.set_ylim(-top, top)
     axes.set_yticks([-top, 0.0, top])
     axes.minorticks_off()
-    told = f"linear within ±{linear:g}, logarithmic beyond"
-    axes.text(0.995, 0.03, told, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
+    text = f"linear within ±{linear:g}, logarithmic beyond"
+    axes.text(0.995, 0.03, text, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
 
 
 def deviation(quantity: Quantity, motion: Motion, reference: Motion) -> tuple[np.ndarray, np.ndarray]:
@@ -155,7 +155,7 @@ def deviation(quantity: Quantity, motion: Motion, reference: Motion) -> tuple[np
 
 
 def ball_deviation(axes: Axes, reference: Motion, others: Sequence[Motion], clearance: float = 0.0) -> None:
-    """Where the ball's centre is beside its place in the ideal model, x-z plane of the world, equal scales.
+    """Where the ball's centre is relative to its position in the ideal model, x-z plane of the world, equal scales.
 
     The path itself is 60 mm long: nothing is seen on it.
     """
@@ -167,8 +167,8 @@ def ball_deviation(axes: Axes, reference: Motion, others: Sequence[Motion], clea
         axes.plot(edge * np.cos(turn), edge * np.sin(turn), color=style.SOFT, lw=0.9, ls=":")
         axes.annotate("clearance", (0.0, edge), ha="center", va="bottom", fontsize=7.6, color=style.SOFT)
     for motion in sorted(others, key=lambda m: not m.model.ours):
-        time, apart = paths[motion.model.scene]
-        x, _, z = factor * apart.T
+        time, deviation_of_ball = paths[motion.model.scene]
+        x, _, z = factor * deviation_of_ball.T
         inside = time <= motion.horizon
         axes.plot(x, z, color=motion.model.color, lw=0.6, alpha=PALE)
         axes.plot(x[inside], z[inside], color=motion.model.color, lw=1.1, alpha=FIRM)
@@ -183,8 +183,8 @@ def ball_distance(axes: Axes, reference: Motion, others: Sequence[Motion]) -> No
     """Distance of the ball's centre from where the ideal model has it, over time."""
     paths = [_ball_apart(motion, reference) for motion in others]
     factor, unit = _short(0.0, paths)
-    for motion, (time, apart) in zip(others, paths, strict=True):
-        _curve(axes, motion, factor * np.linalg.norm(apart, axis=1), 0.9, time)
+    for motion, (time, deviation_of_ball) in zip(others, paths, strict=True):
+        _curve(axes, motion, factor * np.linalg.norm(deviation_of_ball, axis=1), 0.9, time)
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_ylim(bottom=0.0)
     axes.set_xlabel("time (s)")
@@ -199,7 +199,7 @@ def _ball_apart(motion: Motion, reference: Motion) -> tuple[np.ndarray, np.ndarr
 
 def _short(least: float, paths: Iterable[tuple[np.ndarray, np.ndarray]]) -> tuple[float, str]:
     """Factor and unit of lengths [mm] that are drawn: micrometres where all are below a tenth of a millimetre."""
-    largest = max([least, *(float(np.abs(apart).max()) for _, apart in paths)])
+    largest = max([least, *(float(np.abs(deviation_of_ball).max()) for _, deviation_of_ball in paths)])
     return (1e3, "µm") if largest < 0.1 else (1.0, "mm")
 
 

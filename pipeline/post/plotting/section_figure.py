@@ -51,7 +51,7 @@ def _returns(axes: Axes, verdict: xr.Dataset) -> None:
 def _power(axes: Axes, verdict: xr.Dataset) -> None:
     axes.set_title("spectrum")
     axes.set_xlabel("cycles per period")
-    axes.set_ylabel("share of the variance")
+    axes.set_ylabel("fraction of the variance")
     if not verdict.power.values.any():
         axes.text(0.5, 0.5, "the states stand still", transform=axes.transAxes, ha="center", color=style.SOFT)
         return

@@ -68,7 +68,7 @@ def style() -> Iterator[None]:
 def files(name: str, figure: Figure) -> dict[str, bytes]:
     """The figure as ``name.png`` and ``name.svg``, without dates or versions; closes it."""
     result = {}
-    # the layout is solved once and then kept; it would be solved again for each format
+    # the layout is solved once and then fixed; it would be solved again for each format
     figure.draw_without_rendering()
     with mpl.rc_context({"figure.constrained_layout.use": False}):
         figure.set_layout_engine(None)

@@ -67,8 +67,8 @@ def as_html(table: Table, *, prose: bool = False) -> str:
     head = "".join(f"<th scope='col'>{html.escape(column)}</th>" for column in table.columns)
     rows = "".join("<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>\n" for row in table.rows)
     # links between pages of the documentation lead nowhere from here
-    told = [re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", note) for note in table.notes]
-    notes = "".join(f"<p>{html.escape(note)}</p>\n" for note in told)
+    footnotes = [re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", note) for note in table.notes]
+    notes = "".join(f"<p>{html.escape(note)}</p>\n" for note in footnotes)
     caption = html.escape(table.title)
     return (
         f"<figure class='table'><figcaption>{caption}</figcaption>\n<div "

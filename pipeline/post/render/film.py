@@ -1,4 +1,4 @@
-"""A film of a run: the moving mechanism, and its curves beside it."""
+"""A film of a run: the moving mechanism, and its curves next to it."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def film(
 ) -> tuple[str, bytes]:
     """File suffix and content: MP4 where that is asked for and ffmpeg is there, else GIF; the whole run.
 
-    watched: names of bodies, joints and contacts, of which the first of each is shown beside the mechanism.
+    watched: names of bodies, joints and contacts, of which the first of each is shown next to the mechanism.
     Around the strongest impacts time is stretched, so that they are seen (`pace`).
     """
     rate = RATE if kind == "mp4" else RATE // 2
@@ -79,7 +79,7 @@ def _frames(
             struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
             _place(drawn, actors, int(step), struck)
             picture = image(scene)
-            caption.onto(picture, f"{pace.told(float(shown.slower[k]))}{_exaggeration(drawn)}")
+            caption.onto(picture, f"{pace.speed_text(float(shown.slower[k]))}{_exaggeration(drawn)}")
             yield np.concatenate([picture, plots.frame(int(step))], axis=1)
             if k % 15 == 0:
                 progress((k + 1) / steps.size, "film")
@@ -152,7 +152,7 @@ def floor(scene: pv.Plotter, drawn: Mechanism) -> None:
 def look(scene: pv.Plotter, drawn: Mechanism, margin: int = 0) -> None:
     """Put the camera where all that is drawn over the run is in the picture, between its margins [pixels]."""
     width, height = scene.window_size
-    place, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
-    scene.camera_position = [tuple(place), tuple(focus), tuple(drawn.view.up)]
+    position, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
+    scene.camera_position = [tuple(position), tuple(focus), tuple(drawn.view.up)]
     scene.camera.view_angle = ANGLE
     scene.enable_anti_aliasing("msaa", multi_samples=4)

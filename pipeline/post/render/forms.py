@@ -20,15 +20,15 @@ from flexclear.pipeline.post.render import shape_files, surfaces
 from flexclear.pipeline.post.render.solids import Solid
 from flexclear.pipeline.post.render.surfaces import Surface
 
-#: half width of a link as a share of the mechanism's size, and of the distance of its joints at most
+#: half width of a link as a fraction of the mechanism's size, and of the distance of its joints at most
 WIDTH, WIDEST = 0.016, 0.2
 #: thickness of flat links, in half widths
 FLAT = 0.9
-#: places nearer to each other than this many half widths are one
+#: points closer to each other than this many half widths are one
 NEAR = 0.3
 #: a solid is slender where it is so many times longer than thick
 SLENDER = 2.5
-#: largest half extent of a body without joints apart, as a share of the mechanism's size
+#: largest half extent of a body without joints apart, as a fraction of the mechanism's size
 LARGEST = 0.1
 #: joints that turn about z of their frames, and that slide along it
 TURNING = ("revolute", "clearance-revolute", "clearance-slot", "planar")
@@ -38,7 +38,7 @@ BALLS = ("spherical", "clearance-spherical", "ball-on-plane")
 
 @dataclass(frozen=True, slots=True)
 class Seat:
-    """A joint's place on a body: frame name, its origin and axes in the body's, type of the joint, which side it is."""
+    """A joint's frame on a body: frame name, its origin and axes in the body's, type of the joint, which side it is."""
 
     frame: str
     origin: np.ndarray
@@ -70,17 +70,17 @@ def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: floa
     if flat is not None:
         return _plate(places, flat, 1.3 * width, layer)
     middle = places.mean(axis=0)
-    bars = [surfaces.bar(middle, place, 0.8 * width) for place in places if np.linalg.norm(place - middle) > width]
+    bars = [surfaces.bar(middle, point, 0.8 * width) for point in places if np.linalg.norm(point - middle) > width]
     return surfaces.merged([surfaces.moved(surfaces.sphere(1.2 * width), middle), *bars])
 
 
-def shapes(told: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
+def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
     """The shapes that a scene gives of a body, in the body frame [m]; files are relative to `folder`.
 
     Raises InputError for files that cannot be read.
     """
-    found = []
-    for shape in told:
+    drawn = []
+    for shape in declared:
         kind = shape["type"]
         if kind == "box":
             part = surfaces.box(shape["size"])
@@ -91,30 +91,30 @@ def shapes(told: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
         else:
             part = shape_files.read(folder / shape["file"], float(shape.get("unit", 1.0)))
         pose = Pose.model_validate(shape.get("pose", {}))
-        found.append(surfaces.moved(part, np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())))
-    return surfaces.merged(found)
+        drawn.append(surfaces.moved(part, np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())))
+    return surfaces.merged(drawn)
 
 
 def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Solid | None, size: float) -> Surface:
-    """A body whose joints are all in one place, or that has none."""
+    """A body whose joints are all at one point, or that has none."""
     width = WIDTH * size
-    place = places[0] if len(places) else com
-    arm = com - place
+    point = places[0] if len(places) else com
+    arm = com - point
     reach = float(np.linalg.norm(arm))
     kinds = [seat.joint for seat in seats]
     if reach > 1.5 * width:
-        return _arm(place, com, solid, width)
+        return _arm(point, com, solid, width)
     slide = next((seat for seat in seats if seat.joint in SLIDING), None)
     if slide is not None:
         block = surfaces.box((3.0 * width, 3.0 * width, 4.4 * width))
-        return surfaces.moved(block, place, slide.axes)
+        return surfaces.moved(block, point, slide.axes)
     wheel = next((seat for seat in seats if seat.joint in TURNING), None)
     if wheel is not None:
-        return surfaces.moved(_wheel(solid, wheel.axes[:, 2], size), place, surfaces.along(wheel.axes[:, 2]))
+        return surfaces.moved(_wheel(solid, wheel.axes[:, 2], size), point, surfaces.along(wheel.axes[:, 2]))
     if any(kind in BALLS for kind in kinds):
         return surfaces.EMPTY
     if solid is None:
-        return surfaces.moved(surfaces.sphere(2.0 * width), place)
+        return surfaces.moved(surfaces.sphere(2.0 * width), point)
     half = solid.half * min(1.0, LARGEST * size / float(solid.half.max()))
     if kinds and np.ptp(half) <= 1e-9 * half.max():  # alike about all axes and fixed to something: a ball
         return surfaces.moved(surfaces.sphere(float(half[0])), com)
@@ -122,15 +122,15 @@ def _lone(seats: Sequence[Seat], places: np.ndarray, com: np.ndarray, solid: Sol
     return surfaces.moved(part, com, solid.axes)
 
 
-def _arm(place: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) -> Surface:
+def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) -> Surface:
     """A body that hangs on one joint: a bar where its inertia is that of one, else a bob on an arm."""
-    axis = (com - place) / np.linalg.norm(com - place)
+    axis = (com - point) / np.linalg.norm(com - point)
     half = 0.0 if solid is None else float(solid.half.max())
-    if solid is not None and _slender(solid, axis) and half < 1.5 * np.linalg.norm(com - place):
+    if solid is not None and _slender(solid, axis) and half < 1.5 * np.linalg.norm(com - point):
         far = com + half * axis
-        return surfaces.bar(place, far, _thickness(solid, axis, width))
+        return surfaces.bar(point, far, _thickness(solid, axis, width))
     radius = 2.4 * width if solid is None else float(np.clip(0.8 * half, 1.8 * width, 4.0 * width))
-    return surfaces.merged([surfaces.bar(place, com, 0.7 * width), surfaces.moved(surfaces.sphere(radius), com)])
+    return surfaces.merged([surfaces.bar(point, com, 0.7 * width), surfaces.moved(surfaces.sphere(radius), com)])
 
 
 def _wheel(solid: Solid | None, axis: np.ndarray, size: float) -> Surface:
@@ -174,22 +174,22 @@ def _common_axis(seats: Sequence[Seat]) -> np.ndarray | None:
 
 
 def _line(places: np.ndarray, width: float) -> np.ndarray | None:
-    """Direction of a line on which all places lie."""
+    """Direction of a line on which all points lie."""
     way = places - places.mean(axis=0)
     _, size, axes = np.linalg.svd(way, full_matrices=False)
     return axes[0] if len(size) < 2 or size[1] < 0.5 * width else None
 
 
 def _plane(places: np.ndarray, width: float) -> np.ndarray | None:
-    """Normal of a plane in which all places lie."""
+    """Normal of a plane in which all points lie."""
     _, size, axes = np.linalg.svd(places - places.mean(axis=0))
     return axes[2] if len(size) < 3 or size[2] < 0.5 * width else None
 
 
 def _apart(places: Sequence[np.ndarray], same: float) -> np.ndarray:
-    """The places, those closer than `same` to an earlier one left out, shape (n, 3)."""
-    found: list[np.ndarray] = []
-    for place in places:
-        if all(np.linalg.norm(place - other) > same for other in found):
-            found.append(place)
-    return np.array(found).reshape(-1, 3)
+    """The points, those closer than `same` to an earlier one left out, shape (n, 3)."""
+    offsets: list[np.ndarray] = []
+    for point in places:
+        if all(np.linalg.norm(point - other) > same for other in offsets):
+            offsets.append(point)
+    return np.array(offsets).reshape(-1, 3)

@@ -27,8 +27,8 @@ def state() -> str:
         return f"without {' and '.join(missing())}: none"
     if not sys.platform.startswith("linux"):
         return f"GL of {sys.platform}"
-    found = [name for name in ("libGL.so.1", "libEGL.so.1", "libOSMesa.so.8") if _loads(name)]
-    return "GL: " + (", ".join(found) or "none")
+    libraries = [name for name in ("libGL.so.1", "libEGL.so.1", "libOSMesa.so.8") if _loads(name)]
+    return "GL: " + (", ".join(libraries) or "none")
 
 
 def missing() -> list[str]:

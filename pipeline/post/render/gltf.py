@@ -28,7 +28,9 @@ class _File:
 
     def __init__(self) -> None:
         self.binary = bytearray()
-        self.told: dict[str, list[Any]] = {n: [] for n in ("bufferViews", "accessors", "meshes", "materials", "nodes")}
+        self.document: dict[str, list[Any]] = {
+            n: [] for n in ("bufferViews", "accessors", "meshes", "materials", "nodes")
+        }
         self.animations: list[dict[str, Any]] = []
 
     def array(self, values: np.ndarray, kind: int = FLOAT, target: int | None = None) -> int:
@@ -36,12 +38,12 @@ class _File:
         data = np.ascontiguousarray(values, dtype="<f4" if kind == FLOAT else "<u4")
         flat = data.reshape(len(data), -1)
         view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": data.nbytes}
-        self.told["bufferViews"].append(view | ({"target": target} if target else {}))
+        self.document["bufferViews"].append(view | ({"target": target} if target else {}))
         self.binary += data.tobytes()
         bounds = {"min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist()} if len(flat) else {}
-        accessor = {"bufferView": len(self.told["bufferViews"]) - 1, "componentType": kind, "count": len(flat)}
-        self.told["accessors"].append(accessor | {"type": TYPES[flat.shape[1]], **bounds})
-        return len(self.told["accessors"]) - 1
+        accessor = {"bufferView": len(self.document["bufferViews"]) - 1, "componentType": kind, "count": len(flat)}
+        self.document["accessors"].append(accessor | {"type": TYPES[flat.shape[1]], **bounds})
+        return len(self.document["accessors"]) - 1
 
     def node(self, name: str, shape: Surface, color: str, opacity: float, fields: np.ndarray | None = None) -> int:
         """The number of a node with this surface, and morph targets where fields are given."""
@@ -52,22 +54,22 @@ class _File:
                 "roughnessFactor": 0.6,
             }
         }
-        self.told["materials"].append(material | ({"alphaMode": "BLEND"} if opacity < 1.0 else {}))
+        self.document["materials"].append(material | ({"alphaMode": "BLEND"} if opacity < 1.0 else {}))
         primitive: dict[str, Any] = {
             "attributes": {
                 "POSITION": self.array(shape.points, target=ARRAY),
                 "NORMAL": self.array(shape.normals, target=ARRAY),
             },
             "indices": self.array(shape.triangles.ravel(), WHOLE, INDICES),
-            "material": len(self.told["materials"]) - 1,
+            "material": len(self.document["materials"]) - 1,
         }
         mesh: dict[str, Any] = {"name": name, "primitives": [primitive]}
         if fields is not None:
             primitive["targets"] = [{"POSITION": self.array(field, target=ARRAY)} for field in fields]
             mesh["weights"] = [0.0] * len(fields)
-        self.told["meshes"].append(mesh)
-        self.told["nodes"].append({"name": name, "mesh": len(self.told["meshes"]) - 1})
-        return len(self.told["nodes"]) - 1
+        self.document["meshes"].append(mesh)
+        self.document["nodes"].append({"name": name, "mesh": len(self.document["meshes"]) - 1})
+        return len(self.document["nodes"]) - 1
 
     def begin(self, name: str) -> None:
         """A new animation; what moves from here on is part of it."""
@@ -82,18 +84,22 @@ class _File:
     def bytes(self, title: str) -> bytes:
         """The file, as GLB."""
         # the world's z is up here, y in glTF
-        self.told["nodes"].append(
-            {"name": title, "children": list(range(len(self.told["nodes"]))), "rotation": [-(0.5**0.5), 0, 0, 0.5**0.5]}
+        self.document["nodes"].append(
+            {
+                "name": title,
+                "children": list(range(len(self.document["nodes"]))),
+                "rotation": [-(0.5**0.5), 0, 0, 0.5**0.5],
+            }
         )
-        told = {
+        message = {
             "asset": {"version": "2.0", "generator": "flexclear"},
             "scene": 0,
-            "scenes": [{"name": title, "nodes": [len(self.told["nodes"]) - 1]}],
+            "scenes": [{"name": title, "nodes": [len(self.document["nodes"]) - 1]}],
             "buffers": [{"byteLength": len(self.binary)}],
             "animations": self.animations,
-            **self.told,
+            **self.document,
         }
-        text = json.dumps(told, separators=(",", ":")).encode()
+        text = json.dumps(message, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
         binary = bytes(self.binary) + b"\0" * (-len(self.binary) % 4)
         chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary

@@ -15,7 +15,7 @@ from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import pace
 from flexclear.pipeline.post.series import derive
 
-#: size of a picture in hundreds of pixels, and length of the trail as a share of the run
+#: size of a picture in hundreds of pixels, and length of the trail as a fraction of the run
 SIZE, TRAIL = (9.6, 5.4), 0.02
 
 
@@ -37,7 +37,7 @@ def frames(
         (trail,) = left.plot([], [], color="#D55E00", lw=1.8, animated=True)
         (dot,) = left.plot([], [], "o", color=style.INK, ms=8, animated=True)
         (mark,) = right.plot([], [], "o", color=style.INK, ms=6, animated=True)
-        figure.suptitle(" ", fontsize=12)  # keeps the place of the clock
+        figure.suptitle(" ", fontsize=12)  # reserves the area of the clock
         clock = figure.text(0.5, 0.965, "", ha="center", va="center", fontsize=12, fontweight="bold", animated=True)
         canvas.draw()
         still = canvas.copy_from_bbox(figure.bbox)
@@ -49,7 +49,7 @@ def frames(
             trail.set_data(x[first[k] : step + 1], y[first[k] : step + 1])
             dot.set_data([x[step]], [y[step]])
             mark.set_data([time[step]], [force[step]])
-            clock.set_text(f"t = {time[step]:.2f} ms, {pace.told(float(shown.slower[k]))}")
+            clock.set_text(f"t = {time[step]:.2f} ms, {pace.speed_text(float(shown.slower[k]))}")
             for artist in (trail, dot, mark):
                 artist.axes.draw_artist(artist)
             figure.draw_artist(clock)

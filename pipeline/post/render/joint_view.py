@@ -12,11 +12,11 @@ from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View
 from flexclear.pipeline.post.series import parameters
 
-#: colour of a path, as in the plots of orbits; most places of it that are drawn
+#: colour of a path, as in the plots of orbits; most points of it that are drawn
 PATH_COLOR, PLACES = "#009E73", 1500
-#: radius of the mark at the centre and of the path, as shares of the room's size
+#: radius of the mark at the centre and of the path, as fractions of the room's size
 MARK, PATH = 0.05, 0.006
-#: where a sphere and where a flat room are looked at from
+#: where a sphere and where a flat room are examined from
 SLANTED, ABOVE = np.array([0.5, -1.0, 0.7]), np.array([0.0, -0.45, 1.0])
 
 
@@ -46,20 +46,20 @@ def shown(run: xr.Dataset, contact: int) -> JointView:
     return JointView(room, surfaces.tube(offset[some], PATH * half), surfaces.sphere(MARK * half), seen)
 
 
-def _room(told: dict, offset: np.ndarray) -> tuple[Surface, float]:
+def _room(given: dict, offset: np.ndarray) -> tuple[Surface, float]:
     """Where the centre may be, and a length that marks are in proportion to [m].
 
     A sphere or disc of the clearance, a slot longer by its travel; of a ball on a plane the plane in which the centre
     lies when the ball touches.
     """
-    if told["type"] == "ball-on-plane":
+    if given["type"] == "ball-on-plane":
         low, high = offset.min(axis=0), offset.max(axis=0)
-        reach = max(float((high - low).max()), 2.0 * float(told["ball_radius"]))
+        reach = max(float((high - low).max()), 2.0 * float(given["ball_radius"]))
         plane = surfaces.box((*((high - low)[:2] + 0.4 * reach), 0.005 * reach))
-        return surfaces.moved(plane, np.array([*(0.5 * (low + high))[:2], told["ball_radius"]])), 0.6 * reach
-    clearance = float(told["clearance"])
-    if told["type"] == "clearance-spherical":
+        return surfaces.moved(plane, np.array([*(0.5 * (low + high))[:2], given["ball_radius"]])), 0.6 * reach
+    clearance = float(given["clearance"])
+    if given["type"] == "clearance-spherical":
         return surfaces.sphere(clearance), clearance
-    half = 0.5 * float(told.get("travel", 0.0))
+    half = 0.5 * float(given.get("travel", 0.0))
     outline = surfaces.hull(np.array([[-half, 0.0], [half, 0.0]]), clearance)
     return surfaces.prism(outline, 0.02 * clearance), max(clearance, 0.3 * half)

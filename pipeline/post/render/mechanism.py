@@ -24,7 +24,7 @@ from flexclear.pipeline.post.series import parameters
 COLORS = ("#5b7fa6", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b", "#9aa5b1")
 JOINT_COLOR, SOCKET_COLOR, CLEARANCE_COLOR, IMPACT_COLOR = "#3b4754", "#a9bccf", "#E69F00", "#d7191c"
 GROUND_COLOR = "#8d98a4"
-#: as shares of the mechanism's size: joint spheres where no ball radius is known, radius of pins, thickness of rails
+#: as fractions of the mechanism's size: joint spheres where no ball radius is known, radius of pins, thickness of rails
 BALL, PIN, RAIL = 0.022, 0.011, 0.008
 #: radius of a drawn socket over that of its ball or pin: the clearance is drawn as if it were the difference
 SOCKET = 1.3
@@ -33,7 +33,7 @@ LONE = 1.0
 #: outputs at which is looked how far a mechanism reaches
 SAMPLES = 24
 _CORNERS = np.array([[k & 1, k & 2, k & 4] for k in range(8)], dtype=bool)
-#: largest drawn deformation as a share of the body's length
+#: largest drawn deformation as a fraction of the body's length
 DEFORMATION_SHARE = 0.05
 
 
@@ -90,35 +90,35 @@ class Mechanism:
     flexible: tuple[Flexible, ...]
     view: View
     size: float  #: diagonal of the box of all frames and of the flexible bodies at the start [m]
-    cloud: np.ndarray  #: points that stand for all that is drawn over the run, world axes [m], shape (n, 3)
+    cloud: np.ndarray  #: points that represent all that is drawn over the run, world axes [m], shape (n, 3)
     looks: Looks
 
 
 def mechanism(run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None) -> Mechanism:
     """The drawn mechanism of a run; bundles by name of the flexible body."""
-    looks, told = looks or Looks(), parameters(run)
+    looks, given = looks or Looks(), parameters(run)
     flexible = tuple(_flexible(run, name, bundle, looks) for name, bundle in bundles.items() if name in run.body.values)
     places = run.frame_position.values if run.sizes.get("frame", 0) else run.position.values
     shown = np.concatenate([places.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
     low, high = shown.min(axis=0), shown.max(axis=0)
     size = float(np.linalg.norm(high - low)) or LONE
-    seats = _seats(told, bundles)
-    parts = (*_bodies(run, told, bundles, seats, looks, size), *_joints(run, told, bundles, size))
-    seen = view(run, told, looks.direction, looks.up)
+    seats = _seats(given, bundles)
+    parts = (*_bodies(run, given, bundles, seats, looks, size), *_joints(run, given, bundles, size))
+    seen = view(run, given, looks.direction, looks.up)
     return Mechanism(run, parts, flexible, seen, size, _cloud(run, parts, flexible), looks)
 
 
 def _cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible]) -> np.ndarray:
     """Corners of the boxes of all parts, and points of flexible bodies, at some outputs of the run."""
-    found = []
+    clouds = []
     for step in np.unique(np.linspace(0, run.sizes["time"] - 1, SAMPLES).astype(int)):
         for part in parts:
             low, high = part.surface.points.min(axis=0), part.surface.points.max(axis=0)
             corners = np.where(_CORNERS, high, low)
             matrix = part_pose(run, part, int(step))
-            found.append(corners @ matrix[:3, :3].T + matrix[:3, 3])
-        found += [placed(run, body, int(step))[0][::7] for body in flexible]
-    return np.concatenate(found) if found else run.position.values[0]
+            clouds.append(corners @ matrix[:3, :3].T + matrix[:3, 3])
+        clouds += [placed(run, body, int(step))[0][::7] for body in flexible]
+    return np.concatenate(clouds) if clouds else run.position.values[0]
 
 
 def pose(run: xr.Dataset, index: int, step: int) -> np.ndarray:
@@ -161,29 +161,31 @@ def _names(run: xr.Dataset, dim: str) -> list[str]:
     return [str(name) for name in run[dim].values] if dim in run.coords else []
 
 
-def frame_pose(told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], frame: str) -> tuple[np.ndarray, np.ndarray]:
+def frame_pose(
+    given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], frame: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Origin [m] and axes (columns) of a named frame in those of its body."""
     body, _, name = frame.partition(".")
     if body in bundles:
         data = bundles[body].sel(frame=name)
         return data["frame_position"].values, data["frame_rotation"].values
-    given = Pose.model_validate(told.get("body", {}).get(body, {}).get("frames", {}).get(name, {}))
-    return np.array(given.position), quaternion_to_matrix(given.as_quaternion())
+    pose = Pose.model_validate(given.get("body", {}).get(body, {}).get("frames", {}).get(name, {}))
+    return np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())
 
 
-def _seats(told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset]) -> dict[str, list[Seat]]:
+def _seats(given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset]) -> dict[str, list[Seat]]:
     """Where joints sit on each body."""
-    found: dict[str, list[Seat]] = {}
-    for joint in told.get("joint", {}).values():
+    by_body: dict[str, list[Seat]] = {}
+    for joint in given.get("joint", {}).values():
         for k, frame in enumerate(joint["between"]):
-            origin, axes = frame_pose(told, bundles, frame)
-            found.setdefault(frame.partition(".")[0], []).append(Seat(frame, origin, axes, joint["type"], k == 0))
-    return found
+            origin, axes = frame_pose(given, bundles, frame)
+            by_body.setdefault(frame.partition(".")[0], []).append(Seat(frame, origin, axes, joint["type"], k == 0))
+    return by_body
 
 
 def _bodies(
     run: xr.Dataset,
-    told: Mapping[str, Any],
+    given: Mapping[str, Any],
     bundles: Mapping[str, xr.Dataset],
     seats: Mapping[str, list[Seat]],
     looks: Looks,
@@ -191,7 +193,7 @@ def _bodies(
 ) -> Iterator[Part]:
     """Rigid bodies and the ground, as their scene draws them or as links between their joints."""
     names, kinds = _names(run, "body"), dict[tuple[Any, ...], str]()
-    for name, body in told.get("body", {}).items():
+    for name, body in given.get("body", {}).items():
         look = looks.bodies.get(name, {})
         own = None if "geometry" not in look else forms.shapes(look["geometry"], looks.folder)
         if name not in names:
@@ -199,7 +201,7 @@ def _bodies(
                 yield Part(None, own, look.get("color", GROUND_COLOR))
             continue
         if name in bundles:
-            if own is not None:  # beside the deformed mesh: what is fixed to it
+            if own is not None:  # next to the deformed mesh: what is fixed to it
                 yield Part(
                     names.index(name),
                     surfaces.moved(own, -_centre_at_rest(bundles[name])),
@@ -222,22 +224,24 @@ def _centre_at_rest(bundle: xr.Dataset) -> np.ndarray:
     return _centre(bundle, np.zeros(bundle.sizes["mode"]))
 
 
-def _joints(run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], size: float) -> Iterator[Part]:
+def _joints(
+    run: xr.Dataset, given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], size: float
+) -> Iterator[Part]:
     """Balls, pins, rails, crosses and planes of the joints."""
     contacts = _names(run, "contact")
-    for name, joint in told.get("joint", {}).items():
+    for name, joint in given.get("joint", {}).items():
         kind, (first, second) = joint["type"], joint["between"]
         contact = contacts.index(name) if name in contacts else None
         color = JOINT_COLOR if contact is None else CLEARANCE_COLOR
 
         def at(frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0) -> Part:
-            return _seated(run, told, bundles, frame, part, color, contact, opacity)
+            return _seated(run, given, bundles, frame, part, color, contact, opacity)
 
         if kind in forms.BALLS:
             radius = float(joint.get("ball_radius", BALL * size))
             yield at(second, surfaces.sphere(radius), color, contact)
             if kind == "ball-on-plane":
-                yield at(first, _floor(run, told, bundles, joint, size), GROUND_COLOR)
+                yield at(first, _floor(run, given, bundles, joint, size), GROUND_COLOR)
             else:
                 yield at(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, None, 0.35)
         elif "revolute" in kind or kind == "clearance-slot":
@@ -274,14 +278,14 @@ _X, _Y = surfaces.along(np.array([1.0, 0.0, 0.0])), surfaces.along(np.array([0.0
 
 
 def _floor(
-    run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], joint: Mapping[str, Any], size: float
+    run: xr.Dataset, given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], joint: Mapping[str, Any], size: float
 ) -> Surface:
     """A plane without end, as far as a ball goes on it; around the frame's origin where the plane itself moves."""
     (first, second), names = joint["between"], _names(run, "frame")
     low = high = np.zeros(2)
     reach = 0.25 * size
     if first.partition(".")[0] not in _names(run, "body") and second in names:
-        origin, axes = frame_pose(told, bundles, first)
+        origin, axes = frame_pose(given, bundles, first)
         path = (run.frame_position.values[:, names.index(second)] - origin) @ axes
         low, high = path.min(axis=0)[:2], path.max(axis=0)[:2]
         reach = 2.5 * float(joint["ball_radius"])
@@ -300,7 +304,7 @@ def _travel(run: xr.Dataset, joint: str) -> tuple[float, float]:
 
 def _seated(
     run: xr.Dataset,
-    told: Mapping[str, Any],
+    given: Mapping[str, Any],
     bundles: Mapping[str, xr.Dataset],
     frame: str,
     part: Surface,
@@ -309,7 +313,7 @@ def _seated(
     opacity: float,
 ) -> Part:
     """A part at a named frame, given in its axes."""
-    origin, axes = frame_pose(told, bundles, frame)
+    origin, axes = frame_pose(given, bundles, frame)
     bodies, frames, body = _names(run, "body"), _names(run, "frame"), frame.partition(".")[0]
     if body not in bodies:
         return Part(None, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
@@ -318,7 +322,7 @@ def _seated(
             bodies.index(body), surfaces.moved(part, np.zeros(3), axes), color, opacity, frames.index(frame), contact
         )
     com = (
-        _centre_at_rest(bundles[body]) if body in bundles else np.array(told["body"][body].get("com", (0.0, 0.0, 0.0)))
+        _centre_at_rest(bundles[body]) if body in bundles else np.array(given["body"][body].get("com", (0.0, 0.0, 0.0)))
     )
     return Part(bodies.index(body), surfaces.moved(part, origin - com, axes), color, opacity, contact=contact)
 

@@ -14,7 +14,7 @@ from flexclear.pipeline.post.impacts import impacts
 
 #: length of a film [s], and how much slower it runs around impacts
 SECONDS, SLOWER = 3.75, 8.0
-#: so many of the strongest impacts are shown slowly, each within this share of the run
+#: so many of the strongest impacts are shown slowly, each within this fraction of the run
 SHOWN, AROUND = 3, 0.008
 
 
@@ -36,30 +36,33 @@ def pace(run: xr.Dataset, seconds: float | None = None, slower: float | None = N
     factor = SLOWER if slower is None else slower
     for when in strong:
         # a smooth bump: the film slows down and speeds up again, it does not jump
-        near = np.clip(1.0 - np.abs(way - (when - start) / span) / (2.0 * AROUND), 0.0, 1.0)
-        weight = np.maximum(weight, 1.0 + (factor - 1.0) * np.minimum(2.0 * near, 1.0))
+        closeness = np.clip(1.0 - np.abs(way - (when - start) / span) / (2.0 * AROUND), 0.0, 1.0)
+        weight = np.maximum(weight, 1.0 + (factor - 1.0) * np.minimum(2.0 * closeness, 1.0))
     passed = np.concatenate([[0.0], np.cumsum(0.5 * (weight[1:] + weight[:-1]) * np.diff(way))])
     total = max(round(seconds * rate * min(1.4, passed[-1])), 2)
-    share = np.interp(np.linspace(0.0, passed[-1], total), passed, way)
+    fraction = np.interp(np.linspace(0.0, passed[-1], total), passed, way)
     length = total / rate
-    return Pace(start + span * share, length / passed[-1] * np.interp(share, way, weight) / span)
+    return Pace(start + span * fraction, length / passed[-1] * np.interp(fraction, way, weight) / span)
 
 
 def strongest(run: xr.Dataset) -> np.ndarray:
     """When the strongest impacts begin [s], at most SHOWN, ascending; none without contacts."""
-    found = impacts(run)
-    if "impact_time" not in found:
+    all_impacts = impacts(run)
+    if "impact_time" not in all_impacts:
         return np.empty(0)
-    times, force = np.asarray(found["impact_time"][1]), np.nan_to_num(np.asarray(found["impact_peak_force"][1]))
-    kept: list[float] = []
+    times, force = (
+        np.asarray(all_impacts["impact_time"][1]),
+        np.nan_to_num(np.asarray(all_impacts["impact_peak_force"][1])),
+    )
+    chosen: list[float] = []
     least = 4.0 * AROUND * float(run["time"].values[-1] - run["time"].values[0])
     for k in np.argsort(-force, kind="stable"):
-        if len(kept) < SHOWN and all(abs(times[k] - other) > least for other in kept):
-            kept.append(float(times[k]))
-    return np.sort(kept)
+        if len(chosen) < SHOWN and all(abs(times[k] - other) > least for other in chosen):
+            chosen.append(float(times[k]))
+    return np.sort(chosen)
 
 
-def told(slower: float) -> str:
+def speed_text(slower: float) -> str:
     """The pace in words."""
     if 0.95 < slower < 1.05:
         return "as fast as it is"
@@ -78,8 +81,8 @@ class Caption:
         shade = self.drawn(text)
         height = len(shade)
         ink = np.array([int(self.color[k : k + 2], 16) for k in (1, 3, 5)])
-        place = picture[-height:, : shade.shape[1]]
-        place[:] = np.round(place * (1.0 - shade[..., None]) + ink * shade[..., None]).astype(picture.dtype)
+        area = picture[-height:, : shade.shape[1]]
+        area[:] = np.round(area * (1.0 - shade[..., None]) + ink * shade[..., None]).astype(picture.dtype)
 
     def _drawn(self, text: str) -> np.ndarray:
         """How dark each pixel is, in [0, 1]."""

@@ -1,4 +1,4 @@
-"""The plots that run beside a film: drawn once, then only the moving marks."""
+"""The plots that run next to a film: drawn once, then only the moving marks."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from flexclear.pipeline.post.render import joint_view
 
 #: a body that turns by less does not turn [degrees]
 STILL = 1e-3
-#: beside titles [pixels]
+#: next to titles [pixels]
 MARGIN = 6.0
 
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """A figure whose still part is kept as pixels; `cursors` are (dot, x, y) and `clock` shows the time."""
+    """A figure whose still part is stored as pixels; `cursors` are (dot, x, y) and `clock` shows the time."""
 
     canvas: FigureCanvasAgg
     background: Any
@@ -70,7 +70,7 @@ def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Seque
         axes[2].set_title(f"{run['contact'].values[number]} {centre(run, number).removeprefix('centre ')}")
         cursors.append((_dot(axes[2], 7), x, y))
     titles = [panel.set_title(panel.get_title(loc="left"), loc="left", fontsize=8.2) for panel in axes]
-    figure.suptitle(" ", fontsize=13)  # keeps the place of the clock
+    figure.suptitle(" ", fontsize=13)  # reserves the area of the clock
     clock = figure.text(
         0.5, 0.972, "", ha="center", va="center", fontsize=13, fontweight="bold", color=style.INK, animated=True
     )
@@ -98,9 +98,9 @@ def _first(names: Iterable[object], watch: Sequence[str]) -> int | None:
 
 def _body(run: xr.Dataset, watch: Sequence[str]) -> int:
     """The first watched body; else the one that moves farthest."""
-    found = _first(run.body.values, watch)
-    if found is not None:
-        return found
+    name = _first(run.body.values, watch)
+    if name is not None:
+        return name
     way = np.linalg.norm(run.position.values - run.position.values[:1], axis=-1)
     return int(np.argmax(way.max(axis=0)))
 

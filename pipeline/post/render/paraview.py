@@ -19,35 +19,35 @@ from flexclear.pipeline.post.render.mechanism import Mechanism, part_pose, place
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.series import parameters
 
-#: longest arrow, and thickness of arrows, as shares of the mechanism's size
+#: longest arrow, and thickness of arrows, as fractions of the mechanism's size
 LONGEST, THICK = 0.3, 0.006
 
 
 def series(drawn: Mechanism, steps: np.ndarray, name: str = "motion") -> dict[str, bytes]:
     """``motion.pvd`` and the files that it names, by name."""
-    found: dict[str, bytes] = {}
+    files: dict[str, bytes] = {}
     entries = []
     largest = max((float(np.linalg.norm(f, axis=-1).max(initial=0.0)) for _, _, f in _forces(drawn.run)), default=0.0)
     for k, step in enumerate(steps):
         time = float(drawn.run["time"].values[step])
         bodies, arrows = f"{name}_{k:04d}.vtp", f"{name}_forces_{k:04d}.vtp"
-        found[bodies] = _bodies(drawn, int(step))
+        files[bodies] = _bodies(drawn, int(step))
         entries.append((time, 0, "bodies", bodies))
         if largest > 0.0:
-            found[arrows] = _arrows(drawn, int(step), largest)
+            files[arrows] = _arrows(drawn, int(step), largest)
             entries.append((time, 1, "forces", arrows))
-    found[f"{name}.pvd"] = collection(
+    files[f"{name}.pvd"] = collection(
         [
             f'<DataSet timestep="{time!r}" part="{part}" name="{group}" file={quoteattr(file)}/>'
             for time, part, group, file in entries
         ]
     )
-    return found
+    return files
 
 
 def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> dict[str, bytes]:
     """``<name>.pvd``, a series with the number of the mode for time, and the files that it names."""
-    found, lines = {}, []
+    files, lines = {}, []
     rest, _ = surface(bundle, np.zeros(bundle.sizes["mode"]))
     triangles = surfaces.triangulated(faces(bundle))
     for k, frequency in enumerate(bundle["frequency"].values):
@@ -55,9 +55,9 @@ def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> dict[str, bytes]:
         points, _ = surface(bundle, q)
         file = f"{name}_{k + 1:03d}.vtp"
         data = {"displacement": points - rest, "frequency_Hz": np.full(len(points), float(frequency))}
-        found[file] = vtp(surfaces.shaded(points, triangles), data)
+        files[file] = vtp(surfaces.shaded(points, triangles), data)
         lines.append(f'<DataSet timestep="{k + 1}" part="0" name="mode" file={quoteattr(file)}/>')
-    return found | {f"{name}.pvd": collection(lines)}
+    return files | {f"{name}.pvd": collection(lines)}
 
 
 def collection(lines: list[str]) -> bytes:
@@ -84,16 +84,16 @@ def _bodies(drawn: Mechanism, step: int) -> bytes:
 def _arrows(drawn: Mechanism, step: int, largest: float) -> bytes:
     shapes, forces = [], []
     for _, places, force in _forces(drawn.run):
-        for place, value in zip(places[step], force[step], strict=True):
+        for point, value in zip(places[step], force[step], strict=True):
             length = LONGEST * drawn.size * float(np.linalg.norm(value)) / largest
             if length > 0.01 * LONGEST * drawn.size:
-                shapes.append(arrow(place, value / np.linalg.norm(value) * length, THICK * drawn.size))
+                shapes.append(arrow(point, value / np.linalg.norm(value) * length, THICK * drawn.size))
                 forces.append(np.tile(value, (len(shapes[-1].points), 1)))
     return vtp(surfaces.merged(shapes), {"force": np.concatenate(forces) if forces else np.empty((0, 3))})
 
 
-def arrow(place: np.ndarray, way: np.ndarray, thick: float) -> Surface:
-    """An arrow that begins at a place, as long and directed as `way`."""
+def arrow(point: np.ndarray, way: np.ndarray, thick: float) -> Surface:
+    """An arrow that begins at a point, as long and directed as `way`."""
     length = float(np.linalg.norm(way))
     head = min(6.0 * thick, 0.4 * length)
     shaft = surfaces.moved(surfaces.cylinder(thick, length - head), np.array([0.0, 0.0, 0.5 * (length - head)]))
@@ -105,27 +105,27 @@ def arrow(place: np.ndarray, way: np.ndarray, thick: float) -> Surface:
     cone = np.concatenate(
         [np.column_stack([ring, after, np.full(n, n)]), np.column_stack([after, ring, np.full(n, n + 1)])]
     )
-    return surfaces.moved(surfaces.merged([shaft, surfaces.shaded(points, cone)]), place, surfaces.along(way))
+    return surfaces.moved(surfaces.merged([shaft, surfaces.shaded(points, cone)]), point, surfaces.along(way))
 
 
 def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Forces on bodies with the places where they act: kind, (time, n, 3) [m], (time, n, 3) [N], world axes."""
-    told, frames = (
+    """Forces on bodies with the points where they act: kind, (time, n, 3) [m], (time, n, 3) [N], world axes."""
+    given, frames = (
         parameters(run),
         {str(name): k for k, name in enumerate(run["frame"].values)} if "frame" in run.coords else {},
     )
     for family, variable, dim in (("joint", "joint_force", "joint"), ("load", "load_force", "load")):
         if variable not in run:
             continue
-        places, kept = [], []
+        places, forces = [], []
         for k, name in enumerate(str(n) for n in run[dim].values):
-            part = told.get(family, {}).get(name, {})
+            part = given.get(family, {}).get(name, {})
             frame = part["between"][1] if "between" in part else part.get("frame")
             if frame in frames:
                 places.append(run["frame_position"].values[:, frames[frame]])
-                kept.append(k)
-        if kept:
-            yield family, np.stack(places, axis=1), run[variable].values[:, kept]
+                forces.append(k)
+        if forces:
+            yield family, np.stack(places, axis=1), run[variable].values[:, forces]
 
 
 def vtp(shape: Surface, data: dict[str, np.ndarray]) -> bytes:

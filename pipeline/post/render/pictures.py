@@ -127,31 +127,31 @@ def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
 
 
 def _mode_sheets(shown: Shown) -> dict[str, bytes]:
-    found: dict[str, bytes] = {}
+    files: dict[str, bytes] = {}
     for body, bundle in _bodies(shown).items():
         seen = player.side(bundle)
-        found |= mode_sheet.files(f"modes_{body}", body, bundle, seen.direction, seen.up)
-    return found
+        files |= mode_sheet.files(f"modes_{body}", body, bundle, seen.direction, seen.up)
+    return files
 
 
 def _mode_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
     def make_films(shown: Shown) -> dict[str, bytes]:
         from flexclear.pipeline.post.render import writing
 
-        found = {}
+        files = {}
         for body, bundle in _bodies(shown).items():
             seen = player.side(bundle)
             suffix, content = writing.write(mode_sheet.frames(body, bundle, seen.direction, seen.up), 12, kind)
-            found[f"modes_{body}.{suffix}"] = content
-        return found
+            files[f"modes_{body}.{suffix}"] = content
+        return files
 
     return make_films
 
 
 def _mode_page(shown: Shown) -> dict[str, bytes]:
-    """The mode sets of all bodies beside each other."""
+    """The mode sets of all bodies next to each other."""
     views = [
-        viewer(player.modes(bundle), f"{body}: {mode_sheet.told(bundle)}", play=True)
+        viewer(player.modes(bundle), f"{body}: {mode_sheet.range_text(bundle)}", play=True)
         for body, bundle in _bodies(shown).items()
     ]
     return {"modes.html": viewer_page(shown.name("modes"), views)}
@@ -164,10 +164,10 @@ def _mode_gltf(shown: Shown) -> dict[str, bytes]:
 
 
 def _mode_series(shown: Shown) -> dict[str, bytes]:
-    found: dict[str, bytes] = {}
+    files: dict[str, bytes] = {}
     for body, bundle in _bodies(shown).items():
-        found |= paraview.modes(f"modes_{body}", bundle, player.scales(bundle))
-    return found
+        files |= paraview.modes(f"modes_{body}", bundle, player.scales(bundle))
+    return files
 
 
 def _contacts(shown: Shown) -> list[str]:
@@ -208,7 +208,7 @@ def _joint_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
     def make_films(shown: Shown) -> dict[str, bytes]:
         from flexclear.pipeline.post.render import joint_film, writing
 
-        found = {}
+        files = {}
         rate = writing.RATE if kind == "mp4" else writing.RATE // 2
         names = _contacts(shown)
         assert shown.run is not None
@@ -216,8 +216,8 @@ def _joint_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
             name = names[k]
             pictures = joint_film.frames(shown.run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
             suffix, content = writing.write(pictures, rate, kind)
-            found[f"joint_{name}.{suffix}"] = content
-        return found
+            files[f"joint_{name}.{suffix}"] = content
+        return files
 
     return make_films
 
@@ -232,8 +232,8 @@ def _vibrating(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
 
 
 def _vibration_page(shown: Shown) -> dict[str, bytes]:
-    drawn, told = _vibrating(shown)
-    view = viewer(player.vibrations(drawn, told), f"{len(told.labels)} natural vibrations", play=True)
+    drawn, vibrating = _vibrating(shown)
+    view = viewer(player.vibrations(drawn, vibrating), f"{len(vibrating.labels)} natural vibrations", play=True)
     return {"vibrations.html": viewer_page(shown.name("natural vibrations"), [view])}
 
 

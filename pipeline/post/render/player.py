@@ -31,8 +31,8 @@ from flexclear.pipeline.post.render.view import View, eye
 
 #: frames of a motion, and width over height of a picture that is neither wide nor narrow
 FRAMES, ASPECT = 240, 1.2
-#: drawn size of the largest displacement of a mode, as a share of the body's length
-SHARE = 0.12
+#: drawn size of the largest displacement of a mode, as a fraction of the body's length
+FRACTION = 0.12
 
 
 def motion(drawn: Mechanism, frames: int = FRAMES) -> dict[str, Any]:
@@ -47,10 +47,10 @@ def motion(drawn: Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     for body in drawn.flexible:
         track = tracks.setdefault((body.index, None), len(tracks))
         meshes.append(_bent(run, body, steps) | {"track": track})
-    kept = [_track(run, owner, frame, steps) for owner, frame in tracks]
+    tracks_of = [_track(run, owner, frame, steps) for owner, frame in tracks]
     return {
         "meshes": meshes,
-        "tracks": [_floats(track) for track in kept],
+        "tracks": [_floats(track) for track in tracks_of],
         "times": _rounded(run, steps),
         "rate": len(steps) / (drawn.looks.duration or pace.SECONDS),
         "exaggeration": max((body.scale for body in drawn.flexible), default=1.0),
@@ -106,16 +106,16 @@ def modes(bundle: xr.Dataset) -> dict[str, Any]:
 
 def scales(bundle: xr.Dataset) -> np.ndarray:
     """The factor by which each mode of a body is drawn [kg^0.5 m], shape (mode,)."""
-    return np.array([scale_to(bundle, unit, SHARE) for unit in np.eye(bundle.sizes["mode"])])
+    return np.array([scale_to(bundle, unit, FRACTION) for unit in np.eye(bundle.sizes["mode"])])
 
 
-def vibrations(drawn: Mechanism, told: Vibrations) -> dict[str, Any]:
+def vibrations(drawn: Mechanism, linear: Vibrations) -> dict[str, Any]:
     """The natural vibrations of a mechanism about a pose, for the viewer.
 
     Of each complex shape real and imaginary part are shown in turn, so that running waves run.
     """
     meshes = []
-    for piece in told.pieces:
+    for piece in linear.pieces:
         mesh = _still(piece.surface, piece.color, piece.opacity) | {"track": -1, "plain": piece.plain}
         if piece.moved.any():
             mesh["fields"] = [_scaled(f) for f in piece.moved.reshape(-1, *piece.moved.shape[2:])]
@@ -123,16 +123,16 @@ def vibrations(drawn: Mechanism, told: Vibrations) -> dict[str, Any]:
         meshes.append(mesh)
     shapes = [
         {
-            "label": label, "fields": [2 * k, 2 * k + 1], "scale": float(told.scale[k]),
-            "largest": float(told.largest[k]) or 1.0,
+            "label": label, "fields": [2 * k, 2 * k + 1], "scale": float(linear.scale[k]),
+            "largest": float(linear.largest[k]) or 1.0,
         }
-        for k, label in enumerate(told.labels)
+        for k, label in enumerate(linear.labels)
     ]  # fmt: skip
     return {"meshes": meshes, "shapes": shapes, "unit": 1.0, **_camera(drawn.view, drawn.cloud, drawn.looks.zoom)}
 
 
 def side(bundle: xr.Dataset) -> View:
-    """From where a body alone is looked at: its length across the picture."""
+    """From where a body alone is examined: its length across the picture."""
     x = bundle["node_position"].values
     (axis, *_), _ = box(bundle)
     axis = axis * (1.0 if axis @ (x[-1] - x[0]) >= 0.0 else -1.0)
@@ -147,8 +147,8 @@ def _steps(run: xr.Dataset, looks: Looks, frames: int) -> np.ndarray:
         return np.zeros(1, dtype=int)
     times = pace.pace(run, looks.duration, looks.impact_slowdown).times
     times = times[np.unique(np.linspace(0, times.size - 1, frames).astype(int))]
-    found: np.ndarray = np.clip(np.searchsorted(run["time"].values, times - 1e-12), 0, run.sizes["time"] - 1)
-    return found
+    steps: np.ndarray = np.clip(np.searchsorted(run["time"].values, times - 1e-12), 0, run.sizes["time"] - 1)
+    return steps
 
 
 def _rounded(run: xr.Dataset, steps: np.ndarray) -> list[float]:
@@ -162,12 +162,12 @@ def _bent(run: xr.Dataset, body: Flexible, steps: np.ndarray) -> dict[str, Any]:
     some = np.unique(np.linspace(0, len(q) - 1, 60).astype(int))
     largest = max(float(np.linalg.norm(np.tensordot(q[k], fields, axes=1), axis=1).max()) for k in some)
     rest_centre = bundle["first_moment"].values / float(bundle["mass"])
-    told = _skin(bundle, rest - rest_centre) | {
+    content = _skin(bundle, rest - rest_centre) | {
         "fields": [_scaled(values) for values in fields],
         "weights": _floats(q[steps]),
         "largest": largest,
     }
-    return told | ({"color": body.color, "plain": True} if body.color else {})
+    return content | ({"color": body.color, "plain": True} if body.color else {})
 
 
 def _track(run: xr.Dataset, owner: int | None, frame: int | None, steps: np.ndarray) -> np.ndarray:
@@ -198,12 +198,12 @@ def _skin(bundle: xr.Dataset, points: np.ndarray) -> dict[str, Any]:
 
 def _camera(seen: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
     """Where the eye is, and how far what it sees reaches across and upright, over the distance."""
-    place, focus = eye(seen, cloud, ASPECT)
-    back = (place - focus) / np.linalg.norm(place - focus)
+    position, focus = eye(seen, cloud, ASPECT)
+    back = (position - focus) / np.linalg.norm(position - focus)
     right = np.cross(seen.up, back) / np.linalg.norm(np.cross(seen.up, back))
-    local = (cloud - place) @ np.array([right, np.cross(back, right), -back]).T
+    local = (cloud - position) @ np.array([right, np.cross(back, right), -back]).T
     reach = np.abs(local[:, :2] / local[:, 2:]).max(axis=0) / zoom
-    return {"eye": place.tolist(), "focus": focus.tolist(), "up": seen.up.tolist(), "reach": reach.tolist()}
+    return {"eye": position.tolist(), "focus": focus.tolist(), "up": seen.up.tolist(), "reach": reach.tolist()}
 
 
 def _floats(values: np.ndarray) -> str:

@@ -8,8 +8,8 @@ import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.external_files import mesh as foreign_mesh
-from flexclear.pipeline.core.external_files.apart import UnreadableError
 from flexclear.pipeline.core.external_files.checks import require_mesh
+from flexclear.pipeline.core.external_files.isolated import UnreadableError
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.surfaces import Surface
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-#: two principal moments closer than this share are called equal: a cylinder, not a box; tables print four digits
+#: two principal moments closer than this fraction are called equal: a cylinder, not a box; tables print four digits
 ROUND = 0.01
-#: thinnest drawn thickness as a share of the body's largest extent, so that plates are seen
+#: thinnest drawn thickness as a fraction of the body's largest extent, so that plates are seen
 THINNEST = 0.03
 
 

@@ -77,7 +77,7 @@ def prism(outline: np.ndarray, thickness: float, *, smooth: bool = False) -> Sur
 
 
 def hull(places: np.ndarray, margin: float) -> np.ndarray:
-    """Outline around places in a plane, shape (n, 2), at a distance `margin` from them, anticlockwise, shape (m, 2)."""
+    """Outline around points in a plane, shape (n, 2), at a distance `margin` from them, anticlockwise, shape (m, 2)."""
     turn = np.linspace(0.0, 2.0 * np.pi, ROUND, endpoint=False)
     circle = margin * np.column_stack([np.cos(turn), np.sin(turn)])
     spread = (places[:, None, :] + circle).reshape(-1, 2)
@@ -113,9 +113,9 @@ def bar(start: np.ndarray, end: np.ndarray, radius: float) -> Surface:
 
 
 def tube(places: np.ndarray, radius: float, corners: int = 6) -> Surface:
-    """A thin round tube through places, shape (n, 3), open at its ends; places that repeat are left out."""
-    apart = np.concatenate([[True], np.linalg.norm(np.diff(places, axis=0), axis=1) > 1e-3 * radius])
-    places = places[apart]
+    """A thin round tube through points, shape (n, 3), open at its ends; points that repeat are left out."""
+    distinct = np.concatenate([[True], np.linalg.norm(np.diff(places, axis=0), axis=1) > 1e-3 * radius])
+    places = places[distinct]
     if len(places) < 2:
         return moved(sphere(radius), places[0])
     way = np.gradient(places, axis=0)

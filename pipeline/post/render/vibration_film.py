@@ -15,7 +15,7 @@ from flexclear.pipeline.post.render.pace import Caption
 from flexclear.pipeline.post.render.stage import SOFT, image, plotter, polydata
 from flexclear.pipeline.post.render.vibrations import Vibrations
 
-#: size of a film's pictures and of those on a sheet, and how many stand beside each other there
+#: size of a film's pictures and of those on a sheet, and how many are next to each other there
 SIZE, TILE, COLUMNS = (960, 540), (480, 360), 3
 #: how long one vibration is shown [s], and how many periods it goes through meanwhile
 SECONDS, PERIODS = 1.5, 2
@@ -23,11 +23,11 @@ SECONDS, PERIODS = 1.5, 2
 SHOWN = 12
 
 
-def frames(drawn: Mechanism, told: Vibrations, rate: int, progress: Progress = silent) -> Iterator[np.ndarray]:
+def frames(drawn: Mechanism, modes: Vibrations, rate: int, progress: Progress = silent) -> Iterator[np.ndarray]:
     """The slowest vibrations in turn, at most SHOWN, pictures of shape (540, 960, 3), so many a second."""
     count = round(SECONDS * rate / PERIODS)
-    scene = _Scene(drawn, told, SIZE)
-    shown = min(len(told.labels), SHOWN)
+    scene = _Scene(drawn, modes, SIZE)
+    shown = min(len(modes.labels), SHOWN)
     for k in range(shown):
         period = [scene.picture(k, 2.0 * np.pi * n / count) for n in range(count)]
         for _ in range(PERIODS):
@@ -36,10 +36,10 @@ def frames(drawn: Mechanism, told: Vibrations, rate: int, progress: Progress = s
     scene.close()
 
 
-def sheet(drawn: Mechanism, told: Vibrations) -> np.ndarray:
+def sheet(drawn: Mechanism, modes: Vibrations) -> np.ndarray:
     """The vibrations at their largest, in rows of three, slowest first: at most SHOWN of them."""
-    scene = _Scene(drawn, told, TILE)
-    tiles = [scene.picture(k, 0.0) for k in range(min(len(told.labels), SHOWN))]
+    scene = _Scene(drawn, modes, TILE)
+    tiles = [scene.picture(k, 0.0) for k in range(min(len(modes.labels), SHOWN))]
     scene.close()
     columns = min(COLUMNS, len(tiles))
     blank = np.full_like(tiles[0], 255)
@@ -49,28 +49,28 @@ def sheet(drawn: Mechanism, told: Vibrations) -> np.ndarray:
     )
 
 
-def _cloud(told: Vibrations) -> np.ndarray:
-    """Points that stand for all that is drawn, at both ends of each vibration that is shown."""
-    found = []
-    for piece in told.pieces:
-        for k in range(min(len(told.labels), SHOWN)):
-            way = told.scale[k] * piece.moved[k, 0, ::5]
-            found += [piece.surface.points[::5] + way, piece.surface.points[::5] - way]
-    return np.concatenate(found)
+def _cloud(modes: Vibrations) -> np.ndarray:
+    """Points that represent all that is drawn, at both ends of each vibration that is shown."""
+    clouds = []
+    for piece in modes.pieces:
+        for k in range(min(len(modes.labels), SHOWN)):
+            way = modes.scale[k] * piece.moved[k, 0, ::5]
+            clouds += [piece.surface.points[::5] + way, piece.surface.points[::5] - way]
+    return np.concatenate(clouds)
 
 
 class _Scene:
     """The mechanism on the stage, its skins, and the words below it."""
 
-    def __init__(self, drawn: Mechanism, told: Vibrations, size: tuple[int, int]) -> None:
-        self.told = told
+    def __init__(self, drawn: Mechanism, modes: Vibrations, size: tuple[int, int]) -> None:
+        self.modes = modes
         self.stage = plotter(size)
         self.caption = Caption((size[0], 26), SOFT)
-        self.skins = [self._skin(k) for k in range(len(told.pieces))]
-        look(self.stage, replace(drawn, cloud=_cloud(told)))
+        self.skins = [self._skin(k) for k in range(len(modes.pieces))]
+        look(self.stage, replace(drawn, cloud=_cloud(modes)))
 
     def _skin(self, k: int) -> pv.PolyData:
-        piece = self.told.pieces[k]
+        piece = self.modes.pieces[k]
         mesh = polydata(piece.surface)
         if piece.plain:
             solid(self.stage, piece.surface, piece.color, piece.opacity, mesh)
@@ -81,14 +81,14 @@ class _Scene:
 
     def picture(self, vibration: int, phase: float) -> np.ndarray:
         """One vibration at a phase [rad], shape (height, width, 3)."""
-        scale, largest = self.told.scale[vibration], self.told.largest[vibration] or 1.0
-        for piece, mesh in zip(self.told.pieces, self.skins, strict=True):
+        scale, largest = self.modes.scale[vibration], self.modes.largest[vibration] or 1.0
+        for piece, mesh in zip(self.modes.pieces, self.skins, strict=True):
             way = np.cos(phase) * piece.moved[vibration, 0] - np.sin(phase) * piece.moved[vibration, 1]
             mesh.points = piece.surface.points + scale * way
             if not piece.plain:
                 mesh["displacement"] = np.linalg.norm(way, axis=1) / largest
         picture = image(self.stage)
-        self.caption.onto(picture, f"{self.told.labels[vibration]}; drawn larger than it is")
+        self.caption.onto(picture, f"{self.modes.labels[vibration]}; drawn larger than it is")
         return picture
 
     def close(self) -> None:

@@ -13,8 +13,8 @@ from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.fields import hertz, linear_fields
 from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose
 
-#: drawn size of the largest displacement of a vibration, as a share of the mechanism's size
-SHARE = 0.12
+#: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size
+FRACTION = 0.12
 #: largest drawn rotation of any frame [rad]: points of a body that turns further would leave it, they move linearly
 TURN = 0.5
 #: displacement of the centre of mass and rotation in each vibration, (vibration, part, 3), by index of the body
@@ -89,7 +89,7 @@ def _scale(linear: xr.Dataset, size: float, largest: np.ndarray) -> np.ndarray:
     """The factor of each vibration, so that neither displacements nor rotations are drawn too large."""
     turned = np.linalg.norm(linear["frame_rotation"].values, axis=-1).reshape(len(largest), -1).max(axis=1, initial=0.0)
     factor: np.ndarray = np.minimum(
-        SHARE * size / np.where(largest > 0.0, largest, 1.0), TURN / np.where(turned > 0.0, turned, 1e-300)
+        FRACTION * size / np.where(largest > 0.0, largest, 1.0), TURN / np.where(turned > 0.0, turned, 1e-300)
     )
     return factor
 
@@ -101,12 +101,12 @@ def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexibl
     """
     bent = {body.index: body for body in flexible}
     frames = [str(name) for name in linear["frame"].values]
-    found = {}
+    motions = {}
     for k, name in enumerate(str(body) for body in run["body"].values):
         at = next((i for i, frame in enumerate(frames) if frame.partition(".")[0] == name), None)
         zero = np.zeros((linear.sizes["vibration"], 2, 3))
         if at is None:
-            found[k] = (zero, zero)
+            motions[k] = (zero, zero)
             continue
         move, turn = linear["frame_translation"].values[:, :, at], linear["frame_rotation"].values[:, :, at]
         if k in bent:
@@ -117,8 +117,8 @@ def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexibl
             turn = turn - q @ own["frame_rotation_shape"].values.T @ R.T
             move = move - q @ (own["frame_translation_shape"].values - centre).T @ R.T
         arm = run["position"].values[0, k] - run["frame_position"].values[0, at]
-        found[k] = (move + np.cross(turn, arm), turn)
-    return found
+        motions[k] = (move + np.cross(turn, arm), turn)
+    return motions
 
 
 def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray) -> np.ndarray:

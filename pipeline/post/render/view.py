@@ -1,4 +1,4 @@
-"""From where a mechanism is looked at: a planar one along its normal, any other from above and in front."""
+"""From where a mechanism is examined: a planar one along its normal, any other from above and in front."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import xarray as xr
 
 #: from a spatial mechanism to the eye, and how far the eye is from a planar mechanism's normal: depth is then seen
 SPATIAL, TILT = np.array([-0.95, 1.45, 0.68]), 0.32
-#: speeds out of the plane that are rounding, as a share of those in it
+#: speeds out of the plane that are rounding, as a fraction of those in it
 PLANAR = 1e-3
 #: angle of vision from the lower to the upper edge of a picture [degrees], and what is left around the mechanism
 ANGLE, MARGIN = 30.0, 1.08
@@ -28,28 +28,28 @@ class View:
 
 def view(
     run: xr.Dataset,
-    told: Mapping[str, Any],
+    given: Mapping[str, Any],
     asked: Sequence[float] | None = None,
     upwards: Sequence[float] | None = None,
 ) -> View:
     """The view of a run.
 
-    told: the scene's parameters, for gravity, whose opposite is up in the pictures of planar mechanisms.
+    given: the scene's parameters, for gravity, whose opposite is up in the pictures of planar mechanisms.
     asked, upwards: direction to the eye, and what is up, as the user wants them.
     """
-    up = _up(told) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
+    up = _up(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
     if asked is not None:
         direction = np.array(asked, dtype=float)
         return View(direction / np.linalg.norm(direction) * np.linalg.norm(SPATIAL), _across(up, direction), False)
     normal = plane(run)
     if normal is None:
         return _spatial(up if upwards is not None else np.array([0.0, 0.0, 1.0]))
-    return flat(normal, told, upwards)
+    return flat(normal, given, upwards)
 
 
-def flat(normal: np.ndarray, told: Mapping[str, Any], upwards: Sequence[float] | None = None) -> View:
+def flat(normal: np.ndarray, given: Mapping[str, Any], upwards: Sequence[float] | None = None) -> View:
     """The view of a planar mechanism along its normal; the other arguments as of `view`."""
-    up = _up(told) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
+    up = _up(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
     above = _across(up, normal)
     right = np.cross(above, normal)
     if right[np.argmax(np.abs(right))] < 0.0:  # the axis across the picture runs to the right
@@ -62,16 +62,16 @@ def eye(seen: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tupl
 
     aspect: width of the picture over its height; the angle of vision is ANGLE upright.
     """
-    near = seen.direction / np.linalg.norm(seen.direction)
-    up = _across(seen.up, near)
-    axes = np.array([np.cross(up, near), up, near])
+    towards_eye = seen.direction / np.linalg.norm(seen.direction)
+    up = _across(seen.up, towards_eye)
+    axes = np.array([np.cross(up, towards_eye), up, towards_eye])
     local = cloud @ axes.T
     middle = 0.5 * (local.min(axis=0) + local.max(axis=0))
     slope = np.tan(0.5 * np.radians(ANGLE))
     x, y, z = (local - middle).T
     distance = float(np.max(z + np.maximum(np.abs(y), np.abs(x) / aspect) / slope, initial=0.0))
     focus = middle @ axes
-    return focus + MARGIN * distance / zoom * near, focus
+    return focus + MARGIN * distance / zoom * towards_eye, focus
 
 
 def _spatial(up: np.ndarray) -> View:
@@ -101,9 +101,9 @@ def plane(run: xr.Dataset) -> np.ndarray | None:
     return normal if float(np.abs(moving @ normal).max()) <= PLANAR * max(speed, 1e-300) or speed == 0.0 else None
 
 
-def _up(told: Mapping[str, Any]) -> np.ndarray:
+def _up(given: Mapping[str, Any]) -> np.ndarray:
     """Against gravity, where there is some; else z."""
-    fields = [load["acceleration"] for load in told.get("load", {}).values() if load.get("type") == "gravity"]
+    fields = [load["acceleration"] for load in given.get("load", {}).values() if load.get("type") == "gravity"]
     total = np.sum(np.array(fields, dtype=float), axis=0) if fields else np.zeros(3)
     size = float(np.linalg.norm(total))
     return -total / size if size > 0.0 else np.array([0.0, 0.0, 1.0])

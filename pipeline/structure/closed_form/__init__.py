@@ -1,1 +1,1 @@
-"""What theory says without elements, to stand beside what they say."""
+"""Closed-form results, for comparison with those of finite elements."""

@@ -1,4 +1,4 @@
-r"""Spatial beams of two nodes: stiffness and mass of a rod of any section, in any theory and place.
+r"""Spatial beams of two nodes: stiffness and mass of a rod of any section, in any theory and position.
 
 .. math:: 2U = \int EA\,u'^2 + GJ\,\varphi'^2 + E(I_z \psi_v'^2 + I_y \psi_w'^2 + 2I_{yz}\psi_v'\psi_w')
                + \kappa_y GA\gamma_y^2 + \kappa_z GA\gamma_z^2 ,\qquad
@@ -48,7 +48,7 @@ class Beam:
     node_position: np.ndarray  #: [m], mesh frame, shape (nodes, 3)
     axes: np.ndarray  #: R_MR, rod axes (x along the rod) to mesh frame, shape (3, 3)
     component: np.ndarray  #: index in DOFS of each unknown, in rod axes, shape (ndof,)
-    along: np.ndarray  #: place of each unknown along the rod [m], shape (ndof,)
+    along: np.ndarray  #: position of each unknown along the rod [m], shape (ndof,)
 
     @property
     def size(self) -> int:
@@ -78,7 +78,7 @@ def geometric_stiffness(mesh: xr.Dataset, axial_force: np.ndarray) -> sp.csr_arr
     r"""Stiffness that a tension N gives to the deflections, :math:`\int N (v'^2 + w'^2)\,dx`, shape (ndof, ndof).
 
     axial_force: N [N], tension positive, of each cell, shape (cells,), or at its Gauss points, shape (cells, points).
-    The axis alone is counted: no term of the twist (Wagner) and none of masses beside the axis.
+    The axis alone is counted: no term of the twist (Wagner) and none of masses off the axis.
     Source: Przemieniecki (1968), ch. 15.
     """
     beam = assemble(mesh)
@@ -91,9 +91,9 @@ def geometric_stiffness(mesh: xr.Dataset, axial_force: np.ndarray) -> sp.csr_arr
 def rigid_vectors(beam: Beam, about: np.ndarray | None = None) -> np.ndarray:
     """Three translations and three rotations about a point, by default the mesh origin, shape (ndof, 6)."""
     inside = beam.size - beam.nodal_size
-    place = np.concatenate([np.repeat(beam.node_position, N_DOFS, axis=0), np.zeros((inside, 3))])
+    positions = np.concatenate([np.repeat(beam.node_position, N_DOFS, axis=0), np.zeros((inside, 3))])
     component = np.append(np.tile(np.arange(N_DOFS), len(beam.node_position)), np.full(inside, N_DOFS))
-    return rigid_motions(place, component, np.zeros(3) if about is None else about)
+    return rigid_motions(positions, component, np.zeros(3) if about is None else about)
 
 
 def node_dofs(nodes: np.ndarray) -> np.ndarray:
@@ -125,7 +125,7 @@ def per_point(mesh: xr.Dataset, name: str) -> np.ndarray:
 def _stiffness(mesh: xr.Dataset) -> dict[str, np.ndarray]:
     E, G = per_point(mesh, "youngs_modulus"), per_point(mesh, "shear_modulus")
     area, second = at_points(mesh, "area"), at_points(mesh, "second_moment")
-    found = {
+    matrices = {
         "stretch": E * area,
         "twist": G * second[..., 0],
         "bend_w": E * second[..., 1],
@@ -133,9 +133,9 @@ def _stiffness(mesh: xr.Dataset) -> dict[str, np.ndarray]:
         "bend_both": E * per_point(mesh, "product_moment"),
     }
     if mesh.attrs["theory"] == "timoshenko":
-        share = at_points(mesh, "shear_coefficient")
-        found |= {"shear_v": G * area * share[..., 1], "shear_w": G * area * share[..., 2]}
-    return found
+        fraction = at_points(mesh, "shear_coefficient")
+        matrices |= {"shear_v": G * area * fraction[..., 1], "shear_w": G * area * fraction[..., 2]}
+    return matrices
 
 
 def _inertia(mesh: xr.Dataset) -> dict[str, np.ndarray]:
@@ -182,10 +182,10 @@ def _basis(mesh: xr.Dataset, kinematics: Kinematics) -> Basis:
 
 
 def _unknowns(mesh: xr.Dataset, basis: Basis, kinematics: Kinematics) -> tuple[np.ndarray, np.ndarray, sp.csr_array]:
-    """Component and place of each unknown, and the signed permutation from vectors to scikit-fem's order."""
+    """Component and position of each unknown, and the signed permutation from vectors to scikit-fem's order."""
     x, cells = mesh["abscissa"].values, mesh["cell_node"].values
-    place = np.argsort(NODE_COMPONENT)
-    nodal = basis.nodal_dofs[place].T.ravel()
+    by_node = np.argsort(NODE_COMPONENT)
+    nodal = basis.nodal_dofs[by_node].T.ravel()
     inside = [c for e, c in zip(basis.elem.elems, kinematics.component, strict=True) for _ in range(e.interior_dofs)]
     interior = basis.interior_dofs.T.ravel() if inside else np.empty(0, dtype=int)
     rows = np.concatenate([nodal, interior])

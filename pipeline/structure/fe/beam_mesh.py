@@ -24,7 +24,7 @@ from flexclear.pipeline.structure.fe.quadrature import POINTS
 TAPERED = ("area", "second_moment", "inertia_moment", "shear_coefficient")
 
 
-def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, place: str) -> xr.Dataset:
+def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, where: str) -> xr.Dataset:
     """The mesh dataset (schema MESH); InputError for a frame or mass that lies on no node (with the nearest)."""
     parts = segments(recipe)
     x = _nodes(parts)
@@ -32,7 +32,7 @@ def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, place: str) -> xr.Da
     position = np.array(recipe.pose.position) + np.outer(x, R_MR[:, 0])
     cells = np.arange(len(x) - 1)
     names = list(recipe.frames)
-    nodes = np.array([_node_at(x, recipe.frames[name].x, f"{place} [frames.{name}.x]") for name in names])
+    nodes = np.array([_node_at(x, recipe.frames[name].x, f"{where} [frames.{name}.x]") for name in names])
     turned = [frame.orientation() for frame in recipe.frames.values()]
     data: dict[str, Any] = {
         "node_position": (("node", "axis"), position),
@@ -43,7 +43,7 @@ def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, place: str) -> xr.Da
         "frame_position": (("frame", "axis"), position[nodes]),
         "frame_rotation": (("frame", "axis", "axis2"), R_MR @ np.array(turned)),
     }
-    data |= _constants(recipe, parts) | _lumps(recipe, x, R_MR, place)
+    data |= _constants(recipe, parts) | _lumps(recipe, x, R_MR, where)
     return conform(xr.Dataset(data, coords={"frame": names}), MESH, **_attributes(recipe, parts))
 
 
@@ -57,16 +57,16 @@ def _constants(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[Se
     """Material and section constants of the cells; at the middle of a tapered one, with profiles about it."""
     tapers = any(part.end_section is not None for part in parts)
     pieces = [_segment_constants(recipe, part, tapers) for part in parts]
-    found = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
+    joined = {name: np.concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
     for name in ("product_moment", "inertia_product"):
-        if not found[name].any():
-            del found[name]
-    if np.isnan(found["shear_coefficient"]).any():
+        if not joined[name].any():
+            del joined[name]
+    if np.isnan(joined["shear_coefficient"]).any():
         for name in ("shear_coefficient", "shear_coefficient_profile"):
-            found.pop(name, None)
-    dims = {name: ("cell", "axis") if values.ndim == 2 else ("cell",) for name, values in found.items()}
-    dims |= {f"{name}_profile": ("cell", "point", *dims[name][1:]) for name in TAPERED if name in found}
-    return {name: (dims[name], values) for name, values in found.items()}
+            joined.pop(name, None)
+    dims = {name: ("cell", "axis") if values.ndim == 2 else ("cell",) for name, values in joined.items()}
+    dims |= {f"{name}_profile": ("cell", "point", *dims[name][1:]) for name in TAPERED if name in joined}
+    return {name: (dims[name], values) for name, values in joined.items()}
 
 
 def _segment_constants(
@@ -74,7 +74,7 @@ def _segment_constants(
 ) -> dict[str, np.ndarray]:
     n, material = part.elements, part.material or recipe.material
     middle = _section(recipe, part, (np.arange(n) + 0.5) / n)
-    found = middle | {
+    values = middle | {
         name: np.full(n, getattr(material, name)) for name in ("youngs_modulus", "shear_modulus", "density")
     }
     if tapers:
@@ -83,10 +83,10 @@ def _segment_constants(
             at_points = points[name].reshape(n, len(POINTS), *points[name].shape[1:])
             at_middle = middle[name][:, None]
             # without rotary inertia the middle is zero, and so is every point
-            found[f"{name}_profile"] = np.divide(
+            values[f"{name}_profile"] = np.divide(
                 at_points, at_middle, out=np.ones_like(at_points), where=at_middle != 0.0
             )
-    return found
+    return values
 
 
 def _section(recipe: StraightBeamRecipe | SegmentedBeamRecipe, part: Segment, s: np.ndarray) -> dict[str, np.ndarray]:
@@ -113,13 +113,13 @@ def _each(s: np.ndarray, *values: Any) -> np.ndarray:
 
 
 def _lumps(
-    recipe: StraightBeamRecipe | SegmentedBeamRecipe, x: np.ndarray, R_MR: np.ndarray, place: str
+    recipe: StraightBeamRecipe | SegmentedBeamRecipe, x: np.ndarray, R_MR: np.ndarray, where: str
 ) -> dict[str, Any]:
     if not recipe.masses:
         return {}
     masses = recipe.masses
     inertia = np.array([mass.inertia for mass in masses.values()])
-    nodes = [_node_at(x, mass.x, f"{place} [masses.{name}.x]") for name, mass in masses.items()]
+    nodes = [_node_at(x, mass.x, f"{where} [masses.{name}.x]") for name, mass in masses.items()]
     return {
         "lump_node": (("lump",), np.array(nodes)),
         "lump_mass": (("lump",), np.array([mass.mass for mass in masses.values()])),
@@ -140,19 +140,20 @@ def _attributes(recipe: StraightBeamRecipe | SegmentedBeamRecipe, parts: tuple[S
     }
 
 
-def _types(found: Any) -> str:
-    return " ".join(dict.fromkeys(section.type for section in found))
+def _types(types: Any) -> str:
+    return " ".join(dict.fromkeys(section.type for section in types))
 
 
-def _node_at(x: np.ndarray, place: float, where: str) -> int:
-    """Index of the node at `place` [m]; what lies between nodes would need interpolated constraints."""
-    nearest = int(np.argmin(np.abs(x - place)))
-    if abs(x[nearest] - place) <= SAME_PLACE * x[-1]:
+def _node_at(x: np.ndarray, position: float, where: str) -> int:
+    """Index of the node at `position` [m]; what lies between nodes would need interpolated constraints."""
+    nearest = int(np.argmin(np.abs(x - position)))
+    if abs(x[nearest] - position) <= SAME_PLACE * x[-1]:
         return nearest
-    near = sorted(np.argsort(np.abs(x - place))[:2])
-    shown = " and ".join(f"{x[k] * 1e3:.6g} mm" for k in near)
+    neighbours = sorted(np.argsort(np.abs(x - position))[:2])
+    shown = " and ".join(f"{x[k] * 1e3:.6g} mm" for k in neighbours)
     raise InputError(
         where,
-        f"{place * 1e3:.6g} mm lies on no node; {len(x) - 1} elements over {x[-1] * 1e3:.6g} mm have nodes at {shown}",
-        f"move the {'mass' if '[masses.' in where else 'frame'} to a node or choose another number of elements",
+        f"{position * 1e3:.6g} mm lies on no node; {len(x) - 1} elements over {x[-1] * 1e3:.6g} mm "
+        f"have nodes at {shown}",
+        f"move the {'mass' if '[masses.' in where else 'frame'} to a node, or choose another number of elements",
     )

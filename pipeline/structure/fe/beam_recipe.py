@@ -14,7 +14,7 @@ from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, ch
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
-#: places along a rod that differ by less than this share of its length are the same; they come from decimal text
+#: positions along a rod that differ by less than this fraction of its length are the same; they come from decimal text
 SAME_PLACE = 1e-9
 
 
@@ -33,7 +33,7 @@ class Segment(Part):
 
     end_section: the section at `end` when it tapers linearly from `section`, of the same type.
     material: where it differs from the recipe's.
-    start, end: places along the rod.  elements: number of elements.  section: cross section.  inertia_section: gives
+    start, end: positions along the rod.  elements: number of elements.  section: cross section.  inertia_section: gives
     the second moments of the mass; default: `section`.
     """
 
@@ -82,7 +82,7 @@ class LumpedMass(Part):
     """A body tied rigidly to the node at `x` (a ball, a stem).
 
     com: its centre of mass seen from the node, inertia: about that centre; both in axes of the rod frame.
-    x: place along the rod.  mass: its mass.
+    x: position along the rod.  mass: its mass.
     """
 
     x: Length
@@ -101,7 +101,7 @@ class NodeFrame(Part):
     axes: as of a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod.
     A pin across the beam needs others, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``.
     axis: as of a pose, the direction of z alone: ``axis = [0, 0, 1]``.
-    x: place along the rod, at a node.
+    x: position along the rod, at a node.
     """
 
     x: Length
@@ -212,10 +212,10 @@ def check_taper(start: Any, end: Any | None) -> None:
         raise ValueError("the shear coefficient of a taper is said once, in `section`")
 
 
-def check_shear(theory: str, place: str, section: Any) -> None:
+def check_shear(theory: str, where: str, section: Any) -> None:
     """ValueError when a Timoshenko beam has a section without shear coefficient."""
     if theory == "timoshenko" and section.type == "general" and section.shear_coefficient is None:
         raise ValueError(
-            f"{place}: a Timoshenko beam needs the shear coefficient of a general section; "
+            f"{where}: a Timoshenko beam needs the shear coefficient of a general section; "
             "give shear_coefficient, or choose the theory 'rayleigh'"
         )

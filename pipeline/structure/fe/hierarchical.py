@@ -1,6 +1,6 @@
 """Continuous line element of degree one to three for scikit-fem: nodal values and bubbles that vanish at the nodes.
 
-With bubbles, a field that is linear along the rod, as in every rigid motion, is told by its nodal values alone.
+With bubbles, a field that is linear along the rod, as in every rigid motion, is given by its nodal values alone.
 scikit-fem's own hierarchical element keeps the values of its last call; this one keeps nothing.
 """
 

@@ -18,7 +18,7 @@ from flexclear.pipeline.structure.fe.slices import Slices
 
 def integrate(body: Slices, vectors: np.ndarray) -> Integrals:
     """All invariants for vectors of shape (ndof, n); exact but for rounding."""
-    m, X, D = body.mass, body.place.T, body.spread
+    m, X, D = body.mass, body.position.T, body.spread
     s, theta = (np.stack([along @ vectors for along in maps]) for maps in (body.translation, body.rotation))
     mode_mode = _mode_mode(m, s)
     position_mode = np.einsum("p,kp,lpj->klj", m, X, s)

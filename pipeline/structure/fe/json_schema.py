@@ -13,12 +13,12 @@ from flexclear.pipeline.structure.fe.recipe import MODELS, Recipe
 def recipe_schema() -> dict[str, Any]:
     """The schema of a recipe file: which keys there are depends on `shape.type`."""
     adapter: TypeAdapter[Any] = TypeAdapter(Recipe)
-    found = adapter.json_schema(mode="validation")
-    branches = found.pop("anyOf")
+    schema = adapter.json_schema(mode="validation")
+    branches = schema.pop("anyOf")
     shapes = {
         kind: next(b for b in branches if b["$ref"].endswith(f"/{model.__name__}")) for kind, model in MODELS.items()
     }
-    # a choice by the shape, so that an editor tells what is wrong with this kind and not with all others
+    # a choice by the shape, so that an editor reports what is wrong with this kind and not with all others
     chosen = [
         {
             "if": {"properties": {"shape": {"properties": {"type": {"const": kind}}, "required": ["type"]}}},
@@ -28,4 +28,4 @@ def recipe_schema() -> dict[str, Any]:
     ]
     shape = {"type": "object", "required": ["type"], "properties": {"type": {"enum": list(MODELS)}}}
     whole = {"title": "Recipe", "type": "object", "required": ["shape"], "properties": {"shape": shape}}
-    return identified({**whole, "allOf": chosen, **found}, "recipe")
+    return identified({**whole, "allOf": chosen, **schema}, "recipe")

@@ -15,15 +15,15 @@ from flexclear.pipeline.structure.fe.recipe import parse, read_recipe
 __all__ = ["build", "read_recipe", "write_vtu"]
 
 
-def build(recipe: Mapping[str, Any], *, place: str = "mesh recipe") -> xr.Dataset:
+def build(recipe: Mapping[str, Any], *, where: str = "mesh recipe") -> xr.Dataset:
     """The mesh dataset (schema MESH) of a recipe as `read_recipe` returns it.
 
-    place: how messages call the recipe.  Raises InputError for a wrong recipe, and for a frame or a mass
+    where: name of the recipe in messages.  Raises InputError for a wrong recipe, and for a frame or a mass
     that lies on no node (with the nearest nodes).
     """
-    checked = parse(recipe, place)
+    checked = parse(recipe, where)
     assert isinstance(checked, StraightBeamRecipe | SegmentedBeamRecipe)
-    return beam_mesh.build(checked, place)
+    return beam_mesh.build(checked, where)
 
 
 def write_vtu(mesh: xr.Dataset, path: str | Path) -> None:

@@ -43,13 +43,13 @@ class Integrals:
 
 @dataclass(frozen=True)
 class Families:
-    """How modes are told apart, named and signed.
+    """How modes are distinguished, named and signed.
 
     names: families in the order that they take within a cluster of equal frequencies.
     local: the model's vector to components along the body's own axes, orthogonal, shape (ndof, ndof).
     member: family of each local component, index into names, shape (ndof,).
     main: local components that decide a mode's sign, by family, in node order.
-    along: place of each local component along the body, 0 at its start, 1 at its end, shape (ndof,).
+    along: position of each local component along the body, 0 at its start, 1 at its end, shape (ndof,).
     """
 
     names: tuple[str, ...]
@@ -80,7 +80,7 @@ class Model:
 
     rigid: three translations, three rotations about the middle of the body, shape (ndof, 6); about an origin far away
         they would differ from translations by rounding only.
-    place: where each degree of freedom belongs [m], shape (ndof, 3).
+    position: of each degree of freedom [m], shape (ndof, 3).
     interfaces: every named frame.  ends: the two ends that a fixed-fixed condition clamps.
     integrate: volume integrals of vectors, shape (ndof, n); exact but for rounding.
     """
@@ -88,7 +88,7 @@ class Model:
     stiffness: sp.csr_array
     mass: sp.csr_array
     rigid: np.ndarray
-    place: np.ndarray
+    position: np.ndarray
     interfaces: tuple[Interface, ...]
     ends: tuple[Interface, ...]
     integrate: Callable[[np.ndarray], Integrals]
@@ -101,16 +101,16 @@ class Model:
         return self.mass.shape[0]
 
 
-def rigid_motions(place: np.ndarray, component: np.ndarray, about: np.ndarray) -> np.ndarray:
+def rigid_motions(positions: np.ndarray, component: np.ndarray, about: np.ndarray) -> np.ndarray:
     """Three translations, three rotations about a point, shape (ndof, 6).
 
-    place: of each unknown [m], shape (ndof, 3).  component: its index in DIRECTIONS, shape (ndof,); beyond, an unknown
+    positions: of each unknown [m], shape (ndof, 3).  component: its index in DIRECTIONS, shape (ndof,); else an unknown
     that rests in every rigid motion.  about: [m], shape (3,).
     """
-    motion = np.zeros((len(place), 7, 6))
+    motion = np.zeros((len(positions), 7, 6))
     motion[:, range(6), range(6)] = 1.0
-    motion[:, :3, 3:] = -skew(place - about)  # e x X = -X x e
-    return motion[np.arange(len(place)), np.minimum(component, 6)]
+    motion[:, :3, 3:] = -skew(positions - about)  # e x X = -X x e
+    return motion[np.arange(len(positions)), np.minimum(component, 6)]
 
 
 def symmetric(matrix: sp.csr_array) -> sp.csr_array:

@@ -37,20 +37,20 @@ def read_recipe(path: str | Path) -> dict[str, Any]:
     return parse(table, str(path)).model_dump(mode="json", exclude_none=True)
 
 
-def parse(table: Mapping[str, Any], place: str) -> Recipe:
-    """The recipe that a table holds; `place` opens every message of an InputError."""
-    model = _model(table, place)
+def parse(table: Mapping[str, Any], where: str) -> Recipe:
+    """The recipe that a table holds; `where` opens every message of an InputError."""
+    model = _model(table, where)
     try:
         return model.model_validate(dict(table))
     except ValidationError as error:
-        raise input_errors(place, error, model) from None
+        raise input_errors(where, error, model) from None
 
 
-def _model(table: Mapping[str, Any], place: str) -> type[Recipe]:
+def _model(table: Mapping[str, Any], where: str) -> type[Recipe]:
     shape = table.get("shape")
     name = shape.get("type") if isinstance(shape, Mapping) else None
     if name is None:
-        raise InputError(f"{place} [shape.type]", "is missing", "known: " + ", ".join(MODELS))
+        raise InputError(f"{where} [shape.type]", "is missing", "known: " + ", ".join(MODELS))
     if not isinstance(name, str) or name not in MODELS:
-        raise InputError(f"{place} [shape.type]", f"no shape is called {name!r}", suggestion(str(name), MODELS))
+        raise InputError(f"{where} [shape.type]", f"no shape is called {name!r}", suggestion(str(name), MODELS))
     return MODELS[name]

@@ -21,7 +21,7 @@ def _pair(value: Any) -> Any:
 
 def _shares(value: tuple[float, float]) -> tuple[float, float]:
     if not all(0.0 < kappa <= 1.0 for kappa in value):
-        raise ValueError(f"a shear coefficient is a share of the area, above 0 and at most 1, not {list(value)}")
+        raise ValueError(f"a shear coefficient is a fraction of the area, above 0 and at most 1, not {list(value)}")
     return value
 
 
@@ -127,7 +127,7 @@ DIMENSIONS: dict[str, tuple[str, ...]] = {
 
 
 def constants(start: Any, end: Any | None, s: Value) -> Section:
-    """Section constants at the share s of a span from the section `start` to the section `end` (None: no taper)."""
+    """Section constants at the fraction s of a span from the section `start` to the section `end` (None: no taper)."""
     if start.type == "general":
         return Section(start.area, start.torsion, start.second_y, start.second_z, start.product)
     return getattr(sections, start.type)(*_dimensions(start, end, s))
@@ -140,15 +140,15 @@ def inertia(start: Any, end: Any | None, given: Any | None, s: Value) -> tuple[V
     of equal area does with its area.
     """
     if given is not None and given.type == "equal-area-square":
-        found = sections.square(constants(start, end, s).area ** 0.5)
+        values = sections.square(constants(start, end, s).area ** 0.5)
     elif given is not None:
         return inertia(given, None, None, s)
     else:
-        found = constants(start, end, s)
+        values = constants(start, end, s)
     if start.type == "general" and start.inertia is not None and given is None:
         # given apart, about the axes of the section
         return (*start.inertia, 0.0)
-    return found.polar, found.second_y, found.second_z, found.product
+    return values.polar, values.second_y, values.second_z, values.product
 
 
 def shear_coefficient(start: Any, end: Any | None, s: Value, poisson: float) -> tuple[Value, Value] | None:

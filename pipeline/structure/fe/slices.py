@@ -30,7 +30,7 @@ class Slices:
     """p slices and how a vector moves them; axes of the mesh frame."""
 
     mass: np.ndarray  #: [kg], shape (p,)
-    place: np.ndarray  #: X of the centre of mass [m], shape (p, 3)
+    position: np.ndarray  #: X of the centre of mass [m], shape (p, 3)
     spread: np.ndarray  #: D [kg m^2], shape (p, 3, 3)
     translation: Maps  #: vector to s of the centre of mass, along x, y, z, each of shape (p, ndof)
     rotation: Maps  #: vector to theta, likewise
@@ -41,12 +41,12 @@ def slices(mesh: xr.Dataset, beam: Beam) -> Slices:
 
     Sums over them integrate products of two shapes exactly.
     """
-    mass, place, spread = (np.concatenate(pair) for pair in zip(_rod(mesh, beam), _lumps(mesh), strict=True))
+    mass, positions, spread = (np.concatenate(pair) for pair in zip(_rod(mesh, beam), _lumps(mesh), strict=True))
     translation, rotation = _section_maps(beam)
     if "lump_node" in mesh:
         s, theta = _lump_maps(mesh, beam.size)
         translation, rotation = _stacked(translation, s), _stacked(rotation, theta)
-    return Slices(mass, place, spread, translation, rotation)
+    return Slices(mass, positions, spread, translation, rotation)
 
 
 def _rod(mesh: xr.Dataset, beam: Beam) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -82,9 +82,9 @@ def _section_maps(beam: Beam) -> tuple[Maps, Maps]:
 def _sparse(part: list[Any], rows: np.ndarray, size: int) -> sp.csr_array:
     values = np.concatenate([v.ravel() for v, _ in part])
     columns = np.concatenate([c.ravel() for _, c in part])
-    kept = values != 0.0  # each function moves one field only
-    where = (np.tile(rows.ravel(), len(part))[kept], columns[kept])
-    return sp.csr_array((values[kept], where), shape=(rows.size, size))
+    mask = values != 0.0  # each function moves one field only
+    where = (np.tile(rows.ravel(), len(part))[mask], columns[mask])
+    return sp.csr_array((values[mask], where), shape=(rows.size, size))
 
 
 def _turned(R: np.ndarray, local: list[sp.csr_array]) -> Maps:
@@ -96,8 +96,8 @@ def _lumps(mesh: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     if "lump_node" not in mesh:
         return np.empty(0), np.empty((0, 3)), np.empty((0, 3, 3))
     J = mesh["lump_inertia"].values
-    place = mesh["node_position"].values[mesh["lump_node"].values] + mesh["lump_offset"].values
-    return mesh["lump_mass"].values, place, 0.5 * np.trace(J, axis1=1, axis2=2)[:, None, None] * np.eye(3) - J
+    positions = mesh["node_position"].values[mesh["lump_node"].values] + mesh["lump_offset"].values
+    return mesh["lump_mass"].values, positions, 0.5 * np.trace(J, axis1=1, axis2=2)[:, None, None] * np.eye(3) - J
 
 
 def _lump_maps(mesh: xr.Dataset, size: int) -> tuple[Maps, Maps]:
@@ -108,7 +108,7 @@ def _lump_maps(mesh: xr.Dataset, size: int) -> tuple[Maps, Maps]:
 
 
 def carried(node: list[sp.csr_array], r: np.ndarray) -> tuple[Maps, Maps]:
-    """Motion of nodes carried to centres beside them, s = u + theta x r.
+    """Motion of nodes carried to centres next to them, s = u + theta x r.
 
     node: vector to ux uy uz rx ry rz of the nodes, each of shape (p, ndof).  r: from node to centre [m], (p, 3).
     """

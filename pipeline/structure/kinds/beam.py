@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.structure.closed_form import beside
+from flexclear.pipeline.structure.closed_form import comparison
 from flexclear.pipeline.structure.fe import beam as beams
 from flexclear.pipeline.structure.fe import mesh as meshes
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
@@ -30,7 +30,7 @@ def assemble(mesh: xr.Dataset) -> Model:
         stiffness=beam.stiffness,
         mass=beam.mass,
         rigid=beams.rigid_vectors(beam, beam.node_position.mean(axis=0)),
-        place=_place(beam),
+        position=_place(beam),
         interfaces=_interfaces(mesh, beam),
         ends=_ends(mesh, beam),
         integrate=lambda vectors: integrate(slices(mesh, beam), vectors),
@@ -46,8 +46,8 @@ def _place(beam: Beam) -> np.ndarray:
 
 def _interfaces(mesh: xr.Dataset, beam: Beam) -> tuple[Interface, ...]:
     columns = ("frame", "frame_node", "frame_position", "frame_rotation")
-    found = zip(*(mesh[name].values for name in columns), strict=True)
-    return tuple(Interface(str(name), x, R, _node(beam, int(node))) for name, node, x, R in found)
+    rows = zip(*(mesh[name].values for name in columns), strict=True)
+    return tuple(Interface(str(name), x, R, _node(beam, int(node))) for name, node, x, R in rows)
 
 
 def _ends(mesh: xr.Dataset, beam: Beam) -> tuple[Interface, ...]:
@@ -93,4 +93,4 @@ def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
     return [name.partition("_")[0] for name in families]
 
 
-KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=beside.columns)
+KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=comparison.columns)

@@ -32,7 +32,7 @@ class Kind:
     write_vtu: the mesh dataset to a file that ParaView opens.
     assemble: the mesh dataset to matrices.
     words: what each mode does, in a word, from its family and vectors of shape (ndof, n).
-    exact: closed-form frequencies [Hz] beside those of a reference condition, by variable, from the modes'
+    exact: closed-form frequencies [Hz] next to those of a reference condition, by variable, from the modes'
         families and the interfaces' names.
     """
 
@@ -51,11 +51,11 @@ def name_of(recipe: Mapping[str, Any]) -> str:
 
 def of_recipe(recipe: Mapping[str, Any]) -> Kind:
     """The kind of body that a recipe's table describes."""
-    found: Kind = lookup(FAMILY, name_of(recipe), where="shape.type")
-    return found
+    kind: Kind = lookup(FAMILY, name_of(recipe), where="shape.type")
+    return kind
 
 
 def of_mesh(mesh: xr.Dataset) -> Kind:
     """The kind of body whose mesh dataset this is."""
-    found: Kind = lookup(FAMILY, str(mesh.attrs.get("body_kind", "beam")), where="mesh")
-    return found
+    kind: Kind = lookup(FAMILY, str(mesh.attrs.get("body_kind", "beam")), where="mesh")
+    return kind

@@ -17,7 +17,7 @@ from flexclear.pipeline.structure.fe.solid.recipe import SolidRecipe
 from flexclear.pipeline.structure.kinds.kind import Kind
 
 PLACE = "mesh recipe"
-#: a body is a rod where its second largest extent is below this share of the largest
+#: a body is a rod where its second largest extent is below this fraction of the largest
 SLENDER = 0.5
 #: a mode is torsion where the swirl about the axis has this many times the energy of all else
 SWIRL = 4.0

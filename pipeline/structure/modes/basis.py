@@ -1,4 +1,4 @@
-"""The shapes of a body under a reference condition: static ones, and as many normal modes as are wanted."""
+"""The shapes of a body under a reference condition: static ones, and as many normal modes as are requested."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from flexclear.pipeline.structure.fe.model import Interface, Model
 from flexclear.pipeline.structure.modes import compliance, eigen, normal, select
 from flexclear.pipeline.structure.modes.condition import Condition
 from flexclear.pipeline.structure.modes.normal import Normal
-from flexclear.pipeline.structure.modes.select import Wanted
+from flexclear.pipeline.structure.modes.select import ModeRequest
 from flexclear.pipeline.structure.modes.statics import Flexibility, border
 
-#: normal modes tried first where a share decides how many are needed; then twice as many, and so on
+#: normal modes tried first where a fraction decides how many are needed; then twice as many, and so on
 FIRST = 16
 
 
@@ -47,18 +47,18 @@ class Body:
         return normal.lowest(self.model, self.condition.held, count, self.flexibility, self.progress)
 
 
-def build(body: Body, wanted: Wanted) -> Basis:
+def build(body: Body, requested: ModeRequest) -> Basis:
     """Static shapes and normal modes, rigid motion taken out where the condition says so.
 
     Raises InputError for a count beyond the mesh or within a cluster, and for shares that no count reaches.
     """
-    if wanted == Wanted() and body.condition.loaded.shape[0]:
+    if requested == ModeRequest() and body.condition.loaded.shape[0]:
         # all normal modes of a free body span what its attachment modes could add
         body = replace(body, condition=replace(body.condition, loaded=body.condition.loaded[:0]))
     static = _static(body)
     available = _available(body)
-    if wanted.count is not None or wanted == Wanted():
-        request = select.request(wanted.count, available, static.shape[1])
+    if requested.count is not None or requested == ModeRequest():
+        request = select.request(requested.count, available, static.shape[1])
         modes = body.normal(request.solve) if request.normal else _none(body.model)
         return _joined(body, static, modes, select.whole(modes.values, request))
     tried = FIRST
@@ -66,13 +66,13 @@ def build(body: Body, wanted: Wanted) -> Basis:
         modes = body.normal(min(tried, available))
         # static shapes alone are a basis, no shape at all is none
         ends = [0] * bool(static.shape[1]) + [stop for _, stop in select.clusters(modes.values)]
-        _check_first(modes, static, wanted)
+        _check_first(modes, static, requested)
         # the last cluster may go on beyond what was computed
         for stop in ends if tried >= available else ends[:-1]:
-            if _enough(body, static, modes, stop, wanted):
+            if _enough(body, static, modes, stop, requested):
                 return _joined(body, static, modes, stop)
         if tried >= available:
-            raise _unreachable(body, static, modes, wanted)
+            raise _unreachable(body, static, modes, requested)
         tried *= 2
 
 
@@ -100,32 +100,32 @@ def _static(body: Body) -> np.ndarray:
 
 
 def _joined(body: Body, static: np.ndarray, modes: Normal, count: int) -> Basis:
-    kept = modes.shapes[:, :count]
+    shapes = modes.shapes[:, :count]
     if body.condition.residual and static.size:
-        # what the kept modes answer of a load: phi phi^T f / omega^2, with f = K u
-        static = static - kept @ (kept.T @ (body.model.mass @ static))
-    vectors = np.hstack([static, kept])
+        # what the retained modes answer of a load: phi phi^T f / omega^2, with f = K u
+        static = static - shapes @ (shapes.T @ (body.model.mass @ static))
+    vectors = np.hstack([static, shapes])
     if body.condition.mean_axes and body.condition.held.shape[0]:
         momentum = body.model.mass @ body.model.rigid
         vectors = vectors - body.model.rigid @ np.linalg.solve(body.model.rigid.T @ momentum, momentum.T @ vectors)
     return Basis(vectors, modes.rigid_frequency)
 
 
-def _check_first(modes: Normal, static: np.ndarray, wanted: Wanted) -> None:
+def _check_first(modes: Normal, static: np.ndarray, requested: ModeRequest) -> None:
     first = float(eigen.frequency(modes.values[:1])[0])
-    if wanted.up_to is not None and first > wanted.up_to and not static.shape[1]:
-        problem = f"no mode lies below {wanted.up_to:.6g} Hz; the first is at {first:.6g} Hz"
+    if requested.up_to is not None and first > requested.up_to and not static.shape[1]:
+        problem = f"no mode lies below {requested.up_to:.6g} Hz; the first is at {first:.6g} Hz"
         raise InputError("modes.up_to", problem, "ask for a higher frequency")
 
 
-def _enough(body: Body, static: np.ndarray, modes: Normal, count: int, wanted: Wanted) -> bool:
-    if wanted.up_to is not None:
+def _enough(body: Body, static: np.ndarray, modes: Normal, count: int, requested: ModeRequest) -> bool:
+    if requested.up_to is not None:
         following = modes.values[count : count + 1]
-        return bool(following.size == 0 or eigen.frequency(following)[0] > wanted.up_to)
+        return bool(following.size == 0 or eigen.frequency(following)[0] > requested.up_to)
     basis = _joined(body, static, modes, count)
-    if wanted.compliance is not None:
-        return compliance.least(body.flexibility(), body.interfaces, basis.vectors)[0] >= wanted.compliance
-    return wanted.mass is not None and _mass_share(body.model, basis.vectors) >= wanted.mass
+    if requested.compliance is not None:
+        return compliance.least(body.flexibility(), body.interfaces, basis.vectors)[0] >= requested.compliance
+    return requested.mass is not None and _mass_share(body.model, basis.vectors) >= requested.mass
 
 
 def _mass_share(model: Model, vectors: np.ndarray) -> float:
@@ -136,12 +136,12 @@ def _mass_share(model: Model, vectors: np.ndarray) -> float:
     return float((taken / np.einsum("nd,nd->d", model.rigid[:, :3], momentum)).min())
 
 
-def _unreachable(body: Body, static: np.ndarray, modes: Normal, wanted: Wanted) -> InputError:
+def _unreachable(body: Body, static: np.ndarray, modes: Normal, requested: ModeRequest) -> InputError:
     vectors = _joined(body, static, modes, len(modes.values)).vectors
-    if wanted.compliance is not None:
-        share, where = compliance.least(body.flexibility(), body.interfaces, vectors)
-        problem = f"with every mode of this reference condition the basis has {share:.3g} of the compliance {where}"
+    if requested.compliance is not None:
+        fraction, where = compliance.least(body.flexibility(), body.interfaces, vectors)
+        problem = f"with every mode of this reference condition the basis has {fraction:.3g} of the compliance {where}"
         return InputError("modes.compliance", problem, 'take one with static shapes, as reference = "craig-bampton"')
-    share = _mass_share(body.model, vectors)
-    problem = f"with every mode of this reference condition {share:.3g} of the mass moves with the basis"
+    fraction = _mass_share(body.model, vectors)
+    problem = f"with every mode of this reference condition {fraction:.3g} of the mass moves with the basis"
     return InputError("modes.mass", problem, "shapes without momentum carry no mass: select by count or up_to")

@@ -1,4 +1,4 @@
-"""Static compliance at the frames of the full model, and the share of it that a basis has."""
+"""Static compliance at the frames of the full model, and the fraction of it that a basis has."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.compliance import DIRECTIONS, reduced, shares
+from flexclear.pipeline.core.artifacts.compliance import DIRECTIONS, fractions, reduced
 from flexclear.pipeline.structure.fe.model import Interface
 from flexclear.pipeline.structure.modes.condition import in_own_axes
 from flexclear.pipeline.structure.modes.statics import Flexibility
@@ -60,11 +60,11 @@ def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vector
 
 
 def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:
-    """Smallest share of the compliance between the interfaces (of a single one: of the free body), and where."""
+    """Smallest fraction of the compliance between the interfaces (of a single one: of the free body), and where."""
     whole = full(flexibility, interfaces)
-    found = shares(of_basis(flexibility, interfaces, vectors), whole)
+    each = fractions(of_basis(flexibility, interfaces, vectors), whole)
     if len(interfaces) > 1:
-        found[np.arange(len(found)), np.arange(len(found))] = 1.0
-    i, j, d = np.unravel_index(int(np.argmin(found)), found.shape)
+        each[np.arange(len(each)), np.arange(len(each))] = 1.0
+    i, j, d = np.unravel_index(int(np.argmin(each)), each.shape)
     held = "with nothing held" if i == j else f"with '{interfaces[j].name}' held"
-    return float(found[i, j, d]), f"{DIRECTIONS[d]} of '{interfaces[i].name}' {held}"
+    return float(each[i, j, d]), f"{DIRECTIONS[d]} of '{interfaces[i].name}' {held}"

@@ -35,7 +35,7 @@ class Condition:
     held: functionals that vanish in every normal mode, shape (c, ndof).
     moved: rows of `held`; each gives a constraint mode, in which it is one and the others are zero.
     loaded: functionals whose unit loads give attachment modes, shape (s, ndof).
-    residual: whether the kept normal modes' share is taken out of the attachment modes.
+    residual: whether the retained normal modes' part is taken out of the attachment modes.
     mean_axes: whether rigid motion is taken out of every shape (Tisserand's condition: no momentum).
     note: which rigid-body motion was removed, and how.
     """
@@ -105,7 +105,7 @@ def check(model: Model, condition: Condition) -> None:
         size = np.linalg.norm(rows, axis=1, keepdims=True)
         if np.any(size == 0.0) or np.linalg.matrix_rank(rows / size, tol=1e-9) < len(rows):
             raise InputError(WHERE, "the held motions are not independent of each other", ONCE)
-    lengths = np.linalg.norm(model.place - model.place.mean(axis=0), axis=1)
+    lengths = np.linalg.norm(model.position - model.position.mean(axis=0), axis=1)
     scale = np.array([1.0, 1.0, 1.0, *[1.0 / max(lengths.max(), 1e-300)] * 3])
     left = 6 - np.linalg.matrix_rank(np.asarray(held @ model.rigid) * scale, tol=1e-9)
     if left:

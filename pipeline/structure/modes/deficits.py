@@ -1,7 +1,7 @@
 r"""What a reduced body cannot do, measured against the full model.
 
 *Compliance*: displacement of a frame under unit static loads while another frame is held (or nothing is, the load
-being balanced by the body's inertia), full model and share of the basis.
+being balanced by the body's inertia), full model and fraction of the basis.
 
 *Error bound*: a force :math:`f e^{i\omega t}` at a frame moves the free body by u, and the reduced one (with its rigid
 motion) by :math:`\hat u`. With :math:`D = K - \omega^2 M` and the residual :math:`r = f - D\hat u`, which the basis and
@@ -32,13 +32,13 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.artifacts.compliance import shares
+from flexclear.pipeline.core.artifacts.compliance import fractions
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model
 from flexclear.pipeline.structure.modes import compliance, eigen, normal
 from flexclear.pipeline.structure.modes.statics import Flexibility
 
-#: frequencies of the error bound, as shares of the free body's first one
+#: frequencies of the error bound, as fractions of the free body's first one
 BOUND_AT = (0.0, 0.25, 0.5)
 #: a frequency this close to the full model's is resolved
 RESOLVED = 0.01
@@ -52,7 +52,7 @@ def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -
     names = [frame.name for frame in model.interfaces]
     progress(None, "compliance of the full model")
     whole = compliance.full(flexibility, model.interfaces)
-    share = shares(compliance.of_basis(flexibility, model.interfaces, vectors), whole)
+    fraction = fractions(compliance.of_basis(flexibility, model.interfaces, vectors), whole)
     first, resolved = _frequencies(flexibility, vectors, progress)
     progress(None, "error bounds")
     at = first * np.array(BOUND_AT)
@@ -61,7 +61,7 @@ def measure(flexibility: Flexibility, vectors: np.ndarray, progress: Progress) -
         "direction": (("direction",), list(DIRECTIONS)),
         "bound_frequency": (("bound_frequency",), at),
         "compliance_full": (("frame", "frame_held", "direction"), whole),
-        "compliance_share": (("frame", "frame_held", "direction"), share),
+        "compliance_share": (("frame", "frame_held", "direction"), fraction),
         "error_bound": (("frame", "direction", "bound_frequency"), bounds(flexibility, vectors, at, first)),
         "effective_mass": (("direction", "mode"), _effective_mass(model, vectors)),
     }
@@ -106,8 +106,8 @@ def _frequencies(flexibility: Flexibility, vectors: np.ndarray, progress: Progre
     full = eigen.frequency(normal.lowest(model, none, count, lambda: flexibility, progress, rough=True).values)
     shapes = flexibility.relieved(vectors)
     values, _ = eigen.rediagonalise(model.stiffness, model.mass, shapes)
-    near = np.abs(eigen.frequency(values)[:count] / full - 1.0) <= RESOLVED
-    whole = count if near.all() else int(np.argmin(near))
+    resolved = np.abs(eigen.frequency(values)[:count] / full - 1.0) <= RESOLVED
+    whole = count if resolved.all() else int(np.argmin(resolved))
     return float(full[0]), float(full[whole - 1]) if whole else 0.0
 
 

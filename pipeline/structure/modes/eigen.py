@@ -44,7 +44,7 @@ def inverted(
     Raises SolverError when the solver does not deliver all of them.
     """
     n = mass.shape[0]
-    # ARPACK starts from a random vector unless told; in equal pairs that turns the shapes from run to run
+    # ARPACK starts from a random vector unless given one; in equal pairs that turns the shapes from run to run
     start = inverse(mass @ np.linspace(1.0, 2.0, n))
     operator = scipy.sparse.linalg.LinearOperator((n, n), matvec=inverse, dtype=float)
     try:

@@ -76,7 +76,7 @@ def _between(ends: np.ndarray, x0: float, x: float) -> np.ndarray:
 def _beyond(ends: np.ndarray, s: np.ndarray, x0: float, line: np.ndarray, power: int) -> np.ndarray:
     """Int rho A x^power dx over what lies beyond s, seen from x0; minus it where s lies before x0.
 
-    ends: ascending, (cells, 2).  s: places in those cells, (cells, points).  line: rho A of each cell.
+    ends: ascending, (cells, 2).  s: positions in those cells, (cells, points).  line: rho A of each cell.
     """
     k = power + 1
     whole = line * (ends[:, 1] ** k - ends[:, 0] ** k) / k

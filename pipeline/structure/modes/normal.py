@@ -44,7 +44,7 @@ def lowest(
 ) -> Normal:
     """The `count` lowest normal modes with the functionals `held`, shape (c, ndof), at zero.
 
-    Without held functionals: of the free body, its six rigid modes told by a gap and left out.
+    Without held functionals: of the free body, its six rigid modes identified by a gap and left out.
     rough: frequencies of a large model to six digits only, and not checked to be all there.
     Raises InputError when so many modes of so large a mesh are asked for, SolverError when some are missed.
     """
@@ -92,11 +92,11 @@ def _sparse(
         def inverse(loads: np.ndarray) -> np.ndarray:
             return flexibility.relieved(flexibility.response(flexibility.balanced(loads)))
 
-    def told(loads: np.ndarray) -> np.ndarray:
+    def compliance(loads: np.ndarray) -> np.ndarray:
         progress(None, f"{count} normal modes of {model.size} coordinates")
         return inverse(loads.reshape(-1, 1)).ravel()
 
-    values, shapes = eigen.inverted(model.stiffness, model.mass, count, told, ROUGH if rough else 0.0)
+    values, shapes = eigen.inverted(model.stiffness, model.mass, count, compliance, ROUGH if rough else 0.0)
     # ARPACK leaves a trace of what is held in the shapes; one more step of the iteration takes it out
     shapes = inverse(model.mass @ shapes) * values
     rigid = NOBODY
@@ -117,24 +117,24 @@ def _rigid_frequency(model: Model, first: float) -> np.ndarray:
     return np.sort(eigen.frequency(values))
 
 
-def _nothing_missed(model: Model, held: sp.csr_array, found: int, between: float) -> None:
+def _nothing_missed(model: Model, held: sp.csr_array, count: int, between: float) -> None:
     """Sylvester's law of inertia: K - s M has as many negative pivots as there are eigenvalues below s."""
     shifted = sp.csr_array(model.stiffness - between * model.mass)
     dofs = own_dofs(held)
-    extra, place = 0, model.place
+    extra, positions = 0, model.position
     if held.shape[0] == 0:
-        found += model.rigid.shape[1]
+        count += model.rigid.shape[1]
     elif dofs is not None:
         free = np.setdiff1d(np.arange(model.size), dofs)
-        shifted, place = sp.csr_array(shifted[free][:, free]), place[free]
+        shifted, positions = sp.csr_array(shifted[free][:, free]), positions[free]
     else:
         # each held functional brings one eigenvalue of either sign (Gould 1985)
         extra = held.shape[0]
         shifted = sp.csr_array(
             sp.vstack([sp.hstack([shifted, held.T]), sp.hstack([held, sp.csr_array((extra, extra))])])
         )
-        place = np.vstack([place, np.zeros((extra, 3))])
-    below = negative_pivots(shifted, place, extra) - extra
-    if below != found:
+        positions = np.vstack([positions, np.zeros((extra, 3))])
+    below = negative_pivots(shifted, positions, extra) - extra
+    if below != count:
         where = float(eigen.frequency(np.array([between]))[0])
-        raise SolverError(f"modes: {below} frequencies lie below {where:.6g} Hz, the eigensolver found {found}")
+        raise SolverError(f"modes: {below} frequencies lie below {where:.6g} Hz, the eigensolver found {count}")

@@ -26,16 +26,16 @@ def orient(model: Model, values: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def _rank(model: Model) -> np.ndarray:
-    """A weight per local component that separates the families, and within one the places along the body."""
+    """A weight per local component that separates the families, and within one the positions along the body."""
     families = model.families
     return 0.25 * (1.0 - families.along) + (len(families.names) - 1 - families.member)
 
 
 def family(model: Model, vectors: np.ndarray) -> list[str]:
-    """For each vector the family with the largest share of its kinetic energy."""
+    """For each vector the family with the largest fraction of its kinetic energy."""
     families = model.families
-    share = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
-    totals = np.stack([share[families.member == k].sum(axis=0) for k in range(len(families.names))])
+    fraction = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
+    totals = np.stack([fraction[families.member == k].sum(axis=0) for k in range(len(families.names))])
     # a solid's torsion has equal shares along y and z
     return [families.names[k] for k in first_largest(totals, axis=0)]
 

@@ -1,4 +1,4 @@
-"""Beside the reduced bundle: the rigid body that a mesh would be if nothing of it deformed."""
+"""Next to the reduced bundle: the rigid body that a mesh would be if nothing of it deformed."""
 
 from __future__ import annotations
 

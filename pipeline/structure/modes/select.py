@@ -13,17 +13,17 @@ from flexclear.pipeline.structure.modes.eigen import EQUAL, frequency
 WHERE = "modes.count"
 #: rigid eigenvalues are zero up to rounding; elastic ones lie at least this factor above them
 RIGID_GAP = 1e4
-#: modes to compute beyond those wanted, to see where the last cluster ends
+#: modes to compute beyond those requested, to see where the last cluster ends
 MARGIN = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class ModeRequest:
     """What decides the number of coordinates; nothing at all means every one that the mesh has.
 
-    count: elastic coordinates, static ones included.  up_to: highest normal frequency kept [Hz].
-    compliance: least share of the static compliance between the interfaces, in each direction.
-    mass: least share of the mass that moves with the basis, in each direction.
+    count: elastic coordinates, static ones included.  up_to: highest normal retained frequency [Hz].
+    compliance: least fraction of the static compliance between the interfaces, in each direction.
+    mass: least fraction of the mass that moves with the basis, in each direction.
     """
 
     count: int | None = None
@@ -65,20 +65,20 @@ def request(count: int | None, available: int, static: int = 0) -> Request:
     return Request(count - static, available, static)
 
 
-def whole(values: np.ndarray, wanted: Request) -> int:
-    """`wanted.normal`, or InputError when it would keep a part of a cluster of equal frequencies.
+def whole(values: np.ndarray, requested: Request) -> int:
+    """`requested.normal`, or InputError when it would keep a part of a cluster of equal frequencies.
 
-    values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are kept unless there are no more.
+    values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are retained unless there are no more.
     """
-    n = wanted.normal
+    n = requested.normal
     for start, stop in clusters(values):
         if start < n < stop:
-            counts = [c + wanted.static for c in (start, stop) if c + wanted.static > 0]
+            counts = [c + requested.static for c in (start, stop) if c + requested.static > 0]
             hertz = float(frequency(values[start : start + 1])[0])
             nearest = f"count is {counts[0]}" if len(counts) == 1 else f"counts are {counts[0]} and {counts[1]}"
             raise InputError(
                 WHERE,
-                f"{n + wanted.static} modes cut a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz",
+                f"{n + requested.static} modes cut a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz",
                 f"the nearest whole {nearest}",
             )
     return n

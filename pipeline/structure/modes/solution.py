@@ -17,7 +17,7 @@ from flexclear.pipeline.structure.fe.model import Interface, Model
 from flexclear.pipeline.structure.kinds.kind import Kind, of_mesh
 from flexclear.pipeline.structure.modes import basis, deficits, eigen, orient
 from flexclear.pipeline.structure.modes.condition import Condition, Given, check
-from flexclear.pipeline.structure.modes.select import Wanted
+from flexclear.pipeline.structure.modes.select import ModeRequest
 from flexclear.pipeline.structure.modes.statics import Flexibility, support
 
 REFERENCES = "flexclear.pipeline.structure.modes.reference"
@@ -30,7 +30,7 @@ def solve(
     count: int | None = None,
     interfaces: Sequence[str] | None = None,
     *,
-    wanted: Wanted | None = None,
+    requested: ModeRequest | None = None,
     held: Sequence[str] = (),
     of: str | None = None,
     progress: Progress = silent,
@@ -39,7 +39,7 @@ def solve(
 
     mesh: what a kind of body built.  reference: a name of `pipeline.structure.modes.reference`.
     count: number of elastic coordinates, static ones included; None for a complete basis.
-    wanted: other ways to choose.
+    requested: other ways to choose.
     interfaces: named frames; None for the recipe's own list.  held, of: see `condition.Given`.
     Raises InputError for an unknown reference or frame, a count beyond the mesh, or one that cuts a cluster
     of equal frequencies (with the two nearest whole counts).
@@ -55,10 +55,10 @@ def solve(
 
     @cache
     def flexibility() -> Flexibility:
-        return support(model, lambda share: progress(share, f"factorising {model.size} coordinates"))
+        return support(model, lambda fraction: progress(fraction, f"factorising {model.size} coordinates"))
 
     body = basis.Body(model, condition, given.interfaces, flexibility, progress)
-    shapes = basis.build(body, wanted or Wanted(count=count))
+    shapes = basis.build(body, requested or ModeRequest(count=count))
     values, vectors = eigen.rediagonalise(model.stiffness, model.mass, shapes.vectors)
     vectors = orient.orient(model, values, vectors)
     families = orient.family(model, vectors)

@@ -22,7 +22,7 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.structure.fe.model import Model, own_dofs
 from flexclear.pipeline.structure.sparse.multifrontal import Factor, cholesky
 
-#: a pivot this small beside its diagonal entry is rounding: the body moves there without strain
+#: a pivot this small next to its diagonal entry is rounding: the body moves there without strain
 PIVOT = 1e-14
 
 
@@ -58,7 +58,7 @@ def support(model: Model, tell: Callable[[float], None]) -> Flexibility:
     free = np.setdiff1d(np.arange(model.size), places[:6])
     inner = sp.csr_array(model.stiffness[free][:, free])
     try:
-        factor = cholesky(inner, model.place[free], tell)
+        factor = cholesky(inner, model.position[free], tell)
     except SolverError:
         raise _mechanism() from None
     if factor.smallest_pivot(inner.diagonal()) < PIVOT:
@@ -102,8 +102,8 @@ class Border:
     def _finish(self, free: np.ndarray, right: np.ndarray, values: np.ndarray | float) -> np.ndarray:
         c = self.held.shape[0]
         right[:c] *= self.scale[:, None]
-        found = scipy.linalg.lu_solve(self.system, right)
-        result = free - self.answer @ (self.scale[:, None] * found[:c]) + self.flexibility.model.rigid @ found[c:]
+        solution = scipy.linalg.lu_solve(self.system, right)
+        result = free - self.answer @ (self.scale[:, None] * solution[:c]) + self.flexibility.model.rigid @ solution[c:]
         if self.dofs is not None:
             # what is held is held exactly, not to rounding
             result[self.dofs] = values

@@ -32,13 +32,13 @@ class Tree:
     parent: np.ndarray
 
 
-def dissect(pattern: sp.csr_array, place: np.ndarray, last: int = 0) -> Tree:
+def dissect(pattern: sp.csr_array, positions: np.ndarray, last: int = 0) -> Tree:
     """Elimination tree of a symmetric matrix.
 
-    pattern: shape (n, n).  place: where each row belongs [m], shape (n, 3); rows of one place stay together.
+    pattern: shape (n, n).  positions: where each row belongs [m], shape (n, 3); rows at one position stay together.
     last: this many last rows come last in the order.
     """
-    points, group = np.unique(place[: len(place) - last], axis=0, return_inverse=True)
+    points, group = np.unique(positions[: len(positions) - last], axis=0, return_inverse=True)
     group = np.concatenate([group.ravel(), len(points) + np.arange(last)])
     points = np.concatenate([points, np.zeros((last, 3))])
     graph = _quotient(pattern, group, len(points))
@@ -68,7 +68,7 @@ def _blocks(graph: sp.csr_array, points: np.ndarray, last: int) -> tuple[list[np
     hub[len(points) - last :] = True
     root, rest = np.flatnonzero(hub), np.flatnonzero(~hub)
     # from the root downwards; turned round at the end
-    found: list[np.ndarray] = [root]
+    blocks: list[np.ndarray] = [root]
     above = [-1]
     waiting = [(rest, 0)]
     side = np.zeros(len(points), dtype=np.int32)
@@ -78,11 +78,11 @@ def _blocks(graph: sp.csr_array, points: np.ndarray, last: int) -> tuple[list[np
         separator = nodes
         if len(nodes) > LEAF:
             *parts, separator = _halves(graph, points, nodes, side)
-        found.append(separator)
+        blocks.append(separator)
         above.append(parent)
-        waiting += [(part, len(found) - 1) for part in parts if len(part)]
+        waiting += [(part, len(blocks) - 1) for part in parts if len(part)]
     # depth first downwards is children first upwards; the root's parent becomes the number of blocks
-    return found[::-1], len(found) - 1 - np.array(above[::-1])
+    return blocks[::-1], len(blocks) - 1 - np.array(above[::-1])
 
 
 def _halves(

@@ -45,7 +45,7 @@ class Factor:
         return sum(block.diagonal.size + block.under.size for block in self.blocks)
 
     def smallest_pivot(self, diagonal: np.ndarray) -> float:
-        """Least pivot as a share of the matrix' own `diagonal`, shape (n,); rounding when the matrix is singular."""
+        """Least pivot as a fraction of the matrix' own `diagonal`, shape (n,); rounding when the matrix is singular."""
         pivots = np.concatenate([np.diag(block.diagonal) for block in self.blocks]) ** 2
         return float((pivots / diagonal[self.order]).min())
 
@@ -96,7 +96,7 @@ Runs = list[tuple[slice, slice]]
 
 
 def _runs(at: np.ndarray) -> Runs:
-    """Consecutive places, and which entries of `at` they are: to add slices is much quicker than to add by index."""
+    """Consecutive indices, and which entries of `at` they are: to add slices is much quicker than to add by index."""
     if not len(at):
         return []
     ends = np.concatenate([[0], np.flatnonzero(np.diff(at) != 1) + 1, [len(at)]]).tolist()
@@ -109,13 +109,13 @@ def _add_lower(matrix: np.ndarray, runs: Runs, theirs: np.ndarray) -> None:
             matrix[row, column] += theirs[rows, columns]
 
 
-def cholesky(matrix: sp.csr_array, place: np.ndarray, tell: Tell = lambda share: None) -> Factor:
+def cholesky(matrix: sp.csr_array, positions: np.ndarray, tell: Tell = lambda fraction: None) -> Factor:
     """Factor of a symmetric positive definite matrix, shape (n, n).
 
-    place: where each row belongs [m], shape (n, 3); it decides the order of elimination only.
-    tell: is told the done share.  Raises SolverError when the matrix is not positive definite.
+    positions: where each row belongs [m], shape (n, 3); it decides the order of elimination only.
+    tell: receives the finished fraction.  Raises SolverError when the matrix is not positive definite.
     """
-    tree = dissect(matrix, place)
+    tree = dissect(matrix, positions)
     blocks = []
     for front in _fronts(matrix, tree, tell):
         diagonal, info = lapack.dpotrf(front.diagonal, lower=1, clean=1, overwrite_a=1)
@@ -135,12 +135,14 @@ def _under(diagonal: np.ndarray, front: Front) -> np.ndarray:
     return under
 
 
-def negative_pivots(matrix: sp.csr_array, place: np.ndarray, last: int = 0, tell: Tell = lambda share: None) -> int:
+def negative_pivots(
+    matrix: sp.csr_array, positions: np.ndarray, last: int = 0, tell: Tell = lambda fraction: None
+) -> int:
     """Number of negative eigenvalues of a symmetric matrix, by Sylvester's law of inertia.
 
     last: this many last rows are eliminated last, since they have no diagonal entry of their own.
     """
-    tree = dissect(matrix, place, last)
+    tree = dissect(matrix, positions, last)
     return sum(_eliminate(front) for front in _fronts(matrix, tree, tell))
 
 

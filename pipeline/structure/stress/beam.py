@@ -49,24 +49,27 @@ def _slices(mesh: xr.Dataset, beam: Beam, vectors: np.ndarray, nodes: np.ndarray
     body = slices(mesh, beam)
     shape = ("slice", "axis", "mode")
     x, cells = mesh["abscissa"].values, mesh.sizes["cell"]
-    place, ending = x[nodes], np.tile([False, True], cells)
+    positions, ending = x[nodes], np.tile([False, True], cells)
     lumps = x[mesh["lump_node"].values] if "lump_node" in mesh else np.empty(0)
     first = np.arange(2 * cells) // 2 + ending  # the cell that begins at the section, or after it
     inside = np.repeat(np.arange(cells), len(POINTS))[None, :] >= first[:, None]
     return {
         "slice_mass": (("slice",), body.mass),
-        "slice_position": (("slice", "axis"), body.place),
+        "slice_position": (("slice", "axis"), body.position),
         "slice_spread": (("slice", "axis", "axis2"), body.spread),
         "slice_translation_shape": (shape, _shapes(body.translation, vectors)),
         "slice_rotation_shape": (shape, _shapes(body.rotation, vectors)),
-        "slice_beyond": (("section", "slice"), np.hstack([inside, _beyond(lumps, place, ending)]).astype(np.int8)),
-        "frame_beyond": (("section", "frame"), _beyond(x[mesh["frame_node"].values], place, ending).astype(np.int8)),
+        "slice_beyond": (("section", "slice"), np.hstack([inside, _beyond(lumps, positions, ending)]).astype(np.int8)),
+        "frame_beyond": (
+            ("section", "frame"),
+            _beyond(x[mesh["frame_node"].values], positions, ending).astype(np.int8),
+        ),
     }
 
 
-def _beyond(points: np.ndarray, place: np.ndarray, ending: np.ndarray) -> np.ndarray:
+def _beyond(points: np.ndarray, positions: np.ndarray, ending: np.ndarray) -> np.ndarray:
     """Whether what sits on nodes at `points` lies beyond each section; where a cell ends, its end node does."""
-    ahead = points[None, :] - place[:, None]
+    ahead = points[None, :] - positions[:, None]
     return (ahead > 0.0) | (ending[:, None] & (ahead == 0.0))
 
 
@@ -75,7 +78,7 @@ def _shapes(maps: Maps, vectors: np.ndarray) -> np.ndarray:
 
 
 def _fibres(mesh: xr.Dataset) -> dict[str, Any]:
-    found: list[Outline] = []
+    outlines: list[Outline] = []
     types = tuple(mesh.attrs["section"].split())
     poisson = 0.5 * mesh["youngs_modulus"].values / mesh["shear_modulus"].values - 1.0
     area, second = (_at_ends(mesh, name) for name in CONSTANTS)
@@ -87,13 +90,13 @@ def _fibres(mesh: xr.Dataset) -> dict[str, Any]:
             maps = outline(types, given, float(poisson[cell]))
             if maps is None:
                 return {}
-            found.append(maps)
-    most = max(len(maps.stress) for maps in found)
+            outlines.append(maps)
+    most = max(len(maps.stress) for maps in outlines)
     # sections of other types may have fewer fibres: their last one again
-    filled = [np.pad(m.stress, ((0, most - len(m.stress)), (0, 0), (0, 0)), mode="edge") for m in found]
+    filled = [np.pad(m.stress, ((0, most - len(m.stress)), (0, 0), (0, 0)), mode="edge") for m in outlines]
     return {
         "fibre_stress": (("section", "fibre", "stress", "section_load"), np.stack(filled)),
-        "section_round": (("section",), np.array([maps.round for maps in found], dtype=np.int8)),
+        "section_round": (("section",), np.array([maps.round for maps in outlines], dtype=np.int8)),
     }
 
 

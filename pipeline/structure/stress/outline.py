@@ -2,7 +2,7 @@ r"""Stress in a cross section from its section forces: linear maps at fibres on 
 
 Axial stress is :math:`\sigma = N/A + M_y z/I_y - M_z y/I_z`. Shear stress of circles and tubes is the exact solution of
 St. Venant (torsion and flexure); that of rectangles the exact one of torsion and the parabola of flexure, which leaves
-out Poisson's share of the variation across the width.
+out Poisson's part of the variation across the width.
 
 Sources: Love, *A Treatise on the Mathematical Theory of Elasticity*, ch. XV (flexure of a hollow circular cylinder);
 Timoshenko & Goodier, *Theory of Elasticity*, sec. 109 (torsion of a rectangle).
@@ -44,9 +44,9 @@ class Outline:
 def outline(types: tuple[str, ...], given: Section, poisson: float) -> Outline | None:
     """The maps of a section with these constants that is of one of `types`; None where it has no known outline."""
     for name in types:
-        found = _OUTLINES[name](given, poisson, len(types) > 1) if name in _OUTLINES else None
-        if found is not None:
-            return found
+        recovered = _OUTLINES[name](given, poisson, len(types) > 1) if name in _OUTLINES else None
+        if recovered is not None:
+            return recovered
     return None
 
 
@@ -89,19 +89,19 @@ def _round(made: Section, radius: float, inner: float, poisson: float) -> Outlin
     angle = 2.0 * math.pi * np.arange(AROUND) / AROUND
     ring = np.stack([np.cos(angle), np.sin(angle)])
     y, z = np.concatenate([radius * ring, inner * ring if inner else np.zeros((2, 1))], axis=1)
-    found = _axial(made, y, z)
-    found[:, 1, 3], found[:, 2, 3] = -z / made.torsion, y / made.torsion
-    found[:, 1, 1], found[:, 2, 1] = _flexure(y, z, radius, inner, poisson, made.second_z)
+    stress = _axial(made, y, z)
+    stress[:, 1, 3], stress[:, 2, 3] = -z / made.torsion, y / made.torsion
+    stress[:, 1, 1], stress[:, 2, 1] = _flexure(y, z, radius, inner, poisson, made.second_z)
     # a force along z is one along y, seen a quarter turn on
-    found[:, 2, 2], found[:, 1, 2] = _flexure(z, y, radius, inner, poisson, made.second_y)
-    return Outline(found, True)
+    stress[:, 2, 2], stress[:, 1, 2] = _flexure(z, y, radius, inner, poisson, made.second_y)
+    return Outline(stress, True)
 
 
 def _axial(made: Section, y: np.ndarray, z: np.ndarray) -> np.ndarray:
-    found = np.zeros((len(y), 3, 6))
-    found[:, 0, 0] = 1.0 / made.area
-    found[:, 0, 4], found[:, 0, 5] = z / made.second_y, -y / made.second_z
-    return found
+    stress = np.zeros((len(y), 3, 6))
+    stress[:, 0, 0] = 1.0 / made.area
+    stress[:, 0, 4], stress[:, 0, 5] = z / made.second_y, -y / made.second_z
+    return stress
 
 
 def _flexure(
@@ -122,11 +122,11 @@ def _sides(made: Section, width: float, height: float) -> Outline:
     half = np.full(ALONG, 0.5)
     y = width * np.concatenate([s, s, half, -half, [0.0]])
     z = height * np.concatenate([half, -half, s, s, [0.0]])
-    found = _axial(made, y, z)
-    found[:, 1, 3], found[:, 2, 3] = _torsion(y, z, width, height, made.torsion)
-    found[:, 1, 1] = 1.5 / made.area * (1.0 - (2.0 * y / width) ** 2)
-    found[:, 2, 2] = 1.5 / made.area * (1.0 - (2.0 * z / height) ** 2)
-    return Outline(found, False)
+    stress = _axial(made, y, z)
+    stress[:, 1, 3], stress[:, 2, 3] = _torsion(y, z, width, height, made.torsion)
+    stress[:, 1, 1] = 1.5 / made.area * (1.0 - (2.0 * y / width) ** 2)
+    stress[:, 2, 2] = 1.5 / made.area * (1.0 - (2.0 * z / height) ** 2)
+    return Outline(stress, False)
 
 
 def _torsion(y: np.ndarray, z: np.ndarray, width: float, height: float, J: Value) -> tuple[np.ndarray, np.ndarray]:

@@ -13,8 +13,8 @@ import scipy.sparse as sp
 
 from flexclear.pipeline.core.errors import FlexclearError, InputError, shown
 from flexclear.pipeline.core.external_files import archive
-from flexclear.pipeline.core.external_files.apart import UnreadableError
 from flexclear.pipeline.core.external_files.checks import require_file
+from flexclear.pipeline.core.external_files.isolated import UnreadableError
 from flexclear.pipeline.structure.fe.exchange import market
 from flexclear.pipeline.structure.fe.exchange.market import COPIES, SMALLER
 from flexclear.pipeline.structure.fe.model import Model
@@ -48,22 +48,22 @@ class Contents:
 
 
 def table(model: Model) -> Table:
-    """What the unknowns of a model are, read from its rigid motions; nodes are numbered by place."""
+    """What the unknowns of a model are, read from its rigid motions; nodes are numbered by position."""
     moved = np.abs(model.rigid) > 0.0
     component = np.where(moved[:, :3].any(axis=1), np.argmax(moved[:, :3], axis=1), 3 + np.argmax(moved[:, 3:], axis=1))
     component[~moved.any(axis=1)] = COMPONENTS.index("internal")
-    _, node = np.unique(model.place, axis=0, return_inverse=True)
-    return Table(node.ravel() + 1, component, model.place)
+    _, node = np.unique(model.position, axis=0, return_inverse=True)
+    return Table(node.ravel() + 1, component, model.position)
 
 
 def write_npz(model: Model, path: Path) -> None:
     """All that `shape.type = "matrices"` needs of a body, in SI units."""
-    found = table(model)
+    rows = table(model)
     content: dict[str, Any] = {}
     for name, matrix in (("stiffness", model.stiffness), ("mass", model.mass)):
         entries = sp.coo_array(matrix)
         content |= {f"{name}_row": entries.row, f"{name}_column": entries.col, f"{name}_value": entries.data}
-    content |= {"node": found.node, "component": found.component, "position": found.position}
+    content |= {"node": rows.node, "component": rows.component, "position": rows.position}
     np.savez_compressed(path, **content, **(moments(model) if model.size <= MOMENTS_UP_TO else {}))
 
 
@@ -71,29 +71,29 @@ def write_matrix_market(model: Model, folder: Path) -> None:
     """stiffness.mtx, mass.mtx and unknowns.csv in a folder, in SI units."""
     for name, matrix in (("stiffness", model.stiffness), ("mass", model.mass)):
         scipy.io.mmwrite(folder / f"{name}.mtx", sp.coo_array(matrix), symmetry="symmetric", precision=17)
-    found = table(model)
+    content = table(model)
     with (folder / "unknowns.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(COLUMNS)
-        for node, place, component in zip(found.node, found.position, found.component, strict=True):
-            writer.writerow([node, *map(repr, place.tolist()), COMPONENTS[component]])
+        for node, position, component in zip(content.node, content.position, content.component, strict=True):
+            writer.writerow([node, *map(repr, position.tolist()), COMPONENTS[component]])
 
 
 def moments(model: Model) -> dict[str, Any]:
     """Integrals per unknown: those of unit vectors."""
-    found = model.integrate(np.eye(model.size))
+    integrals = model.integrate(np.eye(model.size))
     entries = []
     for k in range(3):
         for l in range(k, 3):
-            pair = sp.coo_array(found.mode_mode_moment[k, l])
+            pair = sp.coo_array(integrals.mode_mode_moment[k, l])
             entries.append((np.full(pair.nnz, 3 * k + l), pair.row, pair.col, pair.data))
     axes, row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
     return {
-        "body_mass": found.mass,
-        "first_moment": found.first_moment,
-        "second_moment": found.second_moment,
-        "unknown_first_moment": found.modal_first_moment,
-        "unknown_position_moment": found.position_mode_moment,
+        "body_mass": integrals.mass,
+        "first_moment": integrals.first_moment,
+        "second_moment": integrals.second_moment,
+        "unknown_first_moment": integrals.modal_first_moment,
+        "unknown_position_moment": integrals.position_mode_moment,
         "pair_axes": axes,
         "pair_row": row,
         "pair_column": column,
@@ -106,13 +106,13 @@ def read_npz(path: Path, where: str) -> Contents:
     require_file(path, where)
     try:
         data = archive.read(path, where, COPIES, SMALLER)
-        found = Table(
+        content = Table(
             _array(data, "node", "iu"), _array(data, "component", "iu"), _array(data, "position", "iuf", (None, 3))
         )
-        n = len(found.node)
-        if not len(found.component) == len(found.position) == n or not np.isfinite(found.position).all():
+        n = len(content.node)
+        if not len(content.component) == len(content.position) == n or not np.isfinite(content.position).all():
             raise ValueError("node, component and position must have as many rows as each other, of finite numbers")
-        if n == 0 or found.component.min() < 0 or found.component.max() >= len(COMPONENTS):
+        if n == 0 or content.component.min() < 0 or content.component.max() >= len(COMPONENTS):
             raise ValueError(f"components are numbers from 0 to {len(COMPONENTS) - 1}: {', '.join(COMPONENTS)}")
         matrices = []
         for name in ("stiffness", "mass"):
@@ -125,7 +125,7 @@ def read_npz(path: Path, where: str) -> Contents:
     except Exception as error:  # what arrays are lacking or do not fit makes NumPy and SciPy fail in many ways
         reason = shown(str(error) or type(error).__name__)
         raise InputError(where, f"'{path.name}' holds no matrices: {reason}", "write it with exchange.files") from None
-    return Contents(matrices[0], matrices[1], found, data)
+    return Contents(matrices[0], matrices[1], content, data)
 
 
 def _array(
@@ -135,25 +135,25 @@ def _array(
 
     shape: None for any length, or, as a whole, for any shape.
     """
-    found = data.pop(name)
+    array = data.pop(name)
     fits = shape is None or (
-        found.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, found.shape, strict=True))
+        array.ndim == len(shape) and all(n in (None, m) for n, m in zip(shape, array.shape, strict=True))
     )
-    if found.dtype.kind not in kinds or not fits:
-        raise ValueError(f"'{name}' is an array of {found.dtype.name}, {found.shape}")
-    return found
+    if array.dtype.kind not in kinds or not fits:
+        raise ValueError(f"'{name}' is an array of {array.dtype.name}, {array.shape}")
+    return array
 
 
 def read_matrix_market(stiffness: Path, mass: Path, unknowns: Path, where: str) -> Contents:
     """Matrices of any code; InputError when they and the table do not fit together."""
     matrices = [_matrix(path, where) for path in (stiffness, mass)]
-    found = _table(unknowns, where, max(matrix.shape[0] for matrix in matrices))
+    content = _table(unknowns, where, max(matrix.shape[0] for matrix in matrices))
     for path, matrix in zip((stiffness, mass), matrices, strict=True):
-        if matrix.shape != (len(found.node),) * 2:
+        if matrix.shape != (len(content.node),) * 2:
             raise InputError(
                 where, f"'{path.name}' has the shape {matrix.shape}, '{unknowns.name}' another number of lines"
             )
-    return Contents(matrices[0], matrices[1], found, {})
+    return Contents(matrices[0], matrices[1], content, {})
 
 
 def _matrix(path: Path, where: str) -> sp.coo_array:

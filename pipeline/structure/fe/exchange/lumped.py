@@ -5,7 +5,7 @@ A node's block of such a matrix, with the mass m, its centre c from the node and
 .. math:: \begin{bmatrix} m 1 & -m\tilde c \\ m\tilde c & J - m\tilde c\tilde c \end{bmatrix},
 
 and from it every integral over the volume follows (`fe.slices`). A consistent mass of nodes that turn does not tell
-them: it has forgotten where in the element each share of mass is.
+them: it has forgotten where in the element each fraction of mass is.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ import scipy.sparse as sp
 from flexclear.pipeline.core.algebra import skew
 from flexclear.pipeline.structure.fe.slices import Slices, carried
 
-#: entries that differ by less than this share of the mass (times a length, where they do) are the same
+#: entries that differ by less than this fraction of the mass (times a length, where they do) are the same
 ALIKE = 1e-9
 
 
-def nodes(M: sp.csr_array, node: np.ndarray, component: np.ndarray, place: np.ndarray) -> Slices | None:
+def nodes(M: sp.csr_array, node: np.ndarray, component: np.ndarray, positions: np.ndarray) -> Slices | None:
     """The nodes as slices; None where the mass matrix is not that of rigid nodes.
 
-    M: shape (n, n).  node: number, shape (n,).  component: index of ux uy uz rx ry rz, (n,).  place: [m], (n, 3).
+    M: shape (n, n).  node: number, shape (n,).  component: index of ux uy uz rx ry rz, (n,).  positions: [m], (n, 3).
     """
     _, first, index = np.unique(node, return_index=True, return_inverse=True)
     index = index.ravel()
@@ -38,7 +38,7 @@ def nodes(M: sp.csr_array, node: np.ndarray, component: np.ndarray, place: np.nd
     made[:, 3:, :3] = mass[:, None, None] * lever
     made[:, :3, 3:] = -made[:, 3:, :3]
     made[:, 3:, 3:] = blocks[:, 3:, 3:]
-    size = np.array([1.0] * 3 + [np.ptp(place, axis=0).max()] * 3)
+    size = np.array([1.0] * 3 + [np.ptp(positions, axis=0).max()] * 3)
     if np.any(np.abs(made - blocks) > ALIKE * mass[:, None, None] * np.outer(size, size)):
         return None
     spread = 0.5 * np.trace(J, axis1=1, axis2=2)[:, None, None] * np.eye(3) - J
@@ -48,7 +48,7 @@ def nodes(M: sp.csr_array, node: np.ndarray, component: np.ndarray, place: np.nd
         own = component == k
         ones = np.ones(np.count_nonzero(own))
         picks.append(sp.csr_array((ones, (index[own], unknown[own])), shape=(len(first), len(node))))
-    return Slices(mass, place[first] + c, spread, *carried(picks, c))
+    return Slices(mass, positions[first] + c, spread, *carried(picks, c))
 
 
 def _blocks(M: sp.csr_array, index: np.ndarray, component: np.ndarray, count: int) -> np.ndarray | None:
@@ -57,8 +57,8 @@ def _blocks(M: sp.csr_array, index: np.ndarray, component: np.ndarray, count: in
         return None
     entries = sp.coo_array(M)
     scale = np.sqrt(M.diagonal())
-    kept = np.abs(entries.data) > ALIKE * scale[entries.row] * scale[entries.col]
-    row, column, value = entries.row[kept], entries.col[kept], entries.data[kept]
+    mask = np.abs(entries.data) > ALIKE * scale[entries.row] * scale[entries.col]
+    row, column, value = entries.row[mask], entries.col[mask], entries.data[mask]
     if np.any(index[row] != index[column]):
         return None
     blocks = np.zeros((count, 6, 6))

@@ -22,7 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from flexclear.pipeline.core import machine
-from flexclear.pipeline.core.external_files import apart
+from flexclear.pipeline.core.external_files import isolated
 
 #: what a file holds is in memory so many times while it is checked and brought into SI units
 COPIES = 4.0
@@ -35,12 +35,12 @@ OPENERS: dict[str, Callable[..., TextIO]] = {".gz": gzip.open, ".bz2": bz2.open}
 
 
 def read(path: Path, where: str) -> sp.coo_array:
-    """A real matrix, coordinates or array, general or symmetric; `apart.UnreadableError` in words when it is not.
+    """A real matrix, coordinates or array, general or symmetric; `isolated.UnreadableError` in words when it is not.
 
-    Raises ResourceError when its header promises more than memory can hold, and as `apart.read` does.
+    Raises ResourceError when its header promises more than memory can hold, and as `isolated.read` does.
     """
-    found = apart.read(entries, path, where, apart.allowed())
-    return sp.coo_array((found["value"], (found["row"], found["column"])), shape=tuple(found["shape"]))
+    matrix = isolated.read(entries, path, where, isolated.allowed())
+    return sp.coo_array((matrix["value"], (matrix["row"], matrix["column"])), shape=tuple(matrix["shape"]))
 
 
 def entries(path: Path, where: str, allowed: float) -> dict[str, Any]:
@@ -51,20 +51,20 @@ def entries(path: Path, where: str, allowed: float) -> dict[str, Any]:
         count = rest[0] if rest else rows * columns
         machine.require_memory(COPIES * 24.0 * count, f"{where}: '{path.name}'", SMALLER, allowed)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a file without entries, which is told below
-            # one more than there should be: packed files have no end that their size tells
+            warnings.simplefilter("ignore")  # of a file without entries, which is reported below
+            # one more than there should be: packed files have no end that follows from their size
             held = np.loadtxt(file, comments="%", ndmin=2, max_rows=count + 1)
-    found = _sparse(held, rows, columns, count, symmetric) if layout else _dense(held, rows, columns, symmetric)
-    return {"shape": list(found.shape), "row": found.row, "column": found.col, "value": found.data}
+    matrix = _sparse(held, rows, columns, count, symmetric) if layout else _dense(held, rows, columns, symmetric)
+    return {"shape": list(matrix.shape), "row": matrix.row, "column": matrix.col, "value": matrix.data}
 
 
 def read_unknowns(path: Path, count: int) -> dict[str, Any]:
-    """A table of unknowns, of so many rows at most and one more, which tells that it is longer.
+    """A table of unknowns, of so many rows at most and one more, which shows that it is longer.
 
-    node: numbers.  component: texts.  position: shape (rows, 3).  Raises `apart.UnreadableError`.
+    node: numbers.  component: texts.  position: shape (rows, 3).  Raises `isolated.UnreadableError`.
     """
-    found: dict[str, Any] = apart.read(unknowns, path, count)
-    return found
+    table: dict[str, Any] = isolated.read(unknowns, path, count)
+    return table
 
 
 def unknowns(path: Path, count: int) -> dict[str, Any]:
@@ -103,11 +103,11 @@ def _sizes(file: TextIO) -> list[int]:
 def _sparse(entries: np.ndarray, rows: int, columns: int, count: int, symmetric: bool) -> sp.coo_array:
     if len(entries) != count or (count and entries.shape[1] != 3):
         raise ValueError(f"it holds {len(entries)} entries where its header says {count}")
-    place, value = entries[:, :2].T - 1.0, entries[:, 2]
-    inside = (place >= 0.0) & (place < np.array([[rows], [columns]])) & (place == np.floor(place))
+    index, value = entries[:, :2].T - 1.0, entries[:, 2]
+    inside = (index >= 0.0) & (index < np.array([[rows], [columns]])) & (index == np.floor(index))
     if not inside.all():
         raise ValueError(f"an entry lies outside of its {rows} x {columns}")
-    row, column = place.astype(np.int64)
+    row, column = index.astype(np.int64)
     if symmetric:
         off = row != column
         row, column = np.concatenate([row, column[off]]), np.concatenate([column, row[off]])

@@ -23,12 +23,12 @@ SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1
 SYMMETRIC = 1e-9
 
 
-def build(recipe: MatricesRecipe, folder: Path, place: str) -> xr.Dataset:
+def build(recipe: MatricesRecipe, folder: Path, path: str) -> xr.Dataset:
     """The dataset (schema MATRICES); InputError for files that do not fit together.
 
-    folder: what the recipe's files are relative to.  place: how messages call the recipe.
+    folder: what the recipe's files are relative to.  where: name of the recipe in messages.
     """
-    where = f"{place} [shape]"
+    where = f"{path} [shape]"
     contents = _read(recipe.shape, folder, where)
     stiffness, mass, position = _in_si(contents, recipe.shape.units, where)
     data: dict[str, Any] = {
@@ -41,7 +41,7 @@ def build(recipe: MatricesRecipe, folder: Path, place: str) -> xr.Dataset:
         for part, values in (("row", entries.row), ("column", entries.col), ("value", entries.data)):
             data[f"{name}_{part}"] = ((f"{name}_entry",), values)
     data |= {name: (MATRICES[name].dims, values) for name, values in contents.moments.items() if name in MATRICES}
-    data |= _frames(recipe, contents.table, position, place)
+    data |= _frames(recipe, contents.table, position, path)
     try:
         made = xr.Dataset(data)
     except ValueError as error:  # integrals in a file are of other sizes than its unknowns
@@ -84,11 +84,11 @@ def _symmetric(matrix: sp.csr_array, name: str, where: str) -> sp.csr_array:
     return symmetric(matrix)
 
 
-def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, place: str) -> dict[str, Any]:
+def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, path: str) -> dict[str, Any]:
     nodes, frames, origins, rotations = [], [], [], []
     for k, (name, frame) in enumerate(recipe.frames.items()):
         chosen = frame.nodes or (frame.node,)
-        where = f"{place} [frames.{name}]"
+        where = f"{path} [frames.{name}]"
         missing = [node for node in chosen if not np.any(table.node == node)]
         if missing:
             raise InputError(where, f"there is no node {missing[0]}", "use numbers from the table of unknowns")

@@ -29,21 +29,21 @@ UNSTRAINED = 1e-6
 def assemble(mesh: xr.Dataset) -> Model:
     """The model of a dataset (schema MATRICES); InputError when the matrices are not those of a free body."""
     component = np.array([COMPONENTS.index(name) for name in mesh["unknown_component"].values])
-    place, n = mesh["unknown_position"].values, mesh.sizes["unknown"]
+    positions, n = mesh["unknown_position"].values, mesh.sizes["unknown"]
     K, M = (_matrix(mesh, name, n) for name in ("stiffness", "mass"))
-    rigid = rigid_motions(place, component, place.mean(axis=0))
-    _check(K, M, rigid, place)
+    rigid = rigid_motions(positions, component, positions.mean(axis=0))
+    _check(K, M, rigid, positions)
     interfaces = _interfaces(mesh, component)
     names = mesh.attrs["interfaces"].split()
     return Model(
         stiffness=K,
         mass=M,
         rigid=rigid,
-        place=place,
+        position=positions,
         interfaces=interfaces,
         ends=tuple(frame for name in names[:2] for frame in interfaces if frame.name == name),
         integrate=_integrate(mesh, M, component),
-        families=_families(place, component),
+        families=_families(positions, component),
         drawn=_drawn(mesh, component),
     )
 
@@ -53,7 +53,7 @@ def _matrix(mesh: xr.Dataset, name: str, n: int) -> sp.csr_array:
     return sp.csr_array(sp.coo_array((value, (row, column)), shape=(n, n)))
 
 
-def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, place: np.ndarray) -> None:
+def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, positions: np.ndarray) -> None:
     left = np.abs(K @ rigid).max(axis=0) / (abs(K) @ np.abs(rigid)).max(axis=0)
     if left.max() > UNSTRAINED:
         worst = COMPONENTS[int(np.argmax(left))]
@@ -63,7 +63,7 @@ def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, place: np.ndarra
             "export the free body, without supports; check the units and the table of unknowns",
         )
     # unknowns of one node belong together, even where axial, bending and torsion are independent of each other
-    _, node = np.unique(place, axis=0, return_inverse=True)
+    _, node = np.unique(positions, axis=0, return_inverse=True)
     linked = sp.coo_array(K)
     pairs = (np.ones(linked.nnz), (node.ravel()[linked.row], node.ravel()[linked.col]))
     pieces, _ = scipy.sparse.csgraph.connected_components(sp.coo_array(pairs).tocsr(), directed=False)
@@ -74,7 +74,7 @@ def _check(K: sp.csr_array, M: sp.csr_array, rigid: np.ndarray, place: np.ndarra
             "make each a body of its own",
         )
     try:
-        cholesky(M, place)
+        cholesky(M, positions)
     except SolverError:
         raise InputError(WHERE, "the mass matrix is not positive definite", "give every unknown a mass") from None
 
@@ -127,8 +127,8 @@ def _from_moments(mesh: xr.Dataset, vectors: np.ndarray) -> Integrals:
 
 
 def _interfaces(mesh: xr.Dataset, component: np.ndarray) -> tuple[Interface, ...]:
-    n, node, place = mesh.sizes["unknown"], mesh["unknown_node"].values, mesh["unknown_position"].values
-    found = []
+    n, node, positions = mesh.sizes["unknown"], mesh["unknown_node"].values, mesh["unknown_position"].values
+    interfaces = []
     for k, name in enumerate(mesh["frame"].values):
         tied = mesh["tie_node"].values[mesh["tie_frame"].values == k]
         rows = np.array([[_unknown(node, component, t, c, str(name)) for c in range(3)] for t in tied])
@@ -136,32 +136,32 @@ def _interfaces(mesh: xr.Dataset, component: np.ndarray) -> tuple[Interface, ...
             turns = [_unknown(node, component, tied[0], c, str(name)) for c in range(3, 6)]
             motion = sp.csr_array((np.ones(6), (np.arange(6), [*rows[0], *turns])), shape=(6, n))
         else:
-            x = place[rows[:, 0]]
+            x = positions[rows[:, 0]]
             average = ties.mean(x, np.ones(len(x)), np.arange(len(x)), x.mean(axis=0), len(x))
             pick = sp.csr_array((np.ones(rows.size), (np.arange(rows.size), rows.ravel())), shape=(rows.size, n))
             motion = sp.csr_array(average @ pick)
         position, rotation = mesh["frame_position"].values[k], mesh["frame_rotation"].values[k]
-        found.append(Interface(str(name), position, rotation, motion))
-    return tuple(found)
+        interfaces.append(Interface(str(name), position, rotation, motion))
+    return tuple(interfaces)
 
 
-def _unknown(node: np.ndarray, component: np.ndarray, number: int, wanted: int, frame: str) -> int:
-    found = np.flatnonzero((node == number) & (component == wanted))
-    if len(found) != 1:
+def _unknown(node: np.ndarray, component: np.ndarray, number: int, requested: int, frame: str) -> int:
+    indices = np.flatnonzero((node == number) & (component == requested))
+    if len(indices) != 1:
         raise InputError(
-            f"mesh recipe [frames.{frame}]", f"node {number} has {len(found)} unknowns {COMPONENTS[wanted]}"
+            f"mesh recipe [frames.{frame}]", f"node {number} has {len(indices)} unknowns {COMPONENTS[requested]}"
         )
-    return int(found[0])
+    return int(indices[0])
 
 
-def _families(place: np.ndarray, component: np.ndarray) -> Families:
-    member = np.zeros(len(place), dtype=np.int64)
+def _families(positions: np.ndarray, component: np.ndarray) -> Families:
+    member = np.zeros(len(positions), dtype=np.int64)
     for rank, name in enumerate(FAMILIES):
         member[np.isin(component, MEMBER[name])] = rank
     main = tuple(np.flatnonzero(component == MEMBER[name][0]) for name in FAMILIES)
-    extent = np.ptp(place, axis=0)
-    along = place[:, int(np.argmax(extent))]
-    local = sp.eye_array(len(place), format="csr")
+    extent = np.ptp(positions, axis=0)
+    along = positions[:, int(np.argmax(extent))]
+    local = sp.eye_array(len(positions), format="csr")
     return Families(FAMILIES, sp.csr_array(local), member, main, (along - along.min()) / extent.max())
 
 

@@ -43,7 +43,7 @@ class Solid:
 class _Pattern:
     """Where the pair of nodes a, b of each cell lies in a sparse matrix of nodes."""
 
-    place: np.ndarray  #: (cells * nodes^2,)
+    index: np.ndarray  #: (cells * nodes^2,)
     indices: np.ndarray
     indptr: np.ndarray
 
@@ -65,10 +65,10 @@ def stiffness(solid: Solid) -> sp.csr_array:
         trace = shear[..., 0, 0] * np.einsum("cakbk->cab", D)
         for i in range(3):
             K[:, :, i, :, i] += trace
-        place = pattern.place[part.start * pairs : part.stop * pairs]
+        index = pattern.index[part.start * pairs : part.stop * pairs]
         for i in range(3):
             for j in range(3):
-                data[:, i, j] += np.bincount(place, K[:, :, i, :, j].ravel(), minlength=len(data))
+                data[:, i, j] += np.bincount(index, K[:, :, i, :, j].ravel(), minlength=len(data))
     blocks = sp.bsr_array((data, pattern.indices, pattern.indptr), shape=(3 * n, 3 * n))
     return symmetric(blocks.tocsr())
 
@@ -82,8 +82,8 @@ def mass(solid: Solid) -> sp.csr_array:
     pairs = solid.cells.shape[1] ** 2
     for part in _chunks(solid, at):
         weight = _jacobian(solid, part, at)[0] * at.weight * solid.density[part][:, None]
-        place = pattern.place[part.start * pairs : part.stop * pairs]
-        data += np.bincount(place, (weight @ products).ravel(), minlength=len(data))
+        index = pattern.index[part.start * pairs : part.stop * pairs]
+        data += np.bincount(index, (weight @ products).ravel(), minlength=len(data))
     return symmetric(sp.csr_array((data, pattern.indices, pattern.indptr), shape=(n, n)))
 
 
@@ -128,6 +128,6 @@ def _pattern(solid: Solid) -> _Pattern:
     n, a = len(solid.nodes), solid.cells.shape[1]
     rows = np.repeat(solid.cells, a, axis=1).ravel().astype(np.int64)
     columns = np.tile(solid.cells, (1, a)).ravel().astype(np.int64)
-    keys, place = np.unique(rows * n + columns, return_inverse=True)
+    keys, index = np.unique(rows * n + columns, return_inverse=True)
     indptr = np.searchsorted(keys, np.arange(n + 1) * n)
-    return _Pattern(place.ravel(), (keys % n).astype(np.int32), indptr.astype(np.int32))
+    return _Pattern(index.ravel(), (keys % n).astype(np.int32), indptr.astype(np.int32))

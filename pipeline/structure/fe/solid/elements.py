@@ -26,8 +26,8 @@ TET_FACES = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2))
 class Element:
     """One type of cell.
 
-    cell: meshio's name.  local: places of its nodes in the reference cell, shape (nodes, 3).
-    faces: corner nodes of each face.  between: corners whose mean is near a node that is no corner, by node.
+    cell: meshio's name.  local: positions of its nodes in the reference cell, shape (nodes, 3).
+    faces: corner nodes of each face.  between: corners whose mean is close to a node that is no corner, by node.
     stiffness_order, mass_order: degrees that the quadrature integrates; the mass of cells with curved sides is exact.
     """
 
@@ -43,12 +43,12 @@ class Element:
     def face_nodes(self) -> np.ndarray:
         """All nodes of each face, shape (faces, nodes): corners, those between each and the next, the middle."""
         at = {frozenset(part): node for node, part in self.between.items()}
-        found = []
+        faces = []
         for face in self.faces:
             sides = zip(face, (*face[1:], face[0]), strict=True)
             parts = [frozenset(side) for side in sides] + [frozenset(face)]
-            found.append([*face, *(at[part] for part in parts if part in at)])
-        return np.array(found)
+            faces.append([*face, *(at[part] for part in parts if part in at)])
+        return np.array(faces)
 
     @property
     def corners(self) -> int:
@@ -113,8 +113,8 @@ def shape_functions(name: str, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
     element = ELEMENTS[name]
     places = np.asarray(element.basis.doflocs)
     # scikit-fem's order to VTK's
-    found = [int(np.argmin(np.abs(places - place).sum(axis=1))) for place in element.local]
-    pairs = [element.basis.lbasis(points, i) for i in found]
+    order = [int(np.argmin(np.abs(places - point).sum(axis=1))) for point in element.local]
+    pairs = [element.basis.lbasis(points, i) for i in order]
     value = np.stack([np.broadcast_to(phi, points.shape[1:]) for phi, _ in pairs], axis=1)
     gradient = np.stack([np.broadcast_to(slope, points.shape).T for _, slope in pairs], axis=1)
     return value, gradient

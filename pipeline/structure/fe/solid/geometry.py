@@ -14,7 +14,7 @@ from flexclear.pipeline.structure.fe.solid.elasticity import check_cells
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.recipe import Block, Cylinder
 
-#: a node that is no corner lies this near to the mean of its corners, as a share of the cell's size
+#: a node that is no corner lies this near to the mean of its corners, as a fraction of the cell's size
 ASTRAY = 0.3
 
 
@@ -41,7 +41,7 @@ def made(shape: Cylinder | Block) -> Geometry:
     nodes, cells = lattice.cut(nodes, cells, shape.element)
     x = nodes[:, 0]
     bare = Geometry(shape.element, nodes, cells, {}, {"body": np.arange(len(cells))})
-    start, end = (np.flatnonzero(np.abs(x - place) < 1e-9 * length) for place in (0.0, length))
+    start, end = (np.flatnonzero(np.abs(x - end_at) < 1e-9 * length) for end_at in (0.0, length))
     faces = face_nodes(bare, *boundary(bare))
     # faces of the mantle have nodes at different x
     mantle = np.unique(faces[np.ptp(x[faces], axis=1) > 1e-9 * length])
@@ -56,7 +56,7 @@ def boundary(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _faces(geometry: Geometry) -> tuple[np.ndarray, np.ndarray]:
-    """Each face once: its first place among the faces of all cells in turn, and the number of cells that have it."""
+    """Each face once: its first index among the faces of all cells in turn, and the number of cells that have it."""
     faces = np.array(ELEMENTS[geometry.element].faces)
     corners = np.sort(geometry.cells[:, faces], axis=2).reshape(-1, faces.shape[1])
     _, first, count = np.unique(corners, axis=0, return_index=True, return_counts=True)

@@ -8,8 +8,8 @@ import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.external_files import mesh as foreign_mesh
-from flexclear.pipeline.core.external_files.apart import UnreadableError
 from flexclear.pipeline.core.external_files.checks import require_mesh
+from flexclear.pipeline.core.external_files.isolated import UnreadableError
 from flexclear.pipeline.core.external_files.mesh import Mesh
 from flexclear.pipeline.core.units import UNITS
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
@@ -50,9 +50,9 @@ def _read(path: Path, where: str) -> Mesh:
 
 
 def _cell_type(mesh: Mesh, where: str) -> str:
-    found = {block.type: sum(len(b.data) for b in mesh.cells if b.type == block.type) for block in mesh.cells}
-    solid = {name: count for name, count in found.items() if name not in BESIDES}
-    listed = ", ".join(f"{count} {name}" for name, count in (solid or found).items()) or "no cells at all"
+    counts = {block.type: sum(len(b.data) for b in mesh.cells if b.type == block.type) for block in mesh.cells}
+    solid = {name: count for name, count in counts.items() if name not in BESIDES}
+    listed = ", ".join(f"{count} {name}" for name, count in (solid or counts).items()) or "no cells at all"
     known = ", ".join(NAMES)
     if not solid:
         raise InputError(where, f"the mesh has no solid cells but {listed}", f"known: {known}")
@@ -104,7 +104,7 @@ def _regions(mesh: Mesh, solid: list[int], renumber: np.ndarray) -> tuple[dict[s
         of_nodes.setdefault(name, []).append(nodes)
     cells = {name: np.unique(np.concatenate(parts)) for name, parts in of_cells.items()}
     numbers = {name: np.unique(renumber[np.concatenate(parts)]) for name, parts in of_nodes.items()}
-    return cells, {name: found[found >= 0] for name, found in numbers.items()}
+    return cells, {name: members[members >= 0] for name, members in numbers.items()}
 
 
 def _cell_groups(mesh: Mesh) -> list[tuple[str, list[np.ndarray]]]:
@@ -125,11 +125,11 @@ def _physical(
     mesh: Mesh, tag: int, chosen: list[np.ndarray], named: dict[tuple[int, int], str]
 ) -> list[tuple[str, list[np.ndarray]]]:
     """A Gmsh tag's groups by their names; tags of surfaces and volumes are counted apart."""
-    found = []
+    groups = []
     for (known, dimension), name in named.items():
         if known == tag:
             of_dimension = [
                 part if block.dim == dimension else part[:0] for part, block in zip(chosen, mesh.cells, strict=True)
             ]
-            found.append((name, of_dimension))
-    return found
+            groups.append((name, of_dimension))
+    return groups

@@ -6,9 +6,9 @@ import numpy as np
 
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, HEX_FACES, TET_EDGES, shape_functions
 
-#: half side of the square core of a cylinder's section, as a share of the radius
+#: half side of the square core of a cylinder's section, as a fraction of the radius
 CORE = 0.55
-#: outward bulge of the core's sides, as a share of its half side; evens out the angles at its corners
+#: outward bulge of the core's sides, as a fraction of its half side; evens out the angles at its corners
 BULGE = 0.12
 
 
@@ -31,8 +31,8 @@ def cylinder(radius: float, length: float, along: int, across: int, rings: int) 
     offsets = np.cumsum([0, *(len(points) for points, _ in patches)])
     points = np.vstack([points for points, _ in patches])
     quads = np.vstack([quads + offset for (_, quads), offset in zip(patches, offsets, strict=False)])
-    points, kept = _merged(points, radius)
-    return _extruded(points, kept[quads], length, along)
+    points, mask = _merged(points, radius)
+    return _extruded(points, mask[quads], length, along)
 
 
 def cut(nodes: np.ndarray, cells: np.ndarray, element: str) -> tuple[np.ndarray, np.ndarray]:
@@ -44,14 +44,14 @@ def cut(nodes: np.ndarray, cells: np.ndarray, element: str) -> tuple[np.ndarray,
     local = _tetrahedra(element)
     value, _ = shape_functions("hex27", local.reshape(-1, 3).T)
     points = np.einsum("pa,cai->cpi", value, nodes[cells], optimize=True).reshape(-1, 3)
-    points, kept = _merged(points, float(np.ptp(nodes, axis=0).max()))
-    return points, kept.reshape(-1, local.shape[1])
+    points, mask = _merged(points, float(np.ptp(nodes, axis=0).max()))
+    return points, mask.reshape(-1, local.shape[1])
 
 
 def _tetrahedra(element: str) -> np.ndarray:
     """Nodes of 24 tetrahedra in the unit cube: centre, face centre and an edge, shape (24, nodes, 3)."""
     corners = ELEMENTS["hex8"].local
-    found = []
+    cells = []
     for face in HEX_FACES:
         middle = corners[list(face)].mean(axis=0)
         for a, b in zip(face, (*face[1:], face[0]), strict=True):
@@ -59,14 +59,14 @@ def _tetrahedra(element: str) -> np.ndarray:
             four = np.array([corners[a], corners[b], middle, np.full(3, 0.5)])
             four = four if np.linalg.det(four[1:] - four[0]) > 0.0 else four[[1, 0, 2, 3]]
             middles = [0.5 * (four[i] + four[j]) for i, j in TET_EDGES] if element == "tet10" else []
-            found.append(np.vstack([four, *middles]))
-    return np.array(found)
+            cells.append(np.vstack([four, *middles]))
+    return np.array(cells)
 
 
-def _patch(place: object, cells_s: int, cells_t: int) -> tuple[np.ndarray, np.ndarray]:
+def _patch(position: object, cells_s: int, cells_t: int) -> tuple[np.ndarray, np.ndarray]:
     """Points (n, 2) and 3 by 3 node quads (c, 3, 3) of a mapped unit square, node [i, j] at s_i, t_j."""
     s, t = np.meshgrid(np.linspace(0.0, 1.0, 2 * cells_s + 1), np.linspace(0.0, 1.0, 2 * cells_t + 1), indexing="ij")
-    points = place(s, t).reshape(-1, 2)  # type: ignore[operator]
+    points = position(s, t).reshape(-1, 2)  # type: ignore[operator]
     number = np.arange(points.shape[0]).reshape(s.shape)
     quads = [number[2 * i : 2 * i + 3, 2 * j : 2 * j + 3] for i in range(cells_s) for j in range(cells_t)]
     return points, np.array(quads)
@@ -78,7 +78,7 @@ def _core(s: np.ndarray, t: np.ndarray) -> np.ndarray:
 
 
 def _shell(s: np.ndarray, t: np.ndarray, half: float, radius: float) -> np.ndarray:
-    """Between the core's side at +y (s = 0) and the quarter circle beside it (s = 1)."""
+    """Between the core's side at +y (s = 0) and the quarter circle next to it (s = 1)."""
     side = 2.0 * t - 1.0
     inner = half * _core(np.ones_like(side), side)
     angle = 0.25 * np.pi * side
@@ -99,7 +99,7 @@ def _extruded(section: np.ndarray, quads: np.ndarray, length: float, layers: int
     x = np.linspace(0.0, length, 2 * layers + 1)
     n = len(section)
     nodes = np.column_stack([np.repeat(x, n), np.tile(section, (len(x), 1))])
-    # VTK's order from places on the 3 by 3 by 3 lattice: first axis x, then the quad's own two
+    # VTK's order from points on the 3 by 3 by 3 lattice: first axis x, then the quad's own two
     lattice = (2.0 * ELEMENTS["hex27"].local).astype(int)
     i, j, k = lattice.T
     cells = [n * (2 * layer + i) + quads[:, j, k] for layer in range(layers)]

@@ -18,16 +18,16 @@ from flexclear.pipeline.structure.fe.solid.geometry import Geometry
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile, SolidRecipe
 
 
-def build(recipe: SolidRecipe, folder: Path, place: str) -> xr.Dataset:
+def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
     """The mesh dataset (schema SOLID); InputError for meshes and frames that cannot be meant.
 
-    folder: what the recipe's files are relative to.  place: how messages call the recipe.
+    folder: what the recipe's files are relative to.  where: name of the recipe in messages.
     """
-    where = f"{place} [shape]"
+    where = f"{path} [shape]"
     shape = recipe.shape
     geometry = imported.read(shape, folder, where) if isinstance(shape, MeshFile) else geometries.made(shape)
     geometries.check(geometry, where)
-    names, region = _materials(recipe, geometry, place)
+    names, region = _materials(recipe, geometry, path)
     materials = [recipe.materials.get(name) or recipe.material for name in names]
     data: dict[str, Any] = {
         "node_position": (("node", "axis"), geometry.nodes),
@@ -37,7 +37,7 @@ def build(recipe: SolidRecipe, folder: Path, place: str) -> xr.Dataset:
     }
     for name in ("youngs_modulus", "poisson", "density"):
         data[name] = (("region",), np.array([getattr(material, name) for material in materials]))
-    data |= _frames(recipe, geometry, place)
+    data |= _frames(recipe, geometry, path)
     return conform(
         xr.Dataset(data),
         SOLID,
@@ -50,14 +50,14 @@ def build(recipe: SolidRecipe, folder: Path, place: str) -> xr.Dataset:
     )
 
 
-def _materials(recipe: SolidRecipe, geometry: Geometry, place: str) -> tuple[list[str], np.ndarray]:
+def _materials(recipe: SolidRecipe, geometry: Geometry, path: str) -> tuple[list[str], np.ndarray]:
     """Names of the regions with a material, and the region of each cell."""
     if recipe.material is not None:
         return ["body"], np.zeros(len(geometry.cells), dtype=np.int64)
     names = list(recipe.materials)
     region = np.full(len(geometry.cells), -1, dtype=np.int64)
     for k, name in enumerate(names):
-        where = f"{place} [materials.{name}]"
+        where = f"{path} [materials.{name}]"
         if name not in geometry.cell_regions:
             known = ", ".join(sorted(geometry.cell_regions)) or "none"
             raise InputError(where, f"no region of solid cells is called '{name}'", f"known: {known}")
@@ -68,16 +68,16 @@ def _materials(recipe: SolidRecipe, geometry: Geometry, place: str) -> tuple[lis
         region[cells] = k
     bare = int(np.count_nonzero(region < 0))
     if bare:
-        raise InputError(f"{place} [materials]", f"{bare} of {len(region)} cells belong to none of {names}", "add them")
+        raise InputError(f"{path} [materials]", f"{bare} of {len(region)} cells belong to none of {names}", "add them")
     return names, region
 
 
-def _frames(recipe: SolidRecipe, geometry: Geometry, place: str) -> dict[str, Any]:
-    found: dict[str, list[Any]] = {name: [] for name in ("node", "weight", "frame", "position", "rotation")}
+def _frames(recipe: SolidRecipe, geometry: Geometry, path: str) -> dict[str, Any]:
+    columns: dict[str, list[Any]] = {name: [] for name in ("node", "weight", "frame", "position", "rotation")}
     taken = np.full(len(geometry.nodes), -1, dtype=np.int64)
     names = list(recipe.frames)
     for k, (name, frame) in enumerate(recipe.frames.items()):
-        where = f"{place} [frames.{name}.on]"
+        where = f"{path} [frames.{name}.on]"
         nodes = ties.chosen(geometry, frame.on, where)
         x, weight = geometry.nodes[nodes], ties.areas(geometry, nodes)
         ties.check_rank(x, where)
@@ -90,19 +90,19 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, place: str) -> dict[str, An
             taken[nodes] = k
             if taken.min() >= 0:
                 raise InputError(where, "rigid ties take every node of the body", "tie fewer nodes, or their mean")
-        found["node"].append(nodes)
-        found["weight"].append(weight)
-        found["frame"].append(np.full(len(nodes), k))
-        found["position"].append(ties.centre(x, weight) if frame.position is None else np.array(frame.position))
-        found["rotation"].append(quaternion_to_matrix(frame.orientation().as_quaternion()))
+        columns["node"].append(nodes)
+        columns["weight"].append(weight)
+        columns["frame"].append(np.full(len(nodes), k))
+        columns["position"].append(ties.centre(x, weight) if frame.position is None else np.array(frame.position))
+        columns["rotation"].append(quaternion_to_matrix(frame.orientation().as_quaternion()))
     return {
         "frame": (("frame",), names),
         "frame_tie": (("frame",), [frame.tie for frame in recipe.frames.values()]),
-        "frame_position": (("frame", "axis"), np.array(found["position"])),
-        "frame_rotation": (("frame", "axis", "axis2"), np.array(found["rotation"])),
-        "tie_node": (("tie",), np.concatenate(found["node"])),
-        "tie_weight": (("tie",), np.concatenate(found["weight"])),
-        "tie_frame": (("tie",), np.concatenate(found["frame"])),
+        "frame_position": (("frame", "axis"), np.array(columns["position"])),
+        "frame_rotation": (("frame", "axis", "axis2"), np.array(columns["rotation"])),
+        "tie_node": (("tie",), np.concatenate(columns["node"])),
+        "tie_weight": (("tie",), np.concatenate(columns["weight"])),
+        "tie_frame": (("tie",), np.concatenate(columns["frame"])),
     }
 
 

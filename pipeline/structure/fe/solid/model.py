@@ -26,7 +26,7 @@ class _Unknowns:
     """From the model's vector to the displacements of all nodes, shape (3 n, ndof), and what the vector is made of."""
 
     spread: sp.csr_array
-    place: np.ndarray  #: [m], shape (ndof, 3)
+    position: np.ndarray  #: [m], shape (ndof, 3)
     component: np.ndarray  #: 0 .. 5, shape (ndof,)
     first: dict[int, int]  #: first unknown of each rigidly tied frame, by its number
 
@@ -45,8 +45,8 @@ def assemble(mesh: xr.Dataset) -> Model:
     return Model(
         stiffness=symmetric(K),
         mass=symmetric(M),
-        rigid=rigid_motions(unknowns.place, unknowns.component, unknowns.place.mean(axis=0)),
-        place=unknowns.place,
+        rigid=rigid_motions(unknowns.position, unknowns.component, unknowns.position.mean(axis=0)),
+        position=unknowns.position,
         interfaces=interfaces,
         ends=ends,
         integrate=partial(integrals, line, solid.nodes, T),
@@ -95,25 +95,25 @@ def _unknowns(mesh: xr.Dataset) -> _Unknowns:
     size = 3 * len(free)
     rows = [(3 * free[:, None] + np.arange(3)).ravel()]
     columns, values = [np.arange(size)], [np.ones(size)]
-    place, component, first = [np.repeat(x[free], 3, axis=0)], [np.tile(np.arange(3), len(free))], {}
+    positions, component, first = [np.repeat(x[free], 3, axis=0)], [np.tile(np.arange(3), len(free))], {}
     for k in rigid:
         nodes, position = tie_node[tie_frame == k], mesh["frame_position"].values[k]
         motion = ties.slaves(x[nodes], position)
         rows.append(np.broadcast_to((3 * nodes[:, None] + np.arange(3))[:, :, None], motion.shape).ravel())
         columns.append(np.broadcast_to(size + np.arange(6), motion.shape).ravel())
         values.append(motion.ravel())
-        place.append(np.tile(position, (6, 1)))
+        positions.append(np.tile(position, (6, 1)))
         component.append(np.arange(6))
         first[int(k)] = size
         size += 6
     where = (np.concatenate(rows), np.concatenate(columns))
     spread = sp.csr_array(sp.coo_array((np.concatenate(values), where), shape=(3 * n, size)))
     spread.eliminate_zeros()
-    return _Unknowns(spread, np.vstack(place), np.concatenate(component), first)
+    return _Unknowns(spread, np.vstack(positions), np.concatenate(component), first)
 
 
 def _interfaces(mesh: xr.Dataset, unknowns: _Unknowns) -> tuple[Interface, ...]:
-    size, found = len(unknowns.place), []
+    size, interfaces = len(unknowns.position), []
     for k, name in enumerate(mesh["frame"].values):
         position, rotation = mesh["frame_position"].values[k], mesh["frame_rotation"].values[k]
         if k in unknowns.first:
@@ -124,26 +124,26 @@ def _interfaces(mesh: xr.Dataset, unknowns: _Unknowns) -> tuple[Interface, ...]:
             nodes, weight = mesh["tie_node"].values[tied], mesh["tie_weight"].values[tied]
             x = mesh["node_position"].values[nodes]
             motion = sp.csr_array(ties.mean(x, weight, nodes, position, mesh.sizes["node"]) @ unknowns.spread)
-        found.append(Interface(str(name), position, rotation, motion))
-    return tuple(found)
+        interfaces.append(Interface(str(name), position, rotation, motion))
+    return tuple(interfaces)
 
 
 def _families(unknowns: _Unknowns) -> Families:
-    size = len(unknowns.place)
+    size = len(unknowns.position)
     member = np.empty(size, dtype=np.int64)
     for rank, name in enumerate(FAMILIES):
         member[np.isin(unknowns.component, MEMBER[name])] = rank
     main = tuple(np.flatnonzero(unknowns.component == MEMBER[name][0]) for name in FAMILIES)
-    extent = np.ptp(unknowns.place, axis=0)
-    along = unknowns.place[:, int(np.argmax(extent))]
+    extent = np.ptp(unknowns.position, axis=0)
+    along = unknowns.position[:, int(np.argmax(extent))]
     return Families(FAMILIES, sp.eye_array(size, format="csr"), member, main, (along - along.min()) / extent.max())
 
 
 def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
     """The boundary: faces with nodes between their corners are cut into several."""
     geometry = Geometry(mesh.attrs["element"], mesh["node_position"].values, mesh["cell_node"].values, {}, {})
-    found = face_nodes(geometry, *boundary(geometry))
-    pieces = found[:, _cut(ELEMENTS[geometry.element].face_nodes.shape[1])].reshape(-1, len(_cut(found.shape[1])[0]))
+    faces = face_nodes(geometry, *boundary(geometry))
+    pieces = faces[:, _cut(ELEMENTS[geometry.element].face_nodes.shape[1])].reshape(-1, len(_cut(faces.shape[1])[0]))
     used, cell = np.unique(pieces, return_inverse=True)
     translation = sp.csr_array(spread[(3 * used[:, None] + np.arange(3)).ravel()])
     # a solid has no rotations of its own

@@ -1,7 +1,7 @@
 r"""Frames tied to nodes: which nodes, and how.
 
 Rigid (RBE2): the nodes follow the frame, :math:`u_n = u_p + \theta\times(x_n - p)`. Mean (RBE3): the frame follows the
-nodes, with weights w (the area that a node stands for) and :math:`c = \sum w x / \sum w`,
+nodes, with weights w (the area that a node represents) and :math:`c = \sum w x / \sum w`,
 
 .. math:: \theta = J^{-1}\sum w\,(x_n-c)\times u_n, \quad J = \sum w\,(|r|^2 1 - r r^T), \quad
           u_p = \sum w\,u_n/\sum w + \theta\times(p - c) .
@@ -22,7 +22,7 @@ from flexclear.pipeline.structure.fe.solid.elements import on_face
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry, boundary, boundary_nodes, face_nodes
 from flexclear.pipeline.structure.fe.solid.recipe import On
 
-#: default distance from a surface within which a node lies on it, as a share of the body's size
+#: default distance from a surface within which a node lies on it, as a fraction of the body's size
 TOLERANCE = 1e-6
 
 
@@ -33,14 +33,14 @@ def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
         if on.region not in regions:
             hint = suggestion(on.region, regions) if regions else "the mesh names none; choose by plane or cylinder"
             raise InputError(f"{where}.region", f"no region is called '{on.region}'", hint)
-        found = regions[on.region]
+        nodes = regions[on.region]
     else:
-        found = _on_surface(geometry, on)
-    if found.size == 0:
+        nodes = _on_surface(geometry, on)
+    if nodes.size == 0:
         x = geometry.nodes
         box = " to ".join(str([float(f"{v:.6g}") for v in end]) for end in (x.min(axis=0), x.max(axis=0)))
-        raise InputError(where, f"selects no node; the body lies within {box} m", "check the place and the units")
-    return found
+        raise InputError(where, f"selects no node; the body lies within {box} m", "check position and units")
+    return nodes
 
 
 def _regions(geometry: Geometry) -> dict[str, np.ndarray]:
@@ -81,7 +81,7 @@ def areas(geometry: Geometry, nodes: np.ndarray) -> np.ndarray:
 
 
 def centre(x: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Weighted centre of places (n, 3)."""
+    """Weighted centre of points (n, 3)."""
     return weight @ x / weight.sum()
 
 

@@ -17,14 +17,14 @@ WHERE = "modes.interfaces"
 
 
 def condition(model: Model, given: Given) -> Condition:
-    """Normal modes between two pins; InputError without two interfaces at different places."""
+    """Normal modes between two pins; InputError without two interfaces at different points."""
     if len(given.interfaces) < 2:
         raise InputError(WHERE, "a pinned-pinned basis needs two interfaces", "name two of the recipe's frames")
     first, second = given.interfaces[:2]
     line = second.position - first.position
     length = float(np.linalg.norm(line))
-    if length <= 1e-9 * np.ptp(model.place, axis=0).max():
-        raise InputError(WHERE, f"'{first.name}' and '{second.name}' lie at one place", "pin the body at two places")
+    if length <= 1e-9 * np.ptp(model.position, axis=0).max():
+        raise InputError(WHERE, f"'{first.name}' and '{second.name}' coincide", "pin the body at two different points")
     along, *across = _triad(line / length)
     held = sp.vstack(
         [

@@ -1,7 +1,7 @@
 """Free-interface normal modes and residual attachment modes, in mean axes, with the residual mass.
 
-A residual attachment mode is what the kept normal modes miss of the answer to a unit load at an interface; it is
-orthogonal to them. The space is Craig and Chang's; the shapes stay independent however many normal modes are kept.
+A residual attachment mode is what the retained normal modes miss of the answer to a unit load at an interface; it is
+orthogonal to them. The space is Craig and Chang's; the shapes stay independent however many normal modes are retained.
 Source: MacNeal (1971), Computers & Structures 1, 581-601; Rubin (1975), AIAA Journal 13, 995-1006.
 """
 

@@ -1,4 +1,4 @@
-"""Closed-form frequencies beside those of a mesh, mode by mode, where the rod and its ends have any."""
+"""Closed-form frequencies next to those of a mesh, mode by mode, where the rod and its ends have any."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ def columns(
 ) -> dict[str, np.ndarray]:
     """Exact frequencies [Hz] by theory, each of shape (mode,); empty where no closed form applies.
 
-    families: of the kept modes in ascending order, without gaps within a family.
+    families: of the retained modes in ascending order, without gaps within a family.
     interfaces: frames that the reference condition holds, in its order.
     """
     rod, ends = uniform(mesh), _ends(mesh, reference, interfaces)
     if rod is None or ends is None:
         return {}
-    found = {"exact_euler_bernoulli": _table(rod, ends, families, rotary=False, shear=False)}
+    tables = {"exact_euler_bernoulli": _table(rod, ends, families, rotary=False, shear=False)}
     if mesh.attrs["theory"] == "euler-bernoulli":
-        return found  # such a mesh says nothing of the rotary inertia
-    found["exact_rayleigh"] = _table(rod, ends, families, rotary=True, shear=False)
+        return tables  # such a mesh says nothing of the rotary inertia
+    tables["exact_rayleigh"] = _table(rod, ends, families, rotary=True, shear=False)
     if rod.shear_coefficient is not None:
-        found["exact_timoshenko"] = _table(rod, ends, families, rotary=True, shear=True)
-    return found
+        tables["exact_timoshenko"] = _table(rod, ends, families, rotary=True, shear=True)
+    return tables
 
 
 def _ends(mesh: xr.Dataset, reference: str, interfaces: Sequence[str]) -> Ends | None:
@@ -83,7 +83,7 @@ def uniform(mesh: xr.Dataset) -> Uniform | None:
 def _table(rod: Uniform, ends: Ends, families: Sequence[str], *, rotary: bool, shear: bool) -> np.ndarray:
     result = np.empty(len(families))
     for name in set(families):
-        places = [k for k, found in enumerate(families) if found == name]
+        places = [k for k, family in enumerate(families) if family == name]
         result[places] = _series(rod, ends, name, len(places), rotary=rotary, shear=shear)
     return result
 

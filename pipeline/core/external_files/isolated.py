@@ -1,7 +1,7 @@
 """Files of others are read by a child process, with limits of memory, of time and of what it may answer.
 
 Readers are large, and parts of them are written in C: a file that was damaged, or made to harm, ends or hangs the
-child, and is refused here in words. The child is started when the first such file is read, and kept for the next.
+child, and is refused here in words. The child is started when the first such file is read, and reused for the next.
 """
 
 from __future__ import annotations
@@ -63,15 +63,15 @@ class Limits:
 def _size(path: Path) -> int:
     """Bytes of a file and of those of its name with other endings, as far as its folder may be looked at."""
     try:
-        found = [other for other in path.parent.iterdir() if other.stem == path.stem and other.is_file()]
+        companions = [other for other in path.parent.iterdir() if other.stem == path.stem and other.is_file()]
     except OSError:
-        found = [path]
-    return sum(file.stat().st_size for file in found)
+        companions = [path]
+    return sum(file.stat().st_size for file in companions)
 
 
 def allowed() -> float:
     """Bytes of memory that what a file holds may take."""
-    return machine.SHARE * machine.memory()
+    return machine.FRACTION * machine.memory()
 
 
 @dataclass
@@ -122,7 +122,7 @@ def read(function: Callable[..., Any], path: Path, *arguments: Any, limits: Limi
             raise ResourceError(str(answer["words"]))
         words = {"memory": _too_large(limits)}
         raise UnreadableError(words.get(answer["failure"], str(answer.get("words"))))
-    file_dependencies.told(answer["read"], path.parent)
+    file_dependencies.add(answer["read"], path.parent)
     return answer["value"]
 
 
@@ -146,8 +146,8 @@ def _answer(asked: dict[str, Any], limits: Limits) -> dict[str, Any]:
     reason = "what its reader answers is no message"
     try:
         wire.send(stdin, asked)
-        found = wire.receive(stdout, limits.memory)
-        answer = found if "failure" in found or {"value", "read"} <= found.keys() else None
+        received = wire.receive(stdout, limits.memory)
+        answer = received if "failure" in received or {"value", "read"} <= received.keys() else None
     except (OSError, EOFError):
         reason = _end_of(child, late.is_set(), limits)
     except (ValueError, TypeError, KeyError, AttributeError, MemoryError):
