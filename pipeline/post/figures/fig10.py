@@ -34,7 +34,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig10.png and fig10.svg, with the counts of the paper's full model."""
     attributes = data[f"{FAR_CSJ_CB.scene}:run"].attrs
     with style.style():
-        figure, axes = style.grid(1, 3, (12.0, 6.2))
+        figure, axes = style.grid(1, 3, (12.0, 4.9))
         for panel, boxes, color, title in zip(
             axes.flat,
             (STRUCTURE, START, LOOP),
@@ -57,7 +57,7 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
 
 def _column(axes: Axes, boxes: tuple[tuple[str, str], ...], color: str) -> None:
     """Boxes below each other, joined by arrows."""
-    height = 1.0 / max(len(LOOP), 1)
+    height = 1.0 / len(boxes)
     for k, (text, step) in enumerate(boxes):
         y = 1.0 - (k + 0.5) * height
         axes.text(

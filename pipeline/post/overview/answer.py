@@ -87,8 +87,9 @@ def _impacts(run: xr.Dataset) -> list[str]:
     for name in (str(c) for c in run["contact"].values) if "contact" in run.coords else ():
         unit = quantities.unit(run, Quantity(name, "peak_force"))
         count, peak = (quantities.events(run, Quantity(name, kind)) for kind in ("impact_times", "peak_force"))
+        closed = float(np.mean(run["contact_gap"].sel(contact=name).values < 0.0))
         sentences.append(
-            f"<b>{html.escape(name)}</b>: {impacts(len(count)).capitalize()}; the contact "
+            f"<b>{html.escape(name)}</b>: {impacts(len(count), closed).capitalize()}; the contact "
             f"{'force' if unit == 'N' else 'torque'} reaches <b class='n'>{measured(float(peak[0]), np.nan, unit)}</b>."
         )
     return sentences

@@ -57,7 +57,13 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
     return [
         None
         if values is None
-        else Curve(title, quantities.unit(run, quantity), run["time"].values, _drawn(values, quantity, k), NONE)
+        else Curve(
+            title,
+            quantities.unit(run, quantity),
+            run["time"].values,
+            without_noise(_drawn(values, quantity, k), _size(run, quantity)),
+            NONE,
+        )
         for run, values in zip(runs, lines, strict=True)
     ]
 
@@ -96,6 +102,11 @@ def _drawn(values: np.ndarray, quantity: Quantity, component: int) -> np.ndarray
     if quantity.kind in BY_COMPONENT:
         return values[:, component]
     return values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
+
+
+def _size(run: xr.Dataset, quantity: Quantity) -> float:
+    """Largest range of such a quantity among all bodies, along any axis; 0 of other kinds, which have no noise."""
+    return float(np.ptp(run[quantity.kind].values, axis=0).max(initial=0.0)) if quantity.kind in BY_COMPONENT else 0.0
 
 
 def _force(run: xr.Dataset, joint: str) -> Curve | None:
@@ -151,9 +162,24 @@ def measured(value: float, error: float, unit: str) -> str:
     return f"{round(value, decimals):.{shown}f} ± {round(error, decimals):.{shown}f} {written}"
 
 
-def impacts(count: int) -> str:
-    """How many impacts, in words."""
-    return "no impact" if not count else "one impact" if count == 1 else f"{count} impacts"
+#: a contact that is closed for so much of the time hardly opens: its force peaks without impacts
+CLOSED = 0.9
+#: rounding grows over a run, but stays below this fraction of the largest curve of its kind; integration errors do not
+NOISE = 1e-9
+
+
+def impacts(count: int, closed: float = 0.0) -> str:
+    """How many impacts, in words; closed: fraction of the time in contact."""
+    said = "no impact" if not count else "one impact" if count == 1 else f"{count} impacts"
+    return f"{said}; the contact hardly opens ({closed:.0%} of the time closed)" if closed >= CLOSED else said
+
+
+def without_noise(values: np.ndarray, size: float) -> np.ndarray:
+    """The values, or their first one where all that they do is rounding; size: the largest range of such values."""
+    change = float(np.ptp(values)) if values.size else 0.0
+    return (
+        np.full_like(values, 0.0 if abs(values[0]) <= NOISE * size else values[0]) if change <= NOISE * size else values
+    )
 
 
 def by_unit(values: Mapping[str, np.ndarray], unit: str) -> tuple[float, str]:

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.scene.requested_accuracy import Quantity
-from flexclear.pipeline.post.overview.curves import by_unit, impacts, measured, turned_by
+from flexclear.pipeline.post.overview.curves import by_unit, impacts, measured, turned_by, without_noise
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.series import derive, parameters
 
@@ -30,7 +30,7 @@ ENERGIES = {
     "load_work": "work of loads",
 }
 #: what holds a pin, by type of joint; a ball is in a socket
-HOLDERS = {"clearance-revolute": "journal", "clearance-slot": "slot"}
+HOLDERS = {"clearance-revolute": "in its journal", "clearance-slot": "in its slot", "ball-on-plane": "above its plane"}
 #: of an energy that is not drawn: its fraction of the largest one
 UNSEEN = 1e-6
 
@@ -72,6 +72,7 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
     chosen = _chosen(names, first, np.abs(moved).max(axis=(0, 2)), BODIES)
     figure, axes = style.grid(len(chosen), 3, (11.0, 0.9 + 1.75 * len(chosen)), sharex=True)
     time = 1e3 * run["time"].values
+    moved, speed = (_without_noise(values) for values in (moved, speed))
     for row, k in zip(axes, chosen, strict=True):
         factor, unit = by_unit({"": moved[:, k]}, "m")
         rate, rate_unit = by_unit({"": speed[:, k]}, "m/s")
@@ -79,7 +80,7 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
             row[0].plot(time, factor * moved[:, k, i], color=color, label=axis)
             row[1].plot(time, rate * speed[:, k, i], color=color, lw=0.9)
         turned = turned_by(run, names[k])
-        row[2].plot(time, np.degrees(turned.angle), color=style.INK)
+        row[2].plot(time, np.degrees(without_noise(turned.angle, 1.0)), color=style.INK)
         for panel, what in zip(
             row, (f"displacement ({unit})", f"velocity ({rate_unit})", f"{turned.title} (°)"), strict=True
         ):
@@ -90,6 +91,13 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
     style.shared_legend(figure, axes[0, 0], 3)
     style.heading(figure, f"Motion of the bodies{_rest(len(names), BODIES)}", "centre of mass, axes of the world")
     return style.files("motion", figure)
+
+
+def _without_noise(values: np.ndarray) -> np.ndarray:
+    """Components (time, body, axis) without those that are rounding of the largest one."""
+    size = float(np.ptp(values, axis=0).max(initial=0.0))
+    series = [without_noise(column, size) for column in values.reshape(len(values), -1).T]
+    return np.array(series).T.reshape(values.shape)
 
 
 def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
@@ -134,14 +142,15 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
         small = "µm" if unit == "N" else "µrad"
         _over_time(row[1], run, 1e6 * run["contact_gap"].values[:, k], f"{names[k]}: gap ({small})")
         row[1].axhline(0.0, color=style.SOFT, lw=0.8)
-        count = impacts(int(post["impact_count"].values[k]))
         fraction = float(post["contact_time_share"].values[k])
+        count = impacts(int(post["impact_count"].values[k]), fraction)
         peak = float(post["peak_force"].values[k])
         pushes = "normal force" if unit == "N" else "torque"
         _over_time(row[2], run, run["contact_normal_force"].values[:, k])
         row[2].set_title(f"{names[k]}: {pushes} ({unit})", pad=16)
         # a line of its own: next to the title it would be cut off
-        text = f"{count}, peak {measured(peak, np.nan, unit)}, {fraction:.0%} of the time in contact"
+        closed = "" if "hardly" in count else f", {fraction:.0%} of the time in contact"
+        text = f"{count}, peak {measured(peak, np.nan, unit)}{closed}"
         row[2].text(0.0, 1.015, text, transform=row[2].transAxes, fontsize=7.6, color=style.SOFT, va="bottom")
     style.heading(figure, f"Joints with clearance{_rest(len(names), CONTACTS)}")
     return style.files("contacts", figure)
@@ -163,6 +172,12 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     offset = 1e3 * run["contact_offset"].values[:, contact]
     i, j = _plane(run, offset, contact)
     radius = 1e3 * clearance
+    if _type(run, contact) == "ball-on-plane":  # which has a floor and no socket
+        axes.axhline(1e3 * _ball(run, contact), color="#a8a8a8", lw=1.0)
+        axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.8)
+        axes.set(xlabel="xyz"[i], ylabel="xyz"[j])
+        axes.set_title(centre(run, contact))
+        return offset[:, i], offset[:, j]
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     axes.fill(radius * np.cos(turn), radius * np.sin(turn), color="#f3f3f3", ec="#a8a8a8", lw=1.0)
     axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.6, alpha=0.8)
@@ -178,7 +193,12 @@ PLANES = {"clearance-revolute": (0, 1), "clearance-slot": (0, 1), "ball-on-plane
 
 def centre(run: xr.Dataset, contact: int) -> str:
     """Title of the picture of a ball or pin in what holds it."""
-    return f"centre in its {HOLDERS.get(_type(run, contact), 'socket')} (mm)"
+    return f"centre {HOLDERS.get(_type(run, contact), 'in its socket')} (mm)"
+
+
+def _ball(run: xr.Dataset, contact: int) -> float:
+    """Radius of a ball [m]."""
+    return float(parameters(run)["joint"][str(run["contact"].values[contact])]["ball_radius"])
 
 
 def _type(run: xr.Dataset, contact: int) -> str:

@@ -10,7 +10,7 @@ import xarray as xr
 
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.scene.requested_accuracy import Quantity
-from flexclear.pipeline.post.overview.curves import Curve, curves, has, scaled
+from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, has, scaled
 from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.series import derive, parameters
@@ -44,9 +44,13 @@ def make(name: str, runs: Mapping[str, xr.Dataset], chosen: Sequence[Quantity]) 
         for row, (quantity, lines) in zip(axes, drawn, strict=True):
             _overlay(row[0], runs, lines)
             _apart(row[1], runs, quantity, lines)
-        style.shared_legend(figure, axes[0, 0], min(len(runs), 3))
-        pale = "; pale: beyond the horizon of a run" if any("horizon" in run for run in runs.values()) else ""
-        style.heading(figure, "Runs next to each other", f"right: distance from {next(iter(runs))}{pale}")
+        pale = "beyond the predictability horizon of a run"
+        if any(float(run["horizon"]) < float(run["time"][-1]) for run in runs.values() if "horizon" in run):
+            axes[0, 0].plot([], [], color=style.SOFT, alpha=PALE, label=pale)
+        if any(len(curve.peaks) for _, lines in drawn for curve in lines if curve is not None):
+            axes[0, 0].plot([], [], ".", color=style.INK, label="peak of a contact shorter than the outputs show")
+        style.shared_legend(figure, axes[0, 0], min(len(runs), 3), pale)
+        style.heading(figure, "Runs next to each other", f"right: distance from {next(iter(runs))}")
         files = style.files(name, figure)
         return files | _orbits(f"{name}_contacts", runs)
 
@@ -99,6 +103,8 @@ def _apart(
         axes.set_visible(False)
         return
     unit = next(curve.unit for curve in curves_drawn if curve is not None)
+    size = max(float(np.abs(curve.values).max(initial=0.0)) for curve in curves_drawn if curve is not None)
+    lines = [(k, time, np.where(values.max(initial=0.0) > NOISE * size, values, 0.0)) for k, time, values in lines]
     factor, written = scaled(max(float(values.max(initial=0.0)) for _, _, values in lines), unit)
     own = colors(runs)
     for k, time, values in lines:

@@ -114,10 +114,11 @@ def heading(figure: Figure, title: str, subtitle: str = "") -> None:
         figure.text(0.012, top, "\n".join(below), ha="left", va="top", fontsize=8.6, color=SOFT)
 
 
-def shared_legend(figure: Figure, axes: Axes, columns: int) -> None:
-    """One legend below all panels, from the labelled lines of `axes`."""
+def shared_legend(figure: Figure, axes: Axes, columns: int, faint: str = "") -> None:
+    """One legend below all panels, from the labelled lines of `axes`; faint: label of the line that keeps its look."""
     handles, labels = axes.get_legend_handles_labels()
     legend = figure.legend(handles, labels, loc="outside lower center", ncols=columns, fontsize=8.8, handlelength=2.4)
     for line in legend.get_lines():
         line.set_linewidth(2.2)
-        line.set_alpha(1.0)
+        if line.get_label() != faint:
+            line.set_alpha(1.0)

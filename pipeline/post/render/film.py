@@ -23,12 +23,15 @@ from flexclear.pipeline.post.render.mechanism import (
     placed,
 )
 from flexclear.pipeline.post.render.panel import panel
+from flexclear.pipeline.post.render.ruler import exaggeration, pixels_per_metre, round_length, words
 from flexclear.pipeline.post.render.stage import SOFT, image, plotter, polydata, shading, skin
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import ANGLE, eye
 from flexclear.pipeline.post.render.writing import RATE, write
 
 VIEW, SIDE, HEIGHT = 656, 304, 540
+#: colour of the bar: red, green, blue
+INK = (34, 34, 34)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,21 +76,22 @@ def _frames(
     look(scene, drawn)
     # words are drawn by matplotlib below: a text in the scene costs as much as the mechanism
     caption = pace.Caption((VIEW, 26), SOFT)
+    larger = "".join(f", {text}" for text in exaggeration(drawn))
+    scale = pixels_per_metre(drawn, (VIEW, HEIGHT))
+    bar = round_length(0.2 * VIEW / scale)
+    long = round(bar * scale)
     with style.style():
         plots = panel(drawn.run, post, (SIDE, HEIGHT), watched)
         for k, step in enumerate(steps):
             struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
             _place(drawn, actors, int(step), struck)
             picture = image(scene)
-            caption.onto(picture, f"{pace.speed_text(float(shown.slower[k]))}{_exaggeration(drawn)}")
+            caption.onto(picture, f"{pace.speed_text(float(shown.slower[k]))}{larger}, bar: {words(bar)}")
+            picture[-36:-33, VIEW - 16 - long : VIEW - 16] = INK
             yield np.concatenate([picture, plots.frame(int(step))], axis=1)
             if k % 15 == 0:
                 progress((k + 1) / steps.size, "film")
     scene.close()
-
-
-def _exaggeration(drawn: Mechanism) -> str:
-    return f", deformation {max(body.scale for body in drawn.flexible):.3g} times larger" if drawn.flexible else ""
 
 
 def _struck(run: xr.Dataset, before: int, now: int) -> bool:

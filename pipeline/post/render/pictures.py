@@ -75,10 +75,11 @@ def png(pixels: np.ndarray) -> bytes:
 
 def _still(shown: Shown) -> dict[str, bytes]:
     _must_draw()
-    from flexclear.pipeline.post.render import film
+    from flexclear.pipeline.post.render import film, ruler
 
     drawn = shown.mechanism()
-    return {"mechanism.png": png(film.still(drawn, _farthest(drawn.run)))}
+    picture = ruler.annotated(film.still(drawn, _farthest(drawn.run)), drawn)
+    return {"mechanism.png": png(picture)}
 
 
 def _film(kind: str) -> Callable[[Shown], dict[str, bytes]]:

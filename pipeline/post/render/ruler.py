@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.render.mechanism import Mechanism
+from flexclear.pipeline.post.render.mechanism import SOCKET, Mechanism
 from flexclear.pipeline.post.render.view import ANGLE, eye
+from flexclear.pipeline.post.series import parameters
 
 #: longest bar [pixels]
 LONGEST = 190.0
@@ -36,6 +39,35 @@ def round_length(most: float) -> float:
     """The longest of 1, 2 or 5 times a power of ten that is not above `most`."""
     ten = 10.0 ** np.floor(np.log10(most))
     return float(max(k * ten for k in (1.0, 2.0, 5.0) if k * ten <= most * (1.0 + 1e-12)))
+
+
+def exaggeration(drawn: Mechanism) -> list[str]:
+    """What is drawn larger than it is, and by which factor."""
+    said = [f"deformation {max(body.scale for body in drawn.flexible):.3g} times larger"] if drawn.flexible else []
+    factors = []
+    for joint in parameters(drawn.run).get("joint", {}).values():
+        radius = joint.get("ball_radius", joint.get("pin_radius"))
+        if joint.get("clearance") and radius and joint["type"] != "ball-on-plane":
+            factors.append((SOCKET - 1.0) * float(radius) / float(joint["clearance"]))
+    if factors:
+        low, high = (f"{value:.2g}" for value in (min(factors), max(factors)))
+        said.append(f"clearances drawn {low if low == high else f'{low} to {high}'} times larger")
+    return said
+
+
+def annotated(pixels: np.ndarray, drawn: Mechanism) -> np.ndarray:
+    """A picture as of `film.still` with a bar and the factors of exaggeration, same shape."""
+    height, width = pixels.shape[:2]
+    canvas = FigureCanvasAgg(Figure(figsize=(width / 100, height / 100), dpi=100))
+    axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set_axis_off()
+    axes.imshow(pixels, extent=(0, width, height, 0), aspect="auto", interpolation="nearest")
+    text = " · ".join(exaggeration(drawn))
+    axes.text(20, height - 26, text, fontsize=10.5, color=style.SOFT, va="center", parse_math=False)
+    ruler(axes, drawn, (width, height))
+    axes.set(xlim=(0, width), ylim=(height, 0))
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
 
 
 def words(value: float) -> str:

@@ -17,7 +17,6 @@ from flexclear.pipeline.post.body_shape import faces, is_rod, surface
 from flexclear.pipeline.post.render import forms, player, surfaces
 from flexclear.pipeline.post.render.mechanism import (
     COLORS,
-    SOCKET,
     Flexible,
     Looks,
     Mechanism,
@@ -26,7 +25,7 @@ from flexclear.pipeline.post.render.mechanism import (
     mechanism,
     pose,
 )
-from flexclear.pipeline.post.render.ruler import words
+from flexclear.pipeline.post.render.ruler import exaggeration, words
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import flat
 from flexclear.pipeline.post.series import parameters
@@ -97,7 +96,7 @@ def start_view(
     marked = list(_marks(run, drawn, told, joints, gaps))
     cloud = np.concatenate([drawn.cloud, *(part.surface.points for part in extra), *([m.point] for m in marked)])
     drawn = replace(drawn, parts=(*drawn.parts, *extra), cloud=cloud)
-    return StartView(drawn, tuple(marked), tuple(_notes(told, gaps)), tuple(gaps), _gravity(told))
+    return StartView(drawn, tuple(marked), tuple(_notes(drawn, told, gaps)), tuple(gaps), _gravity(told))
 
 
 def _still(body: Flexible, opacity: float) -> Part:
@@ -245,22 +244,10 @@ def _middle(run: xr.Dataset, drawn: Mechanism, index: int) -> np.ndarray:
     return np.asarray(run["position"].values[0, index])
 
 
-def _notes(told: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
+def _notes(drawn: Mechanism, told: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
     """What the names do not say."""
     yield f"start at t = {told.get('time', {}).get('start', 0.0):g} s"
-    clear = {name: joint for name, joint in told.get("joint", {}).items() if joint.get("clearance")}
-    radii = {name: joint.get("ball_radius", joint.get("pin_radius")) for name, joint in clear.items()}
-    factors = sorted(
-        {
-            f"{(SOCKET - 1.0) * radii[name] / joint['clearance']:.2g}"
-            for name, joint in clear.items()
-            if joint["type"] != "ball-on-plane" and radii[name]
-        },
-        key=float,
-    )
-    if factors:
-        span = factors[0] if len(factors) == 1 else f"{factors[0]} to {factors[-1]}"
-        yield f"clearances drawn {span} times larger"
+    yield from exaggeration(drawn)
     if not np.any(_gravity(told)):
         yield "no gravity"
     if gaps:

@@ -1,0 +1,65 @@
+"""Pictures show true sizes, name what is drawn larger, and draw rounding as a zero line."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexclear as fc
+from flexclear.pipeline.post.overview.curves import NOISE, impacts, without_noise
+from flexclear.pipeline.post.render.mechanism import CLEARANCE_COLOR, SOCKET
+from flexclear.pipeline.post.render.ruler import exaggeration
+
+#: mechanism with a loose joint, and the key of the radius of its pin or ball
+LOOSE = [("stages/templates/slider_crank/slider_crank.toml", "pin_radius"), ("scenes/sps4/csj.toml", "ball_radius")]
+
+
+@pytest.mark.parametrize("path, key", LOOSE)
+def test_pins_and_balls_have_their_true_radius(path: str, key: str, root):
+    scene = fc.load_scene(root / path)
+    ((name, joint),) = scene.contacts().items()
+    drawn = fc.show(scene).view.drawn
+    (pin,) = [part for part in drawn.parts if part.color == CLEARANCE_COLOR]
+    across = pin.surface.points if key == "ball_radius" else pin.surface.points @ _across(pin.surface.points)
+    reach = np.linalg.norm(across - 0.5 * (across.max(axis=0) + across.min(axis=0)), axis=1).max()
+    assert reach == pytest.approx(getattr(joint, key), rel=1e-6)
+    assert name in {mark.text for mark in fc.show(scene).view.marks}
+
+
+def _across(points: np.ndarray) -> np.ndarray:
+    """Two directions across the axis of a cylinder, which is the one whose extent differs from the two others."""
+    variance, axes = np.linalg.eigh(np.cov(points.T))
+    alike = (0, 1) if variance[1] - variance[0] < variance[2] - variance[1] else (1, 2)
+    return axes[:, alike]
+
+
+def test_the_factor_of_a_clearance_is_what_is_drawn(root):
+    scene = fc.load_scene(root / LOOSE[0][0])
+    ((_, joint),) = scene.contacts().items()
+    factor = (SOCKET - 1.0) * joint.pin_radius / joint.clearance
+    assert f"clearances drawn {factor:.2g} times larger" in exaggeration(fc.show(scene).view.drawn)
+
+
+def test_rounding_is_a_zero_line_and_small_motion_is_not():
+    time = np.linspace(0.0, 1.0, 50)
+    assert (without_noise(1e-17 * np.sin(9.0 * time), 0.3) == 0.0).all()
+    assert (without_noise(0.2 + 1e-17 * np.sin(9.0 * time), 0.3) == 0.2).all()
+    small = 1e-6 * np.sin(9.0 * time)
+    assert np.array_equal(without_noise(small, 0.3), small)
+    edge = 2.0 * NOISE * np.sin(9.0 * time)
+    assert np.array_equal(without_noise(edge, 1.0), edge)
+
+
+@pytest.mark.parametrize(
+    "count, closed, said",
+    [
+        (0, 0.0, "no impact"),
+        (1, 0.2, "one impact"),
+        (40, 0.4, "40 impacts"),
+        (1, 0.97, "one impact; the contact hardly"),
+    ],
+)
+def test_a_contact_that_hardly_opens_is_called_so(count: int, closed: float, said: str):
+    words = impacts(count, closed)
+    assert words.startswith(said)
+    assert ("hardly" in words) == (closed > 0.9)
