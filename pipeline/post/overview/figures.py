@@ -30,7 +30,7 @@ ENERGIES = {
     "load_work": "work of loads",
 }
 #: what holds a pin, by type of joint; a ball is in a socket
-HOLDERS = {"clearance-revolute": "in its journal", "clearance-slot": "in its slot", "ball-on-plane": "above its plane"}
+HOLDERS = {"clearance-revolute": "in its journal", "clearance-slot": "in its slot", "ball-on-plane": "over plane"}
 #: of an energy that is not drawn: its fraction of the largest one
 UNSEEN = 1e-6
 
@@ -175,6 +175,8 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     if _type(run, contact) == "ball-on-plane":  # which has a floor and no socket
         axes.axhline(1e3 * _ball(run, contact), color="#a8a8a8", lw=1.0)
         axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.8)
+        axes.plot(offset[-1:, i], offset[-1:, j], "o", color="#009E73", ms=4)  # of a ball that stays where it is
+        axes.margins(y=0.15)
         axes.set(xlabel="xyz"[i], ylabel="xyz"[j])
         axes.set_title(centre(run, contact))
         return offset[:, i], offset[:, j]
