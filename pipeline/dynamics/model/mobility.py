@@ -77,7 +77,7 @@ class Mobility:
         """In words, for the user."""
         says = "condition follows" if self.redundant == 1 else "conditions follow"
         more = f", {self.redundant} closure {says} from the others" if self.redundant else ""
-        return f"mobility {self.mobility}{more}"
+        return f"free motions besides the drives: {self.mobility}{more}"
 
 
 def analyse(model: Model) -> Mobility:
