@@ -154,7 +154,7 @@ def _require_steady(bench: Bench, at: Tangent) -> None:
             return
     raise SolverError(
         f"at t = {bench.time:.6g} s: the drives' motion is not steady: the forces on the free coordinates change "
-        "as they go on; hold the drives instead"
+        "as they continue; hold the drives instead"
     )
 
 

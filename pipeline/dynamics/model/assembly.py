@@ -122,7 +122,7 @@ def chain_positions(mechanism: Mechanism, link: Link, poses: Sequence[Placement]
 
 
 def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str, float]:
-    """Largest residual per joint [m, or the sine of an angle], drives not looked at."""
+    """Largest residual per joint [m, or the sine of an angle], without drives."""
     worst = {}
     for joint in joints:
         values, _ = demands(joint.edge.kind, *joint.frames(poses))

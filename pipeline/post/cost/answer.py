@@ -54,7 +54,7 @@ def _looser(study: xr.Dataset) -> str:
 
 
 def _cause(study: xr.Dataset) -> str:
-    """Which cause limits the error, of those that were looked at, for the quantity that has the largest one."""
+    """Which cause limits the error, of those that were examined, for the quantity that has the largest one."""
     if "error_by_cause" not in study:
         return ""
     largest = study["error_by_cause"].max("quantity")
@@ -66,7 +66,7 @@ def _cause(study: xr.Dataset) -> str:
     size = f"{known[first]:.0e}" if np.isfinite(known[first]) else "other impacts"
     rest = f"; {others}" if others else ""
     missing = [cause for cause in ("mesh", "modal truncation") if cause not in known]
-    unseen = f" Not looked at: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
+    unseen = f" Not examined: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
     return f"The largest cause of error is {first} ({size}{rest}); what helps is {CAUSES[first]}.{unseen}"
 
 
