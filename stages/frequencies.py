@@ -47,6 +47,11 @@ def text(linear: xr.Dataset) -> str:
         f"equilibrium: largest unbalanced force {a['residual']:.3g} N after {a['iterations']} iterations",
         *_freedoms(linear),
     ]
+    if linear.sizes["vibration"]:
+        grows = a["growth"]
+        lines.append(
+            f"unstable: a small motion grows at {grows:.3g} 1/s" if grows > 0.0 else "stable: no small motion grows"
+        )
     if not linear.sizes["vibration"]:
         return "\n".join([*lines, "nothing vibrates: joints and drives hold all bodies"]) + "\n"
     lines += [

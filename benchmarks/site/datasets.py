@@ -18,7 +18,11 @@ DATASETS: dict[str, tuple[str, Schema]] = {
     "What follows from a run": ("`post.nc`", POST),
     "Ensemble": ("`ensemble.nc`, of scenes with `[ensemble]`", artifacts.ENSEMBLE),
     "Equilibrium": ("from `flexclear.equilibrium`", artifacts.EQUILIBRIUM),
-    "Vibrations": ("from `flexclear frequencies`; it has the variables of an equilibrium as well", artifacts.LINEAR),
+    "Vibrations": (
+        "from `flexclear frequencies`; it has the variables of an equilibrium as well, and as attribute `growth` the "
+        "largest rate [1/s] at which a small motion grows, 0 where the state is stable",
+        artifacts.LINEAR,
+    ),
     "Sections": ("from `flexclear sections`", artifacts.SECTIONS),
     "Verdict": ("from `flexclear sections`", VERDICT),
     "Reduced body": ("`bundle/<body>.nc`", artifacts.BUNDLE),

@@ -3,7 +3,7 @@
     python docs/examples/campbell.py [FIGURE.png]
 
 Both are scenes of flexclear whose drive turns at a steady speed, one of them with geometric stiffening. The vibrations
-are found in the axes that turn with the scene; those of the rotor are drawn in fixed axes, where its whirls are seen.
+are computed in the axes that turn with the scene; those of the rotor are drawn in fixed axes, in which it whirls.
 """
 
 from __future__ import annotations

@@ -108,9 +108,13 @@ def equilibrium(
     Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium.
     """
     from flexclear.pipeline.dynamics.linear import dataset
-    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as find
+    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as at_rest
+    from flexclear.pipeline.dynamics.linear.steady import steady
 
-    return dataset.equilibrium(*find(scene, bundles, progress, time, drives, moving), moving)
+    if not moving:
+        return dataset.equilibrium(*at_rest(scene, bundles, progress, time, drives), moving)
+    bench, rest, _ = steady(scene, bundles, progress, time, drives)
+    return dataset.equilibrium(bench, rest, moving)
 
 
 def frequencies(
@@ -123,8 +127,11 @@ def frequencies(
 ) -> xr.Dataset:
     """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
     from flexclear.pipeline.dynamics.linear import dataset
-    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as find
+    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as at_rest
+    from flexclear.pipeline.dynamics.linear.steady import steady
     from flexclear.pipeline.dynamics.linear.vibrations import vibrations
 
-    bench, rest = find(scene, bundles, progress, time, drives, moving)
+    if moving:
+        return dataset.linear(*steady(scene, bundles, progress, time, drives), moving)
+    bench, rest = at_rest(scene, bundles, progress, time, drives)
     return dataset.linear(bench, rest, vibrations(bench, rest.at), moving)

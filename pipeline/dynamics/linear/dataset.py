@@ -78,7 +78,7 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
         frame=list(bench.model.mechanism.frames),
     )
     facts = still.attrs | {"title": f"Vibrations of {subject(bench.scene)}"}
-    return conform(made, LINEAR, **facts, motions_without_stiffness=small.free)
+    return conform(made, LINEAR, **facts, motions_without_stiffness=small.free, growth=small.growth)
 
 
 def _motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:

@@ -22,6 +22,8 @@ from flexclear.pipeline.core.errors import SolverError
 FACTOR, LEVELS = 2.5, 22
 #: columns of the table: error orders 2, 4, .. 10
 ORDERS = 5
+#: rows of the shortest steps, 600 times apart, that show what rounding does
+SHORTEST = 8
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,7 @@ def derivative(force: Callable[[float], np.ndarray], widest: float, rounding: Ro
     """
     steps = widest / FACTOR ** np.arange(LEVELS)
     table = [_row(force, float(step)) for step in steps]
+    noise = max(rounding.noise, _noise(steps, table))
     for above, row in pairwise(table):
         for j in range(min(len(above), ORDERS) if row else 0):
             gain = FACTOR ** (2 * (j + 1))
@@ -47,7 +50,7 @@ def derivative(force: Callable[[float], np.ndarray], widest: float, rounding: Ro
     best: tuple[np.ndarray, float] | None = None
     for step, above, row in zip(steps[1:], table, table[1:], strict=False):
         # differences alone deceive where rounding makes neighbours equal by chance
-        floor = (rounding.noise + rounding.grain * float(np.linalg.norm(row[0]))) / step if row else 0.0
+        floor = (noise + rounding.grain * float(np.linalg.norm(row[0]))) / step if row else 0.0
         for j in range(1, min(len(above) + 1, len(row))):
             change = max(np.linalg.norm(row[j] - row[j - 1]), np.linalg.norm(row[j] - above[j - 1]))
             if best is None or float(change) + floor < best[1]:
@@ -55,6 +58,16 @@ def derivative(force: Callable[[float], np.ndarray], widest: float, rounding: Ro
     if best is None:
         raise SolverError("the forces close to this pose cannot be evaluated")
     return best
+
+
+def _noise(steps: np.ndarray, table: list[list[np.ndarray]]) -> float:
+    """What rounding does to the force, by how its slopes over the shortest steps scatter; table: with first entries.
+
+    Terms that balance leave nothing of their size in the force, only their rounding.
+    """
+    firsts = [row[0] for row in table[-SHORTEST:] if row]
+    scatter = [float(np.linalg.norm(b - a)) for a, b in pairwise(firsts)]
+    return float(np.median(np.array(scatter) * steps[len(steps) - len(scatter) :])) if scatter else 0.0
 
 
 def _row(force: Callable[[float], np.ndarray], step: float) -> list[np.ndarray]:

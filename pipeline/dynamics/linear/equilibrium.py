@@ -20,11 +20,9 @@ import xarray as xr
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, closed, hold, set_drives
+from flexclear.pipeline.dynamics.linear.bench import Bench, closed, hold
 from flexclear.pipeline.dynamics.linear.tangent import Tangent, magnitude, stiffness, tangent
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.run.singular import built_rows
 
 #: iterations before giving up
 MOST = 200
@@ -38,10 +36,6 @@ ROUNDING = 1e-8
 LIMP = 1e-12
 #: a step may end with this fraction of the starting power turned against it
 OVERSHOOT = 0.5
-#: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
-STEADY = 1e-9
-#: how far the drives are moved to see whether the forces stay the same, in radians or fractions of the mechanism's size
-PROBE = 0.1
 
 
 @dataclass(frozen=True)
@@ -59,18 +53,14 @@ def equilibrium(
     progress: Progress,
     time: float | None,
     drives: Mapping[str, float] | None,
-    moving: bool,
 ) -> tuple[Bench, Equilibrium]:
-    """The bench of a scene and its equilibrium; see `pipeline.dynamics.equilibrium`."""
-    bench, q = hold(scene, bundles, progress, time, drives, moving)
-    progress(None, "looking for the equilibrium")
-    rest = find_equilibrium(bench, q)
-    if moving:
-        _require_steady(bench, rest.at)
-    return bench, rest
+    """The bench of a scene and its equilibrium, drives held; see `pipeline.dynamics.equilibrium`."""
+    bench, q = hold(scene, bundles, progress, time, drives, False)
+    progress(None, "Computing the equilibrium")
+    return bench, descend(bench, q)
 
 
-def find_equilibrium(bench: Bench, q: np.ndarray) -> Equilibrium:
+def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
     """The equilibrium close to positions q (loops closed); SolverError when there is none, or the search fails."""
     at = tangent(bench, q)
     best, since = np.inf, 0
@@ -133,40 +123,6 @@ def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:
             return new
         fraction *= 0.5
     raise SolverError(f"at t = {bench.time:.6g} s: no step towards static equilibrium can be made from this pose")
-
-
-def _require_steady(bench: Bench, at: Tangent) -> None:
-    """SolverError unless the pose stays in balance, and the loops closed, while the drives move on."""
-    fastest = float(np.max(np.abs(bench.drives[:, 1]) / bench.units, initial=0.0))
-    if fastest == 0.0:
-        return
-    model, before, forces = bench.model, balance(bench, at.q), _forces(bench)
-    along = built_rows(model, bench.engine.h) == 0
-    loops = float(np.max(np.abs(before.slip) / np.where(along, model.length, 1.0), initial=0.0))
-    if loops <= STEADY * fastest:
-        onward = bench.drives + np.stack([PROBE * bench.drives[:, 1] / fastest, np.zeros(len(bench.drives))], axis=1)
-        set_drives(bench, onward)
-        after = balance(bench, at.q)
-        forces = max(forces, _forces(bench))
-        set_drives(bench, bench.drives)
-        change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))
-        if change <= STEADY * forces:
-            return
-    raise SolverError(
-        f"at t = {bench.time:.6g} s: the drives' motion is not steady: the forces on the free coordinates change "
-        "as they continue; hold the drives instead"
-    )
-
-
-def _forces(bench: Bench) -> float:
-    """Size of the forces that balance each other in the state evaluated last, as moments [N m].
-
-    Those of inertia, gravity, loads and contacts on each link and what it carries, and those of each load and contact
-    alone.  What is left of them along the free coordinates says nothing: in balance that is rounding.
-    """
-    wrenches, loads, touch = (bench.engine.table(table) for table in (m.WRENCH, m.LOAD, m.TOUCH))
-    forces = [bench.model.length * rows["force"] for rows in (wrenches, loads, touch)]
-    return max(float(np.max(np.abs(v), initial=0.0)) for v in [*forces, wrenches["moment"], loads["moment"]])
 
 
 def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:

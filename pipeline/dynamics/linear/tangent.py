@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.dynamics.linear.bench import Bench, balance, displacement_map
 from flexclear.pipeline.dynamics.linear.differences import Rounding, derivative
 
@@ -47,9 +48,14 @@ class Tangent:
 
 
 def tangent(bench: Bench, q: np.ndarray) -> Tangent:
-    """The free motions at positions q whose loops are closed."""
+    """The free motions at positions q whose loops are closed; SolverError where these are far beyond any real pose."""
     b = balance(bench, q)
-    lower = np.linalg.cholesky(b.mass)
+    try:
+        lower = np.linalg.cholesky(b.mass)
+    except np.linalg.LinAlgError:
+        raise SolverError(
+            f"at t = {bench.time:.6g} s: bodies are so far deformed that the mass matrix is not positive definite"
+        ) from None
     spread = scipy.linalg.solve_triangular(lower, b.jacobian.T, lower=True).T
     scale = np.linalg.norm(spread, axis=1)
     rows = spread[scale > 0.0] / scale[scale > 0.0, None]

@@ -12,9 +12,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.linalg
 
 from flexclear.pipeline.dynamics.linear.bench import Bench
-from flexclear.pipeline.dynamics.linear.tangent import Tangent, damping, stiffness
+from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, damping, stiffness
 
 #: an eigenvalue of the stiffness within this many estimated errors of zero is zero
 NOTHING = 10.0
@@ -33,18 +34,29 @@ class Vibrations:
     """Small motions exp(lambda t) w, ascending in frequency; pairs of complex lambda once, with Im > 0.
 
     value: lambda [1/s], complex, shape (n,).  shape: displacements w of the coordinates, complex, shape (nv, n), with
-    w^H M w = 1.  free: how many motions have no stiffness.
+    w^H M w = 1.  free: how many motions have no stiffness.  doubt: error of each lambda, estimated [1/s], shape (n,).
     """
 
     value: np.ndarray
     shape: np.ndarray
     free: int
+    doubt: np.ndarray
+
+    @property
+    def growth(self) -> float:
+        """The largest rate at which a motion grows [1/s]; 0 where none does by more than its error."""
+        return float(np.max(np.where(self.value.real > NOTHING * self.doubt, self.value.real, 0.0), initial=0.0))
+
+    @property
+    def stable(self) -> bool:
+        """Whether no small motion grows exponentially."""
+        return self.growth == 0.0
 
 
 def vibrations(bench: Bench, at: Tangent) -> Vibrations:
     """All small motions about a pose in balance."""
     if not at.Z.shape[1]:
-        return Vibrations(np.zeros(0, dtype=complex), np.zeros((len(at.bias), 0), dtype=complex), 0)
+        return Vibrations(np.zeros(0, dtype=complex), np.zeros((len(at.bias), 0), dtype=complex), 0, np.zeros(0))
     motions = at.Z
     for _ in range(2):
         K, error = stiffness(bench, at, motions)
@@ -58,11 +70,11 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
     if _is_symmetric(K, error) and not np.any(D):
         k, axes = _principal(_symmetric(K, error), limp)
         # a falling motion, of negative stiffness, grows as exp(+sqrt(-k) t)
-        value, shape = np.sqrt((-k).astype(complex)), axes.astype(complex)
+        value, shape, doubt = np.sqrt((-k).astype(complex)), axes.astype(complex), np.zeros(len(k))
     else:
-        value, shape = _damped(K, D, limp)
+        value, shape, doubt = _damped(K, D, limp, error, rate_error)
     order = np.lexsort((np.abs(value), np.abs(value.imag)))
-    return Vibrations(value[order], motions @ shape[:, order], int(limp.sum()))
+    return Vibrations(value[order], motions @ shape[:, order], int(limp.sum()), doubt[order])
 
 
 def _limp(K: np.ndarray, error: np.ndarray) -> np.ndarray:
@@ -107,22 +119,38 @@ def _principal(K: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return k, full
 
 
-def _damped(K: np.ndarray, D: np.ndarray, limp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Eigenvalues lambda and vectors of z'' + D z' + K z = 0, one of each conjugate pair."""
+def _damped(
+    K: np.ndarray, D: np.ndarray, limp: np.ndarray, error: np.ndarray, rate_error: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Eigenvalues lambda and vectors of z'' + D z' + K z = 0, one of each conjugate pair, and errors of lambda.
+
+    error, rate_error: of the columns of K and D.  An eigenvalue errs by |y^H| |dA| |x| / |y^H x| at most, to first
+    order, with its left and right vectors y and x (Golub & Van Loan (2013), Matrix Computations, sec. 7.2.2).
+    """
     loose = limp & ~np.any(D, axis=0) & ~np.any(D, axis=1)
     rows = np.ix_(~loose, ~loose)
     K, D, scale = K[rows], D[rows], _scale(K)[~loose]
+    n = len(K)
     # coordinates z and z'/scale change at comparable rates
     A = np.block([[np.zeros_like(K), np.diag(scale)], [-K / scale[None, :], -D]])
-    value, vectors = np.linalg.eig(A)
+    value, left, vectors = scipy.linalg.eig(A, left=True)
+    wrong = EPSILON * np.abs(A)
+    wrong[n:] += np.concatenate([error[~loose] / scale, rate_error[~loose]])
+    sizes = np.einsum("ik,ij,jk->k", np.abs(left), wrong, np.abs(vectors))
+    doubt = sizes / np.maximum(np.abs(np.sum(left.conj() * vectors, axis=0)), np.finfo(float).tiny)
     # displacements, not speeds: a creeping motion has none
-    inner = vectors[: len(K)] / scale[:, None]
+    inner = vectors[:n] / scale[:, None]
     real = np.abs(value.imag) <= REAL * np.abs(value)
-    lasting = np.abs(value.real) <= REAL * np.abs(value)
+    lasting = np.abs(value.real) <= np.maximum(REAL * np.abs(value), doubt)
     value = np.where(real, value.real, np.where(lasting, 1j * value.imag, value))
     value[np.abs(value) <= REAL * np.abs(value).max(initial=0.0)] = 0.0
     once = (value.imag > 0.0) | real
     shape = np.zeros((len(loose), int(once.sum())), dtype=complex)
     shape[~loose] = inner[:, once] / np.linalg.norm(inner[:, once], axis=0)
     still = np.eye(len(loose), dtype=complex)[:, loose]
-    return np.concatenate([np.zeros(int(loose.sum()), dtype=complex), value[once]]), np.hstack([still, shape])
+    still_value = np.zeros(int(loose.sum()))
+    return (
+        np.concatenate([still_value.astype(complex), value[once]]),
+        np.hstack([still, shape]),
+        np.concatenate([still_value, doubt[once]]),
+    )

@@ -24,7 +24,7 @@ def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -
 
     Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium close to its poses.
     """
-    bench, rest = equilibrium(placed(scene), bundles, progress, None, None, False)
+    bench, rest = equilibrium(placed(scene), bundles, progress, None, None)
     progress(None, f"begins at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
     rest_state = resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time), scene.contacts())
     return rest_state, bench.engine.model.mechanism.choice

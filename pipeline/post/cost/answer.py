@@ -6,7 +6,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.post.cost.causes import CAUSES
-from flexclear.pipeline.post.cost.price import cheapest
+from flexclear.pipeline.post.cost.price import Choice, cheapest, choices
 
 
 def sentences(study: xr.Dataset) -> str:
@@ -72,3 +72,32 @@ def _cause(study: xr.Dataset) -> str:
 
 def _undone(study: xr.Dataset) -> str:
     return f"Not run within the budget: {study.attrs['undone']}." if study.attrs.get("undone") else ""
+
+
+def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
+    """``<name>.png`` and ``.svg``: the largest error of any quantity against processor time, this scene as a star."""
+    from flexclear.pipeline.post.cost.work_precision import LOOKS
+    from flexclear.pipeline.post.plotting import style
+
+    by_method: dict[str, list[Choice]] = {}
+    for choice in choices(study):
+        by_method.setdefault(choice.name.partition(",")[0], []).append(choice)
+    with style.style():
+        made, axes = style.grid(1, 1, (6.4, 3.6))
+        panel = axes[0, 0]
+        for method, found in by_method.items():
+            shown = sorted((c.seconds, c.error) for c in found if np.isfinite(c.error) and c.error > 0.0)
+            color, mark = LOOKS.get(method, ("#6b6b6b", "x"))
+            panel.plot(*np.array(shown).reshape(-1, 2).T, mark, color=color, ls="-", lw=1.0, ms=5, label=method)
+        _, error = _worst(study)
+        if np.isfinite(error):
+            panel.plot(study.attrs["own_seconds"], error, "*", color="#222222", ms=13, label="this scene", zorder=5)
+        unsure = float(study["reference_uncertainty"].max())
+        if np.isfinite(unsure) and unsure > 0.0:
+            panel.axhline(unsure, color="#6b6b6b", lw=0.9, ls=":", label="uncertainty of the tightest run")
+        panel.set(xscale="log", yscale="log", xlabel="processor time of the integration (s)")
+        panel.set_ylabel("largest relative error")
+        style.plain(panel.xaxis)
+        panel.legend(fontsize=8)
+        style.heading(made, title)
+        return style.files(name, made)

@@ -1,0 +1,202 @@
+r"""Steady motion: the pose in which all forces balance, those of inertia included, while the drives keep their speed.
+
+Newton's method, because a steady motion need not be a minimum of anything: above its critical speed an unbalanced rotor
+is held by gyroscopic forces in a pose from which the forces alone push away (self-centring). Where a single start does
+not lead there, the speed grows in strides from rest, each starting from the pose before; a stride may pass a critical
+speed, at which an undamped rotor has no steady motion. Stability is judged afterwards, by the eigenvalues.
+
+Source: Allgower & Georg (2003), Introduction to Numerical Continuation Methods, ch. 2; Genta (2005), Dynamics of
+Rotating Systems, sec. 2.4 (self-centring).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.scene.loads import Bushing
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, closed, hold, set_drives
+from flexclear.pipeline.dynamics.linear.equilibrium import BALANCED, LONGEST, SHORT, Equilibrium, descend, residual
+from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, stiffness, tangent
+from flexclear.pipeline.dynamics.linear.vibrations import NOTHING, Vibrations, vibrations
+from flexclear.pipeline.dynamics.run.singular import built_rows
+
+#: corrections of one pose; each is at most this fraction of the one before, else a stride has to be shorter
+CORRECTIONS, CONTRACTION = 20, 0.5
+#: corrections below this fraction of the mechanism's size, or of a radian, that shrink no more are rounding
+ROUNDED = 1e-8
+#: shortest stride, as a fraction of the drives' speed: narrow against the way between two critical speeds
+SHORTEST = 1.0 / 256.0
+#: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
+STEADY = 1e-9
+#: how far the drives are moved to see whether the forces stay the same, in radians or fractions of the mechanism's size
+PROBE = 0.1
+
+
+def steady(
+    scene: Scene,
+    bundles: Mapping[str, xr.Dataset],
+    progress: Progress,
+    time: float | None,
+    drives: Mapping[str, float] | None,
+) -> tuple[Bench, Equilibrium, Vibrations]:
+    """The bench of a scene, its steady motion and the vibrations about it; see `pipeline.dynamics.frequencies`."""
+    bench, q = hold(scene, bundles, progress, time, drives, True)
+    progress(None, "Computing the steady motion")
+    return (bench, *steady_near(bench, q))
+
+
+def steady_near(bench: Bench, q: np.ndarray) -> tuple[Equilibrium, Vibrations]:
+    """The steady motion near positions q (loops closed), and the vibrations about it.
+
+    Where the one that Newton's method reaches is unstable, a stable one that the forces lead to is preferred, as of a
+    governor whose arms rise.  Raises SolverError where there is none, or the motion is not steady.
+    """
+    reached, failure = list[tuple[Equilibrium, Vibrations]](), None
+    for find in (_continued, descend) if np.any(bench.drives[:, 1]) else (descend,):
+        try:
+            rest = find(bench, q)
+            reached.append((rest, vibrations(bench, rest.at)))
+        except SolverError as error:
+            failure = failure or error
+            continue
+        if reached[-1][1].stable:
+            break
+    if not reached:
+        assert failure is not None
+        _require_turning_frames(bench)
+        raise failure
+    best = next((pair for pair in reached if pair[1].stable), reached[0])
+    _require_steady(bench, best[0].at)
+    return best
+
+
+def _continued(bench: Bench, q: np.ndarray) -> Equilibrium:
+    """The steady motion by Newton's method, at once or with the drives' speed growing from rest."""
+    try:
+        return newton(bench, q)
+    except SolverError:
+        pass
+
+    def at(fraction: float, start: np.ndarray) -> Equilibrium:
+        set_drives(bench, bench.drives * [1.0, fraction])
+        return newton(bench, start)
+
+    try:
+        set_drives(bench, bench.drives * [1.0, 0.0])
+        rest, fraction = descend(bench, q), 0.0
+        while fraction < 1.0:
+            stride = 1.0 - fraction
+            while True:
+                try:
+                    rest, fraction = at(min(1.0, fraction + stride), rest.at.q), min(1.0, fraction + stride)
+                    break
+                except SolverError:
+                    stride *= 0.5
+                    if stride < SHORTEST:
+                        raise
+    finally:
+        set_drives(bench, bench.drives)
+    return rest
+
+
+def newton(bench: Bench, q: np.ndarray) -> Equilibrium:
+    """The pose in balance that full steps of Newton's method reach from q; SolverError where they do not contract."""
+    at, last, iteration = tangent(bench, q), np.inf, 0
+    size = bench.model.speed_scales
+    for iteration in range(1, CORRECTIONS + 1):
+        forces = _forces(bench) * float(np.linalg.norm(np.abs(at.Z).T @ (1.0 / size)))
+        step = _correction(bench, at, BALANCED * forces)
+        length = float(np.max(np.abs(step) / size, initial=0.0))
+        if length <= SHORT or (length <= ROUNDED and length > CONTRACTION * last):
+            return Equilibrium(at, residual(bench, at), iteration)
+        if not length <= min(LONGEST, CONTRACTION * last):
+            break
+        at, last = tangent(bench, closed(bench, at.q + at.moves @ step)), length
+    raise SolverError(
+        f"at t = {bench.time:.6g} s: no steady motion was reached from this pose in {iteration} corrections; a force "
+        f"of {residual(bench, at):.3g} N stays unbalanced"
+    )
+
+
+def _correction(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
+    """Newton's step of all coordinates, shape (nv,); motions that nothing drives back stay where they are."""
+    if not at.Z.shape[1]:
+        return np.zeros(len(at.bias))
+    first, _ = stiffness(bench, at, at.Z)
+    # along the principal motions soft ones are not lost in the rounding of stiff ones
+    motions = at.Z @ np.linalg.svd(first)[2].T
+    K, error = stiffness(bench, at, motions)
+    size, forces = np.linalg.norm(K, axis=0), motions.T @ at.bias
+    firm = size > np.maximum(NOTHING * error, np.finfo(float).tiny)
+    along = -np.linalg.lstsq(K[:, firm] / size[firm], forces, rcond=None)[0] / size[firm]
+    left = float(np.linalg.norm(forces + K[:, firm] @ along))
+    if left > max(negligible, ROUNDED * float(np.linalg.norm(forces))):
+        raise SolverError(
+            f"at t = {bench.time:.6g} s: nothing holds a motion against a force of {residual(bench, at):.3g} N"
+        )
+    return motions[:, firm] @ along
+
+
+def _require_steady(bench: Bench, at: Tangent) -> None:
+    """SolverError unless the pose stays in balance, and the loops closed, while the drives move on."""
+    fastest = float(np.max(np.abs(bench.drives[:, 1]) / bench.units, initial=0.0))
+    if fastest == 0.0:
+        return
+    model, before = bench.model, balance(bench, at.q)
+    forces = _forces(bench)
+    along = built_rows(model, bench.engine.h) == 0
+    loops = float(np.max(np.abs(before.slip) / np.where(along, model.length, 1.0), initial=0.0))
+    if loops <= STEADY * fastest:
+        set_drives(
+            bench, bench.drives + np.stack([PROBE * bench.drives[:, 1] / fastest, 0.0 * bench.drives[:, 1]], axis=1)
+        )
+        after = balance(bench, at.q)
+        forces = max(forces, _forces(bench))
+        set_drives(bench, bench.drives)
+        change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))
+        if change <= STEADY * forces + _rounding(bench, at):
+            return
+    _require_turning_frames(bench)
+    raise SolverError(
+        f"at t = {bench.time:.6g} s: the drives' motion is not steady: the forces on the free coordinates change "
+        "as they go on; hold the drives instead"
+    )
+
+
+def _rounding(bench: Bench, at: Tangent) -> float:
+    """What rounding of positions does to stiff forces along the free motions that balance, as moments [N m]."""
+    K, _ = stiffness(bench, at, at.Z)
+    forces = at.mass @ at.Z @ K @ at.Z.T @ at.mass
+    size = bench.model.speed_scales
+    return EPSILON * float(np.max(size * (np.abs(forces) @ size), initial=0.0))
+
+
+def _require_turning_frames(bench: Bench) -> None:
+    """SolverError for a body that only a bushing connects to others: its coordinates do not move with the drives."""
+    loose = {name for link in bench.model.links[1:] if link.branch.edge is None for name in link.places}
+    for name, load in bench.scene.forces().items():
+        mounted = loose & {frame.partition(".")[0] for frame in load.between} if isinstance(load, Bushing) else ()
+        for body in mounted:
+            raise SolverError(
+                f"at t = {bench.time:.6g} s: {body} is held by no joint: its coordinates ignore the drives, and "
+                f"no pose of it is steady; give it a joint of type `free` with the frames of the bushing {name}: "
+                f'between = ["{load.between[0]}", "{load.between[1]}"]'
+            )
+
+
+def _forces(bench: Bench) -> float:
+    """Size of the forces that balance each other in the state evaluated last, as moments [N m].
+
+    Those of inertia, gravity, loads and contacts on each link and what it carries, and those of each load and contact
+    alone.  What is left of them along the free coordinates says nothing: in balance that is rounding.
+    """
+    wrenches, loads, touch = (bench.engine.table(table) for table in (m.WRENCH, m.LOAD, m.TOUCH))
+    forces = [bench.model.length * rows["force"] for rows in (wrenches, loads, touch)]
+    return max(float(np.max(np.abs(v), initial=0.0)) for v in [*forces, wrenches["moment"], loads["moment"]])

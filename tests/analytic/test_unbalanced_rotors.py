@@ -1,0 +1,202 @@
+"""Unbalanced rotors at steady speed: their poses below and above the critical speed, and their stability."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.schema import Scene
+from tests.analytic.linear_runs import frequencies
+from tests.properties.mechanisms import GRAVITY, Table, joint, scene
+
+#: a disc at the end of a shaft of 0.25 m: mass [kg], inertia across and along [kg m^2]
+MASS, ACROSS, ALONG, ARM = 3.0, 0.02, 0.036, 0.25
+#: stiffness of the shaft's end: deflection [N/m], mixed [N/rad], slope [N m/rad]
+SIDE, MIXED, SLOPE = 164163.04446739165, 20520.380558423956, 3420.0634264039927
+#: no turn, and two about axes that are parallel to none of the world's
+TURNS = {"upright": (0.0, 0.0, 0.0), "oblique": (0.7, -1.9, 0.4), "over": (2.0, 1.0, -2.0)}
+
+
+def rotor(
+    speed: float,
+    unbalance: float = 0.0,
+    turn: tuple[float, float, float] = TURNS["upright"],
+    size: float = 1.0,
+    damping: float = 0.0,
+    **more: object,
+) -> Table:
+    """The disc on a bushing at a driven hub; unbalance: of its centre of mass along x, per size [m].
+
+    size: all lengths are as much larger; forces per displacement, and frequencies, stay the same.
+    """
+    K = np.diag([SIDE, SIDE, 1e8, SLOPE * size**2, SLOPE * size**2, 1e5 * size**2])
+    K[0, 4] = K[4, 0] = -MIXED * size
+    K[1, 3] = K[3, 1] = MIXED * size
+    R = rotation_vector_to_matrix(np.array(turn))
+    axes = {"z": R[:, 2].tolist(), "x": R[:, 0].tolist()}
+    bodies: Table = {
+        "ground": {"type": "ground", "frames": {"o": {"axes": axes}}},
+        "hub": {
+            "type": "rigid", "mass": 1.0, "inertia": [0.01 * size**2] * 3, "pose": {"axes": axes},
+            "frames": {"o": {}, "s": {"position": [0.0, 0.0, ARM * size]}},
+        },
+        "disc": {
+            "type": "rigid", "mass": MASS, "inertia": [ACROSS * size**2, ACROSS * size**2, ALONG * size**2],
+            "com": [unbalance * size, 0.0, 0.0], "frames": {"o": {}},
+            "pose": {"position": (R[:, 2] * ARM * size).tolist(), "axes": axes},
+        },
+    }  # fmt: skip
+    mount = {"type": "bushing", "between": ["hub.s", "disc.o"], "stiffness": K.tolist()}
+    mount["damping"] = [damping, damping, 0.0, 0.0, 0.0, 0.0]
+    return scene(
+        bodies,
+        {"axle": joint("revolute", "ground.o", "hub.o"), "float": joint("free", "hub.s", "disc.o")},
+        load={"shaft": mount},
+        drive={"motor": {"joint": "axle", "law": {"type": "polynomial", "coefficients": [0.0, speed]}}},
+        **more,
+    )
+
+
+def steady(table: Table) -> xr.Dataset:
+    return dynamics.frequencies(Scene.model_validate(table), {}, silent, moving=True)
+
+
+def deflection(speed: float) -> float:
+    """Deflection of the shaft's end per unbalance, in the axes that turn.
+
+    (K - Omega^2 diag(m, I_t - I_p)) (x, p) = (m Omega^2 e, 0); Genta (2005), Dynamics of Rotating Systems, sec. 2.6.
+    """
+    K = np.array([[SIDE, -MIXED], [-MIXED, SLOPE]])
+    return float(np.linalg.solve(K - speed**2 * np.diag([MASS, ACROSS - ALONG]), [MASS * speed**2, 0.0])[0])
+
+
+def test_the_disc_turns_inside_of_its_unbalance_above_the_critical_speed() -> None:
+    """From outside to beyond its centre of mass's opposite side, as it is self-centred: -1 far above."""
+    assert deflection(100.0) > 0.0
+    assert deflection(150.0) == pytest.approx(-4.6, abs=0.05)
+    K = np.array([[SIDE, -MIXED], [-MIXED, SLOPE]])
+    turning = np.linalg.eigvals(np.linalg.solve(np.diag([MASS, ACROSS - ALONG]), K)).real
+    assert np.sqrt(turning[turning > 0.0]) == pytest.approx([129.0], abs=0.5)
+
+
+@pytest.mark.parametrize(
+    "speed, size, turn",
+    [
+        (20.0, 1.0, "over"),
+        (125.0, 1e-3, "oblique"),
+        (150.0, 1.0, "upright"),
+        (150.0, 1e3, "oblique"),
+        (600.0, 1.0, "over"),
+    ],
+)
+def test_an_unbalanced_disc_turns_where_its_equations_say(speed: float, size: float, turn: str) -> None:
+    unbalance = 1e-5
+    found = steady(rotor(speed, unbalance, TURNS[turn], size))
+    x = deflection(speed)
+    # the deflection, 1e-4 of the arm at most, enters in second order
+    R = rotation_vector_to_matrix(np.array(TURNS[turn]))
+    place = R.T @ found.frame_position.sel(frame="disc.o").values - [0.0, 0.0, ARM * size]
+    assert place[0] == pytest.approx(x * unbalance * size, rel=1e-3)
+    assert np.abs(place[1]) < 1e-3 * abs(place[0])
+    assert found.attrs["growth"] == 0.0
+
+
+@pytest.mark.parametrize(
+    "unbalance, turn", [(0.0, "oblique"), (1e-9, "over"), (1e-6, "upright"), (1e-6, "oblique"), (1e-3, "over")]
+)
+def test_neither_direction_nor_unbalance_makes_a_rotor_unsteady(unbalance: float, turn: str) -> None:
+    """Nor does it change the frequencies, but for the unbalance's own inertia: m e^2 is 1.5e-4 of I_t at 1 mm."""
+    found = steady(rotor(20.0, unbalance, TURNS[turn]))
+    upright = steady(rotor(20.0))
+    assert found.frequency.values == pytest.approx(upright.frequency.values, rel=2e-4 if unbalance > 1e-4 else 1e-8)
+
+
+def test_weight_across_an_axle_is_unsteady_still() -> None:
+    with pytest.raises(SolverError, match="not steady"):
+        steady(heavy(9.81))
+    with pytest.raises(SolverError, match="not steady"):
+        steady(heavy(1e-4))
+
+
+def heavy(g: float) -> Table:
+    """The oblique rotor in a gravity field."""
+    table = rotor(20.0, 1e-6, TURNS["oblique"])
+    table["load"]["weight"] = {**GRAVITY["gravity"], "acceleration": [0.0, 0.0, -g]}
+    return table
+
+
+@pytest.mark.parametrize("speed, turn", [(200.0, "upright"), (300.0, "oblique")])
+def test_damping_in_the_shaft_makes_the_forward_whirl_grow_above_the_critical_speed(speed: float, turn: str) -> None:
+    """In turning axes m (r'' + 2 i Omega r' - Omega^2 r) + c r' + k r = 0; Genta (2005), sec. 2.5.2."""
+    damping = 20.0
+    table = rotor(speed, 1e-6, TURNS[turn], damping=damping)
+    stiffness = np.diag([SIDE, SIDE, 1e8, 1e6, 1e6, 1e6])
+    table["load"]["shaft"]["stiffness"] = stiffness.tolist()
+    roots = np.roots([MASS, 2j * MASS * speed + damping, SIDE - MASS * speed**2])
+    growth = float(max(roots.real))
+    assert (growth > 0.0) == (speed > np.sqrt(SIDE / MASS))
+    # differences of forces to 1e-9, frequencies up to 1e4 rad/s
+    assert steady(table).attrs["growth"] == pytest.approx(max(growth, 0.0), rel=1e-4)
+
+
+@pytest.mark.parametrize("speed, unbalance", [(40.0, 1e-3), (100.0, 1e-3), (100.0, 1e-6)])
+def test_a_flexible_shaft_holds_its_unbalanced_disc_above_the_critical_speed_too(
+    speed: float, unbalance: float
+) -> None:
+    """The overhung rotor of the checks, about an oblique axis; deflection as of `deflection`."""
+    overrides = (
+        ("drive.axle.law.coefficients", (0.0, speed)),
+        ("body.disc.com", (unbalance, 0.0, 0.0)),
+        ("body.disc.pose", None),
+        ("body.ground.frames.axle", {"axis": (1.0, 2.0, 3.0)}),
+    )
+    found = frequencies.__wrapped__("checks/overhung_rotor", overrides, moving=True)
+    K = 200e9 * np.pi * 0.01**4 / 4.0 / 0.5**3 * np.array([[12.0, -3.0], [-3.0, 1.0]])
+    x = np.linalg.solve(K - speed**2 * np.diag([10.0, -0.1]), [10.0 * speed**2 * unbalance, 0.0])[0]
+    axis = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
+    place = found.frame_position.sel(frame="disc.centre").values
+    away = place - axis * (axis @ place)
+    # the shaft's own mass is 1.6e-5 of the disc's, and its linear modes shorten nothing
+    assert np.linalg.norm(away) == pytest.approx(abs(x), rel=1e-3)
+    assert found.attrs["growth"] == 0.0
+
+
+def test_a_rotor_on_a_bushing_alone_is_refused_with_its_remedy() -> None:
+    table = rotor(20.0, 1e-6)
+    del table["joint"]["float"]
+    with pytest.raises(SolverError, match=r'disc is held by no joint.*type `free`.*between = \["hub.s", "disc.o"\]'):
+        steady(table)
+
+
+@pytest.mark.parametrize("speed", [4.0, 12.0])
+def test_an_arm_that_turns_fast_rises_to_its_stable_angle(speed: float) -> None:
+    """A point on a hinged arm l: at rest below, above sqrt(g/l) at cos(angle) = g/(l Omega^2); Goldstein, ch. 2."""
+    length, inertia = 0.4, 1e-6
+    bodies: Table = {
+        "ground": {"type": "ground", "frames": {"o": {}}},
+        "hub": {
+            "type": "rigid", "mass": 1.0, "inertia": [1.0] * 3,
+            "frames": {"o": {}, "h": {"axes": {"z": [0.0, 1.0, 0.0], "x": [0.0, 0.0, -1.0]}}},
+        },
+        "bob": {
+            "type": "rigid", "mass": 1.0, "inertia": [inertia] * 3,
+            "frames": {"h": {"position": [-length, 0.0, 0.0]}, "tip": {}},
+        },
+    }  # fmt: skip
+    table = scene(
+        bodies,
+        {"axle": joint("revolute", "ground.o", "hub.o"), "hinge": joint("revolute", "hub.h", "bob.h")},
+        load=GRAVITY,
+        start={"joint": {"hinge": {"position": 0.1}}},
+        drive={"motor": {"joint": "axle", "law": {"type": "polynomial", "coefficients": [0.0, speed]}}},
+    )
+    found = steady(table)
+    height = -found.frame_position.sel(frame="bob.tip", axis="z").item() / length
+    # the bob's own inertia is 6e-6 of m l^2
+    assert height == pytest.approx(min(1.0, 9.81 / (length * speed**2)), rel=1e-5)
+    assert found.attrs["growth"] == 0.0
