@@ -24,7 +24,7 @@ LOOKED_AT = ("0.67.", "0.68.")
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "") not in ("", "0")
 
 
-def tested_release() -> bool:
+def known_release() -> bool:
     """Whether the release of Numba is known to take `lowering`."""
     import numba
 
@@ -64,7 +64,7 @@ def _compiled(function: Callable) -> Any:
         "no_cfunc_wrapper": True,
         "no_cpython_wrapper": True,
     }
-    if tested_release():
+    if known_release():
         from flexclear.pipeline.dynamics.lowering import KernelDispatcher
 
         return KernelDispatcher.of(function, options)
@@ -92,7 +92,7 @@ def field_reader(index: int, size: int, field: int) -> Any:
 
 
 def _lookup(function: Callable, index: int, size: int, field: int | None) -> Any:
-    if not tested_release():
+    if not known_release():
         return _compiled(function)
     from flexclear.pipeline.dynamics.lookup import Lookup
 
