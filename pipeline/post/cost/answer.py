@@ -8,6 +8,9 @@ import xarray as xr
 from flexclear.pipeline.post.cost.causes import CAUSES
 from flexclear.pipeline.post.cost.price import Choice, cheapest, choices
 
+#: a setting that is as accurate as the scene's own is named where it costs less than this fraction
+CHEAPER = 0.7
+
 
 def sentences(study: xr.Dataset) -> str:
     """In words; study: of `stages.cost_study`."""
@@ -29,7 +32,9 @@ def _own(study: xr.Dataset) -> str:
         f"With {study.attrs['own_integrator']} at {setting} the integration takes {study.attrs['own_seconds']:.2g} s "
         f"of processor time ({study.attrs['own_evaluations']:.0f} evaluations)."
     )
-    until = "" if study.attrs["horizon"] == "none" else f" up to the horizon, t = {study.attrs['horizon']:.3g} s,"
+    horizon = study.attrs["horizon"]
+    whole = horizon == "none" or horizon >= study.attrs["end"]
+    until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
         return f"{took} Its error cannot be said: other runs{until} have another number of impacts ({name})."
     return f"{took} Its largest error{until} is {error:.1e} of a quantity's size ({name})."
@@ -48,13 +53,15 @@ def _looser(study: xr.Dataset) -> str:
     """Whether another setting is as accurate for less."""
     _, error = _worst(study)
     same = cheapest(study, error) if np.isfinite(error) else None
-    if same is None or same.seconds > 0.7 * study.attrs["own_seconds"]:
+    if same is None or same.evaluations > CHEAPER * study.attrs["own_evaluations"]:
+        return ""
+    if same.seconds > CHEAPER * study.attrs["own_seconds"]:
         return ""
     return f"{same.name} is as accurate for {same.seconds / study.attrs['own_seconds']:.2g} times the cost."
 
 
 def _cause(study: xr.Dataset) -> str:
-    """Which cause limits the error, of those that were examined, for the quantity that has the largest one."""
+    """Which cause limits the error, of those that were looked at, for the quantity that has the largest one."""
     if "error_by_cause" not in study:
         return ""
     largest = study["error_by_cause"].max("quantity")
@@ -65,8 +72,8 @@ def _cause(study: xr.Dataset) -> str:
     others = ", ".join(f"{cause} {value:.0e}" for cause, value in known.items() if cause != first)
     size = f"{known[first]:.0e}" if np.isfinite(known[first]) else "other impacts"
     rest = f"; {others}" if others else ""
-    missing = [cause for cause in ("mesh", "modal truncation") if cause not in known]
-    unseen = f" Not examined: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
+    missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
+    unseen = f" Not looked at: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
     return f"The largest cause of error is {first} ({size}{rest}); what helps is {CAUSES[first]}.{unseen}"
 
 
@@ -85,8 +92,8 @@ def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
     with style.style():
         made, axes = style.grid(1, 1, (6.4, 3.6))
         panel = axes[0, 0]
-        for method, found in by_method.items():
-            shown = sorted((c.seconds, c.error) for c in found if np.isfinite(c.error) and c.error > 0.0)
+        for method, result in by_method.items():
+            shown = sorted((c.seconds, c.error) for c in result if np.isfinite(c.error) and c.error > 0.0)
             color, mark = LOOKS.get(method, ("#6b6b6b", "x"))
             panel.plot(*np.array(shown).reshape(-1, 2).T, mark, color=color, ls="-", lw=1.0, ms=5, label=method)
         _, error = _worst(study)
