@@ -245,10 +245,10 @@ def _middle(run: xr.Dataset, drawn: Mechanism, index: int) -> np.ndarray:
     return np.asarray(run["position"].values[0, index])
 
 
-def _notes(text: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
+def _notes(parameters: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
     """What the names do not say."""
-    yield f"start at t = {told.get('time', {}).get('start', 0.0):g} s"
-    clear = {name: joint for name, joint in text.get("joint", {}).items() if joint.get("clearance")}
+    yield f"start at t = {parameters.get('time', {}).get('start', 0.0):g} s"
+    clear = {name: joint for name, joint in parameters.get("joint", {}).items() if joint.get("clearance")}
     radii = {name: joint.get("ball_radius", joint.get("pin_radius")) for name, joint in clear.items()}
     factors = sorted(
         {
@@ -261,13 +261,13 @@ def _notes(text: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
     if factors:
         span = factors[0] if len(factors) == 1 else f"{factors[0]} to {factors[-1]}"
         yield f"clearances drawn {span} times larger"
-    if not np.any(_gravity(text)):
+    if not np.any(_gravity(parameters)):
         yield "no gravity"
     if gaps:
         yield "red: joints that do not fit"
 
 
-def _gravity(text: Mapping[str, Any]) -> np.ndarray:
-    fields = [load["acceleration"] for load in text.get("load", {}).values() if load["type"] == "gravity"]
+def _gravity(parameters: Mapping[str, Any]) -> np.ndarray:
+    fields = [load["acceleration"] for load in parameters.get("load", {}).values() if load["type"] == "gravity"]
     total: np.ndarray = np.sum(np.array(fields, dtype=float).reshape(-1, 3), axis=0)
     return total
