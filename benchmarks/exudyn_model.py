@@ -25,6 +25,7 @@ from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.contact.surfaces import BallInSocket
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.model.contacts import LEAST_RATE
 from flexclear.pipeline.dynamics.model.merge import (
     Frame,
     Group,
@@ -333,7 +334,7 @@ def _contact(model: Model, joint: ClearanceSpherical, socket: Any, ball: Any) ->
             contactStiffness=BallInSocket.stiffness(joint, exponent),
             contactStiffnessExponent=exponent,
             restitutionCoefficient=1.0 - 0.5 * (1.0 - restitution**2),
-            minimumImpactVelocity=joint.floor,
+            minimumImpactVelocity=joint.floor or LEAST_RATE,
             dynamicFriction=dynamic,
             frictionProportionalZone=linear_up_to,
         )

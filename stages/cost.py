@@ -92,6 +92,7 @@ def command(options: argparse.Namespace) -> None:
     if options.page is not None:
         said = f" --peer {options.peer.as_posix()}" if options.peer else ""
         said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
+        said += f" --budget {options.budget}{' --models' if options.models else ''}"
         write_page(studies, options.page, said)
 
 
@@ -181,7 +182,7 @@ class Study:
                 "points": listed,
                 "quantities": [[q.owner, q.kind] for q in chosen],
                 "title": self.scene.title,
-                "own": self.setting.attributes,
+                "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
                 "complete": self._complete and not self.undone,
                 "undone": _listed([design.key for design in self.undone]),
                 "peers": list(self.peers),
@@ -302,7 +303,7 @@ def dataset(scene: Scene, workplace: Workplace, budget: str | float | None = Non
     given = limit.seconds(budget, "budget") if isinstance(budget, str) else budget
     # in this process: workers would run a caller's script again from its top
     result, folder = bring(scene, replace(workplace, jobs=1), seconds=BUDGET if given is None else given, models=models)
-    return answered(result, sentences(result), (folder / "work_precision.png").read_bytes())
+    return answered(result, sentences(result), (folder / "accuracy.png").read_bytes())
 
 
 def figures_and_tables(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:

@@ -23,7 +23,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     by another method confirms it.
     """
     from flexclear.pipeline.core.scene.requested_accuracy import Quantity
-    from flexclear.pipeline.post.cost import causes, price, statistics, work_precision
+    from flexclear.pipeline.post.cost import answer, causes, price, statistics, work_precision
     from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
     from flexclear.pipeline.post.plotting.table import files
 
@@ -46,6 +46,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     result |= files("price", price.price_list(study, f"What accuracy costs: {title}", said))
     result |= files("quantities", price.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
+    result |= answer.figure("accuracy", study, f"What accuracy costs: {title}")
     result |= causes.make("causes", split, f"Where the error comes from: {title}")
     marks = _marks(points, runs, chosen)
     result |= work_precision.make(

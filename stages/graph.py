@@ -36,8 +36,8 @@ ARTIFACTS |= {"run": "simulate", "fine-modes": "fine_modes"}
 TIGHTER, FINER = 1e-2, 4
 #: the tightest tolerance that makes a difference: beyond, rounding does
 TIGHTEST = 1e-13
-#: a comparison run may take so many times the evaluations of the run that it is compared with
-MOST = 10.0
+#: a comparison run may take so many times the evaluations of the run that it is compared with, and at least so many
+MOST, LEAST = 4, 100_000
 
 
 @dataclass(frozen=True)
@@ -241,9 +241,8 @@ class Graph:
         return self._tighter({})
 
     def tighter(self, evaluations: int) -> Task:
-        """`tight` that may take MOST times so many evaluations, rounded up to a power of ten, which keys can share."""
-        most = 10 ** math.ceil(math.log10(MOST * max(evaluations, 1)))
-        return self._tighter({"evaluations": min(most, self.scene.solver.evaluations)})
+        """`tight` that may take MOST times so many evaluations."""
+        return self._tighter({"evaluations": min(max(MOST * evaluations, LEAST), self.scene.solver.evaluations)})
 
     def _tighter(self, limits: dict[str, float]) -> Task:
         solver = self.scene.solver

@@ -20,6 +20,8 @@ from flexclear.pipeline.post.plotting.table import Table, as_markdown, from_mark
 from flexclear.stages import cost
 from flexclear.stages.run import find_scene, open_workplace
 
+#: processor time of a study [s]
+STUDY = 3600.0
 #: models of the paper's mechanism
 SCENES = ("sps4/ideal", "sps4/csj", "sps4/far_cb", "sps4/variants/far_csj_cb_damped", "sps4/far_csj_cb")
 
@@ -29,7 +31,8 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     place = open_workplace()
     peers = exudyn.points([r for s in log.latest(log.FOLDER / "exudyn.jsonl") for r in s.records])
     for case in cases:
-        study, folder = cost.bring(load_scene(find_scene(case.name)), place, peers.get(case.name, ()))
+        scene = load_scene(find_scene(case.name))
+        study, folder = cost.bring(scene, place, peers.get(case.name, ()), seconds=STUDY, models=True)
         said, pictures = cost.figures_and_tables(case.name, study, folder, "accuracy")
         records: list[Record] = [{"advice": said.advice}]
         for title, path in said.pictures.items():

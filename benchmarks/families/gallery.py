@@ -168,6 +168,12 @@ def _bifilar(run: xr.Dataset, scene: Scene) -> str:
     return f"Each rod carries up to {float(force):.1f} N."
 
 
+def _six_bar(run: xr.Dataset, scene: Scene) -> str:
+    swing = np.degrees(2.0 * _amplitude(run["joint_position"].sel(coordinate="O3")))
+    torque = derive(run)["peak_drive_force"].sel(drive="motor")
+    return f"It swings by {swing:.1f}°, and the motor supplies up to {float(torque):.2g} N m."
+
+
 def _controllers(run: xr.Dataset, scene: Scene) -> str:
     push = abs(run["controller_force"]).max("time")
     return f"The hardest push is {float(push.max()):.3g} N, by '{push.idxmax().item()}'."
@@ -192,6 +198,7 @@ ENTRIES = {
         Entry("gallery/four_bar", "How far does the rocker swing, and what must the motor supply?", _four_bar),
         Entry("checks/clearance_slider_crank", "What does 0.1 mm of clearance do at 5000 rpm?", _slider_crank),
         Entry("gallery/scott_russell", "How straight is its straight line?", _scott_russell),
+        Entry("gallery/six_bar", "How far does a rocker swing that a loose, bending link drives?", _six_bar),
         Entry("gallery/stewart", "Which stroke and force must the six legs have for this path?", _stewart, at=0.0),
         Entry("gallery/robot_arm", "How much does the load swing after the arm has stopped?", _robot_arm),
         Entry("checks/universal_shaft", "How unevenly does the second shaft turn?", _universal),

@@ -147,7 +147,7 @@ def test_a_cost_study_compares_it(python: Command) -> None:
         """
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.stages import cost_design
-designs = cost_design.runs(load_scene("own.toml"), None, ("heun",))
+designs = cost_design.wide(load_scene("own.toml"), ("heun",))
 print(json.dumps([[d.group, d.scene.solver.integrator, d.scene.solver.rtol, d.scene.solver.step] for d in designs]))
 """,
     )

@@ -155,7 +155,8 @@ class _Contact(Part):
     """What all contacts between surfaces have.
 
     floor: least approach speed used as the impact rate of a closing [m/s]; keeps the law regular
-    for grazing and resting contact.  initial_approach_speed: impact rate of a contact that the
+    for grazing and resting contact.  Without it, 1e-5 of the size of the mechanism per second, at most 1e-6 m/s.
+    initial_approach_speed: impact rate of a contact that the
     scene's start already has, 0 of one that rests there; without it, a start in contact is refused.
     between: frames of the outer and the inner surface, each as body.FRAME.  normal: law of the normal force.  friction:
     law of friction; without it there is none.
@@ -164,7 +165,7 @@ class _Contact(Part):
     between: tuple[FrameName, FrameName]
     normal: NormalLaw
     friction: Friction | None = None
-    floor: Annotated[Speed, Positive] = 1e-6
+    floor: Annotated[Speed, Positive] | None = None
     initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | None = None
 
     @property

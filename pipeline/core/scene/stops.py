@@ -14,8 +14,8 @@ class Stop(Part):
 
     lower, upper: the ends, one or both; angles go on beyond half a turn, from within half a turn of zero at the start.
     normal: a normal law of contacts with its stiffness, of angles in N m and rad.  floor: least approach speed used as
-    impact rate.  initial_approach_speed: of an end that the scene's start has passed; without it, such a start is
-    refused.
+    impact rate; without it 1e-6 rad/s, or of lengths that of contacts.  initial_approach_speed: of an end that the
+    scene's start has passed; without it, such a start is refused.
     joint: name of the joint.  coordinate: name of its coordinate, where it has several.
     """
 
@@ -24,7 +24,7 @@ class Stop(Part):
     lower: Value | None = None
     upper: Value | None = None
     normal: NormalLaw
-    floor: Value = 1e-6
+    floor: Value | None = None
     initial_approach_speed: Value | None = None
 
     @model_validator(mode="after")

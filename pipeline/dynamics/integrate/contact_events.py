@@ -52,6 +52,11 @@ MOST_IMMEDIATE = 200
 MOST_SHORTENED, SHORTER = 8, 0.1
 #: a contact that begins deeper than this share of its clearance, and so many tolerances, has been stepped over
 DEEP, ERRORS = 1e-6, 100.0
+#: share of its length by which a step may miss the event that it is to end on
+CLOSE = 1e-6
+#: a contact that would end where it has just begun is looked at in shorter steps, down to one in which it moves by so
+#: many times what its gap is off zero
+FURTHER = 10.0
 
 
 # Modes ---------------------------------------------------------------------------------------------------------------
@@ -314,6 +319,23 @@ def stepped_over(h, f, w, n, c):
     return gap < -deep and n[n[m.MODE] + c] == 0
 
 
+@kernel
+def backwards(h, w, n, c, rate):
+    """Whether contact c would change its mode on the way back: a graze that a shorter step is to decide.
+
+    Steps of a chosen length, and polynomials, cannot be made shorter.
+    """
+    o = h[m.CONTROL]
+    return side(n, c) * rate < 0.0 and w[o + m.FIXED] == 0.0 and w[o + m.COLLOCATED] == 0.0
+
+
+@kernel
+def resolvable(h, f, w, c, step):
+    """Whether contact c moves further in a step than its gap at the start is uncertain."""
+    o = m.WATCH.row(h, c)
+    return abs(w[o + m.WATCH.rate0]) * step > FURTHER * max(abs(w[o + m.WATCH.gap0]), zero_gap(h, f, w, c))
+
+
 def make_resolve_events(
     evaluate: Callable,
     attempt: Callable,
@@ -331,7 +353,11 @@ def make_resolve_events(
 
     @kernel
     def end_on_event(h, f, w, n, step, c):
-        """Repeat the step so that it ends on the event: its length, or -1 when that fails, and whether it is there."""
+        """Repeat the step so that it ends on the event: its length, or -1 when that fails, and whether it is there.
+
+        Grazes are approached slowly: what is not there after three steps is left to shorter ones.
+        """
+        off = 0.0
         for _ in range(3):
             if not repeat(h, f, w, n, step):
                 return -1.0, False
@@ -340,8 +366,9 @@ def make_resolve_events(
                 return step, True
             if not abs(gap) < 0.1 * abs(rate) * step:
                 return step, False
-            step += gap / rate
-        return step, True
+            off = gap / rate
+            step += off
+        return step, abs(off) <= CLOSE * step
 
     end_on_kink = make_end_on_kink(evaluate_at, extend, repeat, kinks)
     end, accept = (kinks.end, kinks.accept) if kinks else (watch_nothing, watch_nothing)
@@ -398,6 +425,9 @@ def make_resolve_events(
                 accept(h, w)
                 return 0, follow_contacts(h, f, w, n, step, ready, rows, events), t_new, step
             if first * step <= 1e-15 * max(abs(t), step):
+                back = backwards(h, w, n, which, w[m.WATCH.row(h, which) + m.WATCH.rate0])
+                if back and resolvable(h, f, w, which, step):
+                    return try_again(n, which), ready, t_new, step
                 return change_at_start(h, f, w, n, which, events), True, t, step
             length, there = end_on_event(h, f, w, n, first * step, which)
             if length < 0.0:
@@ -408,6 +438,8 @@ def make_resolve_events(
             t_new = t + step
             if not repeat(h, f, w, n, step):
                 return try_again(n, which), ready, t_new, step
+        if backwards(h, w, n, which, w[m.TOUCH.row(h, which) + m.TOUCH.rate]):
+            return try_again(n, which), ready, t_new, step
         n[m.IMMEDIATE] = 0
         watch_end(h, w)
         extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one

@@ -15,13 +15,16 @@ from flexclear.pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_
 from flexclear.pipeline.dynamics.model.gauges import Gauges
 from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
-from flexclear.pipeline.dynamics.model.stops import End
+from flexclear.pipeline.dynamics.model.stops import End, ends_an_angle
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
 
 #: a number of each independent mechanism
 Floors = Sequence[float] | np.ndarray
+#: least impact rates where the scene gives none: far below the approach speeds of common machines [m/s or rad/s], and
+#: the share of the size of a mechanism of 10 cm that this is [1/s]; in one of micrometres 1 um/s would be fast
+LEAST_RATE, SLOW = 1e-6, 1e-5
 #: wiring of a contact but for the kinds of its laws
 Touching = Sequence[tuple[int, int]]
 
@@ -55,9 +58,8 @@ def fill(
             surfaces, shape = parts.surfaces.index(joint.type), joint.shape
         kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
         rows.append((*sites, *kinds_of, first))
-        reals.append(
-            [joint.clearance, joint.radius, joint.floor, stick, *kinks, *law.numbers, *numbers, *shape, length]
-        )
+        sizes = (joint.clearance, joint.radius, _floor(joint, length))
+        reals.append([*sizes, stick, *kinks, *law.numbers, *numbers, *shape, length])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
 
@@ -112,6 +114,13 @@ def _bristles(mechanism: Mechanism) -> list[float | None]:
         None if joint.friction is None else _friction(name, joint).bristle(joint.friction)
         for name, joint, *_ in mechanism.contacts
     ]
+
+
+def _floor(joint: Clearance | End, length: float) -> float:
+    """Least impact rate of a contact of a mechanism of that size [m/s or rad/s]."""
+    if joint.floor is not None:
+        return joint.floor
+    return LEAST_RATE if ends_an_angle(joint) else min(LEAST_RATE, SLOW * length)
 
 
 def _friction(name: str, joint: Clearance | End) -> Any:

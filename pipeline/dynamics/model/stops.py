@@ -32,7 +32,7 @@ class End:
     sense: float
     clearance: float
     normal: NormalLaw
-    floor: float
+    floor: float | None
     initial_approach_speed: float | None
     radius: float = 0.0
     friction: None = None
@@ -83,6 +83,6 @@ def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> 
     between, sides = scene.joint[joint].between, {"lower": -1.0, "upper": 1.0}
     approach = speeds.get("initial_approach_speed")
     return {
-        end: End(name, between, coordinate, limit, sides[end], far, stop.normal, speeds["floor"], approach)
+        end: End(name, between, coordinate, limit, sides[end], far, stop.normal, speeds.get("floor"), approach)
         for end, limit in limits.items()
     }

@@ -6,7 +6,10 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.post.cost.causes import CAUSES
-from flexclear.pipeline.post.cost.price import cheapest
+from flexclear.pipeline.post.cost.price import Choice, cheapest, choices
+
+#: a setting that is as accurate as the scene's own is named where it costs less than this fraction
+CHEAPER = 0.7
 
 
 def sentences(study: xr.Dataset) -> str:
@@ -29,7 +32,9 @@ def _own(study: xr.Dataset) -> str:
         f"With {study.attrs['own_integrator']} at {setting} the integration takes {study.attrs['own_seconds']:.2g} s "
         f"of processor time ({study.attrs['own_evaluations']:.0f} evaluations)."
     )
-    until = "" if study.attrs["horizon"] == "none" else f" up to the horizon, t = {study.attrs['horizon']:.3g} s,"
+    horizon = study.attrs["horizon"]
+    whole = horizon == "none" or horizon >= study.attrs["end"]
+    until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
         return f"{took} Its error cannot be said: other runs{until} have another number of impacts ({name})."
     return f"{took} Its largest error{until} is {error:.1e} of a quantity's size ({name})."
@@ -48,7 +53,9 @@ def _looser(study: xr.Dataset) -> str:
     """Whether another setting is as accurate for less."""
     _, error = _worst(study)
     same = cheapest(study, error) if np.isfinite(error) else None
-    if same is None or same.seconds > 0.7 * study.attrs["own_seconds"]:
+    if same is None or same.evaluations > CHEAPER * study.attrs["own_evaluations"]:
+        return ""
+    if same.seconds > CHEAPER * study.attrs["own_seconds"]:
         return ""
     return f"{same.name} is as accurate for {same.seconds / study.attrs['own_seconds']:.2g} times the cost."
 
@@ -65,10 +72,39 @@ def _cause(study: xr.Dataset) -> str:
     others = ", ".join(f"{cause} {value:.0e}" for cause, value in known.items() if cause != first)
     size = f"{known[first]:.0e}" if np.isfinite(known[first]) else "other impacts"
     rest = f"; {others}" if others else ""
-    missing = [cause for cause in ("mesh", "modal truncation") if cause not in known]
+    missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
     unseen = f" Not looked at: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
     return f"The largest cause of error is {first} ({size}{rest}); what helps is {CAUSES[first]}.{unseen}"
 
 
 def _undone(study: xr.Dataset) -> str:
     return f"Not run within the budget: {study.attrs['undone']}." if study.attrs.get("undone") else ""
+
+
+def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
+    """``<name>.png`` and ``.svg``: the largest error of any quantity against processor time, this scene as a star."""
+    from flexclear.pipeline.post.cost.work_precision import LOOKS
+    from flexclear.pipeline.post.plotting import style
+
+    by_method: dict[str, list[Choice]] = {}
+    for choice in choices(study):
+        by_method.setdefault(choice.name.partition(",")[0], []).append(choice)
+    with style.style():
+        made, axes = style.grid(1, 1, (6.4, 3.6))
+        panel = axes[0, 0]
+        for method, found in by_method.items():
+            shown = sorted((c.seconds, c.error) for c in found if np.isfinite(c.error) and c.error > 0.0)
+            color, mark = LOOKS.get(method, ("#6b6b6b", "x"))
+            panel.plot(*np.array(shown).reshape(-1, 2).T, mark, color=color, ls="-", lw=1.0, ms=5, label=method)
+        _, error = _worst(study)
+        if np.isfinite(error):
+            panel.plot(study.attrs["own_seconds"], error, "*", color="#222222", ms=13, label="this scene", zorder=5)
+        unsure = float(study["reference_uncertainty"].max())
+        if np.isfinite(unsure) and unsure > 0.0:
+            panel.axhline(unsure, color="#6b6b6b", lw=0.9, ls=":", label="uncertainty of the tightest run")
+        panel.set(xscale="log", yscale="log", xlabel="processor time of the integration (s)")
+        panel.set_ylabel("largest relative error")
+        style.plain(panel.xaxis)
+        panel.legend(fontsize=8)
+        style.heading(made, title)
+        return style.files(name, made)

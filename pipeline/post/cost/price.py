@@ -27,7 +27,7 @@ def price_list(study: xr.Dataset, title: str, notes: tuple[str, ...] = ()) -> Ta
     for target in TARGETS:
         choice = cheapest(study, target)
         if choice is None:
-            best = min(_choices(study), key=lambda c: c.error, default=NOTHING)
+            best = min(choices(study), key=lambda c: c.error, default=NOTHING)
             rows.append((f"{target:g}", _absent(study), "–", "–", f"{best.error:.1e} at best", best.worst))
         else:
             seconds = f"{choice.seconds:.3f}"
@@ -42,7 +42,7 @@ def by_quantity(study: xr.Dataset, title: str) -> Table:
     rows = []
     for name in study["quantity"].values:
         one = study.sel(quantity=[name])
-        best = min(_choices(one), key=lambda c: c.error, default=NOTHING)
+        best = min(choices(one), key=lambda c: c.error, default=NOTHING)
         cells = (_cell(cheapest(one, target), _absent(study)) for target in TARGETS)
         rows.append((str(name), *cells, f"{best.error:.1e}"))
     heads = ("quantity", *(f"for {target:g}" for target in TARGETS), "at best")
@@ -78,11 +78,12 @@ NOTHING = Choice("–", np.nan, np.nan, np.inf, "no run")
 
 def cheapest(study: xr.Dataset, target: float) -> Choice | None:
     """The choice with the fewest evaluations whose largest error is at most `target`; None if there is none."""
-    good = [choice for choice in _choices(study) if choice.error <= target]
+    good = [choice for choice in choices(study) if choice.error <= target]
     return min(good, key=lambda choice: choice.evaluations, default=None)
 
 
-def _choices(study: xr.Dataset) -> list[Choice]:
+def choices(study: xr.Dataset) -> list[Choice]:
+    """All ways to integrate whose error is known."""
     choices = []
     unsure = study["reference_uncertainty"].fillna(0.0)
     for group, word in INTEGRATION.items():
@@ -146,7 +147,7 @@ def _confirmed(study: xr.Dataset) -> str:
 def _why_not(study: xr.Dataset) -> str:
     """Whether the settings that were tried end too early, or rounding decides."""
     unsure = study["reference_uncertainty"].fillna(0.0)
-    best = min(_choices(study), key=lambda c: c.error, default=NOTHING)
+    best = min(choices(study), key=lambda c: c.error, default=NOTHING)
     if np.isinf(unsure).any():
         return "the reference and its confirmation do not agree on the number of impacts"
     if best is NOTHING:
