@@ -43,6 +43,7 @@ __all__ = [
     "report",
     "run",
     "sections",
+    "show",
     "stability",
     "sweep",
 ]
@@ -261,6 +262,21 @@ def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
 def render(scene: Scene | str | Path) -> Path:
     """The folder with the scene's pictures, film and mode shapes, brought up to date.  Raises FlexclearError."""
     return _stages("render").rendered(_loaded(scene))
+
+
+def show(scene: Scene | str | Path, folder: str | Path | None = None) -> Any:
+    """The start pose of a scene with all names, in seconds: nothing is run or compiled.
+
+    folder: also write picture and page there, as ``flexclear show`` does.  In a notebook the result shows the page
+    that turns; `gaps` lists the joints that do not fit, `refused` says why (None where all fit).  Raises InputError
+    where no pose can be drawn.
+
+    >>> import flexclear as fc
+    >>> seen = fc.show("scenes/checks/pendulum.toml")
+    >>> [mark.text for mark in seen.view.marks], seen.refused
+    (['bob', 'hinge'], None)
+    """
+    return _stages("show").start(_loaded(scene), None if folder is None else Path(folder))
 
 
 def report(scene: Scene | str | Path, budget: str | float | None = None, *, answers: bool = True) -> Path:

@@ -24,6 +24,7 @@ GARBAGE = 200_000
 #: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
 COMMANDS = {
     "new": "a commented scene of one's own to start from",
+    "show": "the start pose with all names, in seconds; nothing is run",
     "check": "every mistake of scenes and recipes at once; nothing is run",
     "run": "bring scenes up to date",
     "why": "for each stage: fresh, or why it would run again",

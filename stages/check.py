@@ -35,6 +35,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scenes", nargs="+", metavar="SCENE", help="a scene, recipe or sweep file, or a name below scenes/"
     )
+    parser.add_argument(
+        "--show", action="store_true", help="also write the start pose of each scene, and what does not fit there"
+    )
     parser.add_argument("--json", action="store_true", help="print the mistakes as JSON")
 
 
@@ -46,6 +49,9 @@ def command(options: argparse.Namespace) -> int:
     errors: dict[str, FlexclearError] = {}
     for name in options.scenes:
         mistakes, seen = examined(name)
+        if options.show:
+            refused = _show(name, quiet=options.json)
+            mistakes = mistakes or ([] if refused is None else [refused])
         errors |= {str(mistake): mistake for mistake in mistakes}
         if not mistakes and not options.json:
             print(f"{run.find_scene(name)}: {seen.summary}; no error")
@@ -60,6 +66,20 @@ def command(options: argparse.Namespace) -> int:
         if len(errors) > 1:
             print(f"flexclear: {len(errors)} mistakes", file=sys.stderr)
     return min((mistake.exit_code for mistake in errors.values()), default=0)
+
+
+def _show(name: str, *, quiet: bool) -> InputError | None:
+    """Write the start pose of a scene where one can be drawn; returns why it is refused."""
+    from flexclear.stages import show
+
+    try:
+        if kind_of_file(read_toml(run.find_scene(name))) == SCENE:
+            scene = load_scene(run.find_scene(name))
+            run.require_names(scene)
+            return show.shown(scene, quiet=quiet)
+    except MISTAKES:  # told with all others
+        pass
+    return None
 
 
 @dataclass(frozen=True, slots=True)

@@ -182,7 +182,7 @@ class Study:
                 "points": listed,
                 "quantities": [[q.owner, q.kind] for q in chosen],
                 "title": self.scene.title,
-                "own": self.setting.attributes,
+                "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
                 "complete": self._complete and not self.undone,
                 "undone": _listed([design.key for design in self.undone]),
                 "peers": list(self.peers),

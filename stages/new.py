@@ -34,6 +34,7 @@ def command(options: argparse.Namespace) -> None:
     scene = files[0]
     print(
         "next:",
+        f"  flexclear show {scene}        the start pose with all names; nothing is run",
         f"  flexclear check {scene}       every mistake at once; nothing is run",
         f"  flexclear render {scene}      film and pictures",
         f"  flexclear report {scene}      one page with figures, and next to its ideal mechanism",

@@ -42,6 +42,15 @@ class Assembly:
     coordinates: dict[tuple[str, int], float]
 
 
+def opened(
+    mechanism: Mechanism, joints: Sequence[Constraint], placed: set[int], starts: Sequence[Given]
+) -> list[Placement]:
+    """Poses of all links where one joint each puts those without a pose; loops may stay open.  Arguments as below."""
+    hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
+    known = {(j.name, k): value for j in joints for k, value in j.values.items()}
+    return _guess(mechanism, joints, placed, hints | known, None, 0.0)
+
+
 def assemblies(
     mechanism: Mechanism, joints: list[Constraint], placed: set[int], starts: Sequence[Given]
 ) -> list[Assembly]:

@@ -8,6 +8,9 @@ import xarray as xr
 from flexclear.pipeline.post.cost.causes import CAUSES
 from flexclear.pipeline.post.cost.price import Choice, cheapest, choices
 
+#: a setting that is as accurate as the scene's own is named where it costs less than this fraction
+CHEAPER = 0.7
+
 
 def sentences(study: xr.Dataset) -> str:
     """In words; study: of `stages.cost_study`."""
@@ -29,7 +32,9 @@ def _own(study: xr.Dataset) -> str:
         f"With {study.attrs['own_integrator']} at {setting} the integration takes {study.attrs['own_seconds']:.2g} s "
         f"of processor time ({study.attrs['own_evaluations']:.0f} evaluations)."
     )
-    until = "" if study.attrs["horizon"] == "none" else f" up to the horizon, t = {study.attrs['horizon']:.3g} s,"
+    horizon = study.attrs["horizon"]
+    whole = horizon == "none" or horizon >= study.attrs["end"]
+    until = "" if whole else f" up to the horizon, t = {horizon:.3g} s,"
     if not np.isfinite(error):
         return f"{took} Its error cannot be said: other runs{until} have another number of impacts ({name})."
     return f"{took} Its largest error{until} is {error:.1e} of a quantity's size ({name})."
@@ -48,7 +53,9 @@ def _looser(study: xr.Dataset) -> str:
     """Whether another setting is as accurate for less."""
     _, error = _worst(study)
     same = cheapest(study, error) if np.isfinite(error) else None
-    if same is None or same.seconds > 0.7 * study.attrs["own_seconds"]:
+    if same is None or same.evaluations > CHEAPER * study.attrs["own_evaluations"]:
+        return ""
+    if same.seconds > CHEAPER * study.attrs["own_seconds"]:
         return ""
     return f"{same.name} is as accurate for {same.seconds / study.attrs['own_seconds']:.2g} times the cost."
 
@@ -65,7 +72,7 @@ def _cause(study: xr.Dataset) -> str:
     others = ", ".join(f"{cause} {value:.0e}" for cause, value in known.items() if cause != first)
     size = f"{known[first]:.0e}" if np.isfinite(known[first]) else "other impacts"
     rest = f"; {others}" if others else ""
-    missing = [cause for cause in ("mesh", "modal truncation") if cause not in known]
+    missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
     unseen = f" Not looked at: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
     return f"The largest cause of error is {first} ({size}{rest}); what helps is {CAUSES[first]}.{unseen}"
 

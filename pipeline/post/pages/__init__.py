@@ -23,9 +23,12 @@ def viewer(content: dict[str, Any], caption: str, *, play: bool = False) -> str:
     told: what `pipeline.post.render.player` makes.  play: whether it moves at once, unless the system asks for rest.
     """
     moving = "shapes" not in content
-    tools = ["<button type='button' data-part='play' aria-pressed='false'>Play</button>"]
-    if moving:
-        last = len(content["times"]) - 1
+    still = moving and len(content["times"]) < 2
+    tools = [] if still else ["<button type='button' data-part='play' aria-pressed='false'>Play</button>"]
+    last = len(content["times"]) - 1 if moving else 0
+    if still:
+        tools.append("<label><input type='checkbox' data-part='names' checked> names</label>")
+    elif moving:
         tools.append(f"<label>time <input type='range' data-part='time' min='0' max='{last}' value='0'></label>")
     elif len(content["shapes"]) > 1:
         options = "".join(
@@ -44,7 +47,8 @@ def viewer(content: dict[str, Any], caption: str, *, play: bool = False) -> str:
     return (
         f"<figure><figcaption>{html.escape(caption)}</figcaption>"
         f"<div class='viewer' data-play='{'yes' if play else 'no'}'>"
-        f"<canvas tabindex='0' role='img' aria-label='{html.escape(label, quote=True)}'></canvas>"
+        f"<div class='viewer-stage'><canvas tabindex='0' role='img' aria-label='{html.escape(label, quote=True)}'>"
+        "</canvas><div class='viewer-names'></div><div class='viewer-ruler'><i></i><span></span></div></div>"
         f"<div class='viewer-tools'>{''.join(tools)}</div><p class='viewer-state' aria-live='off'></p>"
         f"<script type='application/json'>{data}</script></div></figure>\n"
     )

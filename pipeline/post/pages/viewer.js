@@ -54,6 +54,13 @@
       }
       this.part = (name) => root.querySelector(`[data-part=${name}]`);
       this.frame = 0; this.phase = 0; this.playing = false; this.shape = 0; this.factor = 1;
+      this.ruler = root.querySelector(".viewer-ruler"); this.names = root.querySelector(".viewer-names");
+      this.labels = (this.told.labels || []).map((told) => {
+        const text = document.createElement("span"), detail = document.createElement("small");
+        text.textContent = told.text; detail.textContent = ` ${told.detail}`; text.style.color = told.color;
+        text.append(detail); this.names.append(text);
+        return { ...told, text };
+      });
       this.home();
       this.build();
       this.listen();
@@ -144,6 +151,8 @@
       if (told.shapes) {
         const shape = told.shapes[this.shape];
         state.textContent = `${shape.label}; drawn with its coordinate at ${shown(this.factor * shape.scale * told.unit)}`;
+      } else if (told.state !== undefined) {
+        state.textContent = told.state;
       } else {
         const bent = this.meshes.some((mesh) => mesh.fields.length);
         state.textContent = `t = ${(1e3 * told.times[this.frame]).toFixed(2)} ms`
@@ -173,6 +182,33 @@
         gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.order);
         gl.drawElements(gl.TRIANGLES, mesh.index.length, gl.UNSIGNED_INT, 0);
       }
+      const wide = canvas.clientWidth, high = canvas.clientHeight;
+      this.measure(0.5 * f * high / far);
+      this.label((at) => {
+        const p = minus(at, this.eye), depth = -dot(z, p);
+        return [0.5 * wide + 0.5 * f * high * dot(x, p) / depth, 0.5 * high - 0.5 * f * high * dot(y, p) / depth];
+      }, wide, high);
+    }
+    // the bar: a round length in the plane of the point that is looked at, which is so many pixels long
+    measure(pixels) {
+      if (!this.ruler) return;
+      const most = 120 / pixels, ten = 10 ** Math.floor(Math.log10(most)), metres = ten * [5, 2, 1].find((k) => k * ten <= most);
+      const [size, unit] = metres >= 1 ? [1, "m"] : metres >= 1e-3 ? [1e-3, "mm"] : [1e-6, "µm"];
+      this.ruler.querySelector("i").style.width = `${metres * pixels}px`;
+      this.ruler.querySelector("span").textContent = `${shown(metres / size)} ${unit}`;
+    }
+    // names at their points, moved up or down where there is one already; those without room wait until it is closer
+    label(project, wide, high) {
+      const taken = [], off = this.part("names") && !this.part("names").checked;
+      for (const { at, text } of this.labels) {
+        const [px, py] = project(at), [w, h] = [text.offsetWidth, 17];
+        const left = Math.min(px + 6, wide - w - 2);
+        const free = [-0.5, -1.6, 0.6, -2.7, 1.7, -3.8, 2.8].map((k) => py + k * h).find((top) =>
+          top > 0 && top + h < high && taken.every(([l, t, r]) => left > r || left + w < l || top >= t + h || top + h <= t));
+        text.style.visibility = off || free === undefined || px < 0 || px > wide ? "hidden" : "visible";
+        if (free === undefined) continue;
+        taken.push([left, free, left + w]); text.style.left = `${left}px`; text.style.top = `${free}px`;
+      }
     }
     turn(across, upwards) {
       const back = minus(this.eye, this.focus), side = unit(cross(this.up, back));
@@ -193,6 +229,7 @@
       this.update();
     }
     play(on) {
+      if (!this.part("play")) return; // a pose that does not move
       this.playing = on;
       this.part("play").textContent = on ? "Pause" : "Play";
       this.part("play").setAttribute("aria-pressed", String(on));
@@ -236,6 +273,7 @@
       on("play", "click", () => this.play(!this.playing));
       on("home", "click", () => { this.home(); this.draw(); });
       on("time", "input", (part) => { this.play(false); this.frame = this.way = Number(part.value); this.update(); });
+      on("names", "change", () => this.draw());
       on("shape", "change", (part) => this.choose(Number(part.value)));
       on("factor", "input", (part) => { this.factor = 10 ** Number(part.value); this.update(); });
     }

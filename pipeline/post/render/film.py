@@ -39,12 +39,12 @@ class Actors:
     flexible: tuple[pv.PolyData, ...]
 
 
-def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900)) -> np.ndarray:
-    """One picture of the mechanism at an output, shape (height, width, 3)."""
+def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900), margin: int = 0) -> np.ndarray:
+    """One picture of the mechanism at an output, shape (height, width, 3); margin: left at both sides [pixels]."""
     scene = plotter(size)
     actors = _build(scene, drawn)
     _place(drawn, actors, step, glow=False)
-    look(scene, drawn)
+    look(scene, drawn, margin)
     result = image(scene)
     scene.close()
     return result
@@ -149,10 +149,10 @@ def floor(scene: pv.Plotter, drawn: Mechanism) -> None:
     scene.add_mesh(disc, color="#dfe5ec", ambient=0.12)
 
 
-def look(scene: pv.Plotter, drawn: Mechanism) -> None:
-    """Put the camera where all that is drawn over the run is in the picture."""
+def look(scene: pv.Plotter, drawn: Mechanism, margin: int = 0) -> None:
+    """Put the camera where all that is drawn over the run is in the picture, between its margins [pixels]."""
     width, height = scene.window_size
-    position, focus = eye(drawn.view, drawn.cloud, width / height, drawn.looks.zoom)
+    position, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
     scene.camera_position = [tuple(position), tuple(focus), tuple(drawn.view.up)]
     scene.camera.view_angle = ANGLE
     scene.enable_anti_aliasing("msaa", multi_samples=4)

@@ -26,6 +26,8 @@ JOINT_COLOR, SOCKET_COLOR, CLEARANCE_COLOR, IMPACT_COLOR = "#3b4754", "#a9bccf",
 GROUND_COLOR = "#8d98a4"
 #: as fractions of the mechanism's size: joint spheres where no ball radius is known, radius of pins, thickness of rails
 BALL, PIN, RAIL = 0.022, 0.011, 0.008
+#: radius of a drawn socket over that of its ball or pin: the clearance is drawn as if it were the difference
+SOCKET = 1.3
 #: size of what has none: one body that rests [m]
 LONE = 1.0
 #: outputs at which is looked how far a mechanism reaches
@@ -241,14 +243,17 @@ def _joints(
             if kind == "ball-on-plane":
                 yield at(first, _floor(run, given, bundles, joint, size), GROUND_COLOR)
             else:
-                yield at(first, surfaces.sphere(1.3 * radius), SOCKET_COLOR, None, 0.35)
+                yield at(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, None, 0.35)
         elif "revolute" in kind or kind == "clearance-slot":
-            radius = _pin_radius(joint, size)
-            yield at(second, surfaces.cylinder(radius, 3.4 * PIN * size), color, contact)
+            radius = float(joint.get("pin_radius", PIN * size))
+            long = max(3.4 * PIN * size, float(joint.get("length", 0.0)))  # what is shorter, the links would hide
+            yield at(second, surfaces.cylinder(radius, long), color, contact)
             if kind == "clearance-slot":
                 half = np.array([[-0.5 * joint["travel"], 0.0], [0.5 * joint["travel"], 0.0]])
-                rim = surfaces.prism(surfaces.hull(half, 1.8 * radius), 0.8 * PIN * size)
+                rim = surfaces.prism(surfaces.hull(half, SOCKET * radius), 0.5 * long)
                 yield at(first, rim, SOCKET_COLOR, None, 0.5)
+            elif kind == "clearance-revolute":
+                yield at(first, surfaces.cylinder(SOCKET * radius, 0.8 * long), SOCKET_COLOR, None, 0.35)
             elif first.partition(".")[0] not in _names(run, "body"):
                 yield at(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)
         elif kind in forms.SLIDING:
@@ -286,11 +291,6 @@ def _floor(
         reach = 2.5 * float(joint["ball_radius"])
     plane = surfaces.box((*(high - low + 2.0 * reach), 0.004 * size))
     return surfaces.moved(plane, np.array([*(0.5 * (low + high)), -0.002 * size]))
-
-
-def _pin_radius(joint: Mapping[str, Any], size: float) -> float:
-    """The true radius of a pin, within what is seen and hides nothing."""
-    return float(np.clip(joint.get("pin_radius", PIN * size), PIN * size, 1.8 * PIN * size))
 
 
 def _travel(run: xr.Dataset, joint: str) -> tuple[float, float]:

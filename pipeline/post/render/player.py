@@ -143,6 +143,8 @@ def side(bundle: xr.Dataset) -> View:
 
 def _steps(run: xr.Dataset, looks: Looks, frames: int) -> np.ndarray:
     """The outputs that are shown."""
+    if run.sizes["time"] == 1:
+        return np.zeros(1, dtype=int)
     times = pace.pace(run, looks.duration, looks.impact_slowdown).times
     times = times[np.unique(np.linspace(0, times.size - 1, frames).astype(int))]
     steps: np.ndarray = np.clip(np.searchsorted(run["time"].values, times - 1e-12), 0, run.sizes["time"] - 1)

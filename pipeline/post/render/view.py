@@ -34,7 +34,7 @@ def view(
 ) -> View:
     """The view of a run.
 
-    told: the scene's parameters, for gravity, whose opposite is up in the pictures of planar mechanisms.
+    given: the scene's parameters, for gravity, whose opposite is up in the pictures of planar mechanisms.
     asked, upwards: direction to the eye, and what is up, as the user wants them.
     """
     up = _up(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
@@ -44,6 +44,12 @@ def view(
     normal = plane(run)
     if normal is None:
         return _spatial(up if upwards is not None else np.array([0.0, 0.0, 1.0]))
+    return flat(normal, given, upwards)
+
+
+def flat(normal: np.ndarray, given: Mapping[str, Any], upwards: Sequence[float] | None = None) -> View:
+    """The view of a planar mechanism along its normal; the other arguments as of `view`."""
+    up = _up(given) if upwards is None else np.array(upwards, dtype=float) / np.linalg.norm(upwards)
     above = _across(up, normal)
     right = np.cross(above, normal)
     if right[np.argmax(np.abs(right))] < 0.0:  # the axis across the picture runs to the right

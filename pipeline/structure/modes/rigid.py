@@ -2,25 +2,52 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.schema import RIGID, conform
+from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 
 
 def build(mesh: xr.Dataset) -> xr.Dataset:
     """Mass [kg], centre of mass [m], inertia about it [kg m^2] and frames of a mesh (schema RIGID), in its frame."""
+    return conform(xr.Dataset(*_rigid(of_mesh(mesh).assemble(mesh))), RIGID, title=_title(mesh))
+
+
+def drawn(mesh: xr.Dataset) -> xr.Dataset:
+    """The same with what is drawn of the body, and one mode in which nothing moves: to be shown without modes."""
     model = of_mesh(mesh).assemble(mesh)
+    data, coordinates = _rigid(model)
+    shown, still = model.drawn, np.zeros((len(model.drawn.position), 3, 1))
+    data |= {
+        "first_moment": (("axis",), float(data["mass"][1]) * data["com"][1]),
+        "modal_first_moment": (("axis", "mode"), np.zeros((3, 1))),
+        "node_position": (("node", "axis"), shown.position),
+        "cell_node": (("cell", "corner"), shown.cell),
+        "shape_translation": (("node", "axis", "mode"), still),
+        "shape_rotation": (("node", "axis", "mode"), still),
+        "radius": (("cell",), shown.radius),
+    }
+    return xr.Dataset(data, coordinates)
+
+
+def _title(mesh: xr.Dataset) -> str:
+    return f"Rigid body made of the mesh: {mesh.attrs['title']}"
+
+
+def _rigid(model: Model) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Variables of schema RIGID, and their coordinates."""
     integrals = model.integrate(np.zeros((model.size, 0)))
     com = integrals.first_moment / integrals.mass
     second = integrals.second_moment - integrals.mass * np.outer(com, com)
-    data = {
+    data: dict[str, Any] = {
         "mass": ((), integrals.mass),
         "com": (("axis",), com),
         "inertia": (("axis", "axis2"), np.trace(second) * np.eye(3) - second),
         "frame_position": (("frame", "axis"), np.stack([frame.position for frame in model.interfaces])),
         "frame_rotation": (("frame", "axis", "axis2"), np.stack([frame.rotation for frame in model.interfaces])),
     }
-    made = xr.Dataset(data, coords={"frame": [frame.name for frame in model.interfaces]})
-    return conform(made, RIGID, title=f"Rigid body made of the mesh: {mesh.attrs['title']}")
+    return data, {"frame": [frame.name for frame in model.interfaces]}

@@ -1,0 +1,172 @@
+"""Where a scene puts its bodies at the start, also where joints, drives and poses do not fit; nothing is compiled."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexclear.pipeline.core.algebra import matrix_to_quaternion
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.model import given_start
+from flexclear.pipeline.dynamics.model.assembly import assembled, settled
+from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
+from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.placing import opened
+from flexclear.pipeline.dynamics.model.start_table import given_coordinates
+from flexclear.pipeline.dynamics.model.stops import STOP
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+#: residuals below these are rounding of a closed mechanism: a share of its size, and an angle [rad]
+CLOSED, STRAIGHT = 1e-8, 1e-7
+
+
+@dataclass(frozen=True)
+class Gap:
+    """What a joint or its drive misses: from where its second frame would have to be to where it is, world axes [m].
+
+    distance: length of that way [m].  angle: by which the joint or its drive is turned away, besides [rad].
+    """
+
+    joint: str
+    start: np.ndarray
+    end: np.ndarray
+    angle: float
+
+    @property
+    def distance(self) -> float:
+        """Between the two places [m]."""
+        return float(np.linalg.norm(self.end - self.start))
+
+
+@dataclass(frozen=True)
+class StartPose:
+    """data: a run (schema RUN, in part) of one output at which nothing moves.  gaps: of joints that do not fit.
+
+    refused: why the start is refused; None where it fits.
+    """
+
+    data: xr.Dataset
+    gaps: tuple[Gap, ...]
+    refused: InputError | None
+
+
+def start_pose(scene: Scene, bundles: Mapping[str, xr.Dataset], drawn: Mapping[str, xr.Dataset]) -> StartPose:
+    """The start of a scene as its joints place it, or, where they cannot fit, as the poses and the joints' tree do.
+
+    bundles: of flexible bodies, undeformed (mass, inertia, frames), by name.  drawn: the same of all bodies with a
+    mesh.  Raises InputError where not even the tree of the joints can be built.
+    """
+    mechanism, refused = build(scene, bundles), None
+    try:
+        mechanism = assembled(mechanism)
+    except InputError as error:
+        refused, mechanism = error, _open(mechanism)
+    starts = given_coordinates(scene)
+    poses = [link.start for link in mechanism.links]
+    gaps = [] if refused is None else _gaps(mechanism, constraints(mechanism, starts=starts), poses)
+    return StartPose(_data(mechanism, drawn), (*gaps, *_loose(mechanism)), refused)
+
+
+def _open(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with bodies without poses put where one joint each has them; loops may stay open."""
+    starts, placed = given_coordinates(mechanism.scene), given_start.given_links(mechanism)
+    return settled(mechanism, opened(mechanism, constraints(mechanism, starts=starts), placed, starts))
+
+
+def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> list[Gap]:
+    found = []
+    for joint in joints:
+        A, B = joint.frames(poses)
+        parts = [demands(joint.edge.kind, A, B), prescribed(joint.edge.kind, A, B, joint.values)]
+        away, turned = np.zeros(3), 0.0
+        for values, wrenches in parts:
+            for value, wrench in zip(values, wrenches, strict=True):
+                if np.any(wrench[3:]):
+                    away = away + value * wrench[3:]
+                else:
+                    turned = max(turned, float(abs(value)))
+        if np.linalg.norm(away) > CLOSED * mechanism.length or turned > STRAIGHT:
+            end = B.p + mechanism.origin
+            found.append(Gap(joint.name, end - away, end, turned))
+    return found
+
+
+def _loose(mechanism: Mechanism) -> list[Gap]:
+    """Balls and pins that start outside of their sockets."""
+    found = []
+    for contact in mechanism.contacts:
+        if contact.joint.type in (STOP, "ball-on-plane", "clearance-slot"):
+            continue
+        outer, inner = (mechanism.links[s.link].start.of(s.place) for s in (contact.outer, contact.inner))
+        away = inner.p - outer.p
+        if contact.joint.type == "clearance-revolute":  # along its axis a pin is as free as its length lets it
+            away = away - (away @ outer.R[:, 2]) * outer.R[:, 2]
+        if np.linalg.norm(away) > 2.0 * contact.joint.clearance:
+            end = inner.p + mechanism.origin
+            found.append(Gap(contact.name, end - away, end, 0.0))
+    return found
+
+
+def _data(mechanism: Mechanism, drawn: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    import xarray as xr
+
+    scene, names = mechanism.scene, mechanism.moving_bodies
+    poses = {name: _pose(mechanism, name) for name in scene.body}
+    centres = []
+    for name in names:
+        com = drawn[name]["com"].values if name in drawn else np.array(scene.body[name].com)  # type: ignore[union-attr]
+        centres.append(poses[name].point(com))
+    frames = {name: poses[frame.body].point(frame.place.p) for name, frame in mechanism.frames.items()}
+    still = np.zeros((1, len(names), 3))
+    data = {
+        "position": (("time", "body", "axis"), np.array(centres).reshape(1, -1, 3)),
+        "quaternion": (
+            ("time", "body", "quaternion_component"),
+            np.array([matrix_to_quaternion(poses[name].R) for name in names]).reshape(1, -1, 4),
+        ),
+        "velocity": (("time", "body", "axis"), still),
+        "angular_velocity": (("time", "body", "axis"), still),
+        "frame_position": (("time", "frame", "axis"), np.array(list(frames.values())).reshape(1, -1, 3)),
+        "modal_coordinate": (("time", "mode"), np.zeros((1, len(drawn)))),
+    }
+    joints = dict(_coordinates(mechanism))
+    data["joint_position"] = (("time", "coordinate"), np.array(list(joints.values())).reshape(1, -1))
+    coordinates = {
+        "time": [scene.time.start],
+        "body": names,
+        "frame": list(frames),
+        "mode": [f"{name}.1" for name in drawn],
+        "mode_body": ("mode", list(drawn)),
+        "coordinate": list(joints),
+        "contact": list(scene.contacts()),
+    }
+    parameters = scene.model_dump(mode="json", exclude={"title", "description", "limits"}, exclude_none=True)
+    return xr.Dataset(data, coordinates, {"parameters": json.dumps(parameters, sort_keys=True)})
+
+
+def _pose(mechanism: Mechanism, body: str) -> Placement:
+    """Of a body's frame in the world."""
+    link = mechanism.links[mechanism.link_of[body]]
+    here = link.start.of(link.places[body])
+    return here if link is mechanism.links[0] else Placement(here.p + mechanism.origin, here.R)
+
+
+def _coordinates(mechanism: Mechanism) -> list[tuple[str, float]]:
+    """Names of joint coordinates, as records call them, and where they are [m or rad]."""
+    poses, found = [link.start for link in mechanism.links], list[tuple[str, float]]()
+    for joint in constraints(mechanism):
+        A, B = joint.frames(poses)
+        declared, relative = joint_class(joint.edge.kind), A.inverse().of(B)
+        now, names = declared.coordinates(relative.R, relative.p), [one.name for one in declared.COORDINATES]
+        labels = [joint.name] if len(names) == 1 else [f"{joint.name}.{name}" for name in names]
+        found += [(label, float(value)) for label, value in zip(labels, now, strict=False)]
+    return found

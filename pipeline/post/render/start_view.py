@@ -1,0 +1,273 @@
+"""The start pose of a scene with names: bodies, frames, joints, axes, drives, gravity, clearances and gaps.
+
+What is drawn is a run of one output (`pipeline.dynamics.model.start_pose`); nothing here computes a motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.post.body_shape import faces, is_rod, surface
+from flexclear.pipeline.post.render import forms, player, surfaces
+from flexclear.pipeline.post.render.mechanism import (
+    COLORS,
+    SOCKET,
+    Flexible,
+    Looks,
+    Mechanism,
+    Part,
+    frame_pose,
+    mechanism,
+    pose,
+)
+from flexclear.pipeline.post.render.ruler import words
+from flexclear.pipeline.post.render.surfaces import Surface
+from flexclear.pipeline.post.render.view import flat
+from flexclear.pipeline.post.series import parameters
+
+BODY, JOINT, FRAME, DRIVE, LOAD = "#1f2937", "#3b4754", "#6b7280", "#0072B2", "#7a4a00"
+CLEARANCE, GAP = "#a35f00", "#c4161c"
+#: as shares of the mechanism's size: half length of a drawn axis, its thickness, radius of a drive's arrow, of a gap
+AXIS, THIN, ARC, THICK = 0.055, 0.0016, 0.035, 0.004
+#: axes of joints that differ by less are parallel [-]
+PARALLEL = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A name at a point of the world [m]: text, what is said below it, colour."""
+
+    text: str
+    detail: str
+    point: np.ndarray
+    color: str
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """What a joint misses, as `pipeline.dynamics.model.start_pose.Gap`: from, to [m], angle [rad]."""
+
+    joint: str
+    start: np.ndarray
+    end: np.ndarray
+    angle: float
+
+    @property
+    def said(self) -> str:
+        """Distance and angle, as a picture says them."""
+        distance = float(np.linalg.norm(self.end - self.start))
+        turned = f"{np.degrees(self.angle):.3g}° off" if self.angle > 1e-7 else ""
+        return " and ".join(filter(None, [f"gap {words(distance)}" if distance > 0.0 else "", turned]))
+
+
+@dataclass(frozen=True, slots=True)
+class StartView:
+    """The drawn mechanism, its marks, and sentences for below the picture."""
+
+    drawn: Mechanism
+    marks: tuple[Mark, ...]
+    notes: tuple[str, ...]
+    gaps: tuple[Missing, ...]
+    gravity: np.ndarray  #: sum of the gravity loads, world axes [m/s^2]
+
+
+def start_view(
+    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], gaps: Sequence[Missing], looks: Looks | None = None
+) -> StartView:
+    """The view of a start; gaps: of joints that do not fit."""
+    told, drawn = parameters(run), mechanism(run, bundles, looks)
+    joints = dict(_joints(run, told, bundles))
+    normal = _normal(told, joints)
+    if normal is not None and drawn.looks.direction is None:
+        drawn = replace(drawn, view=flat(normal, told, drawn.looks.up))
+    # with red lines to be seen inside of them
+    opacity = 0.4 if gaps else 1.0
+    solid = [
+        *(replace(part, opacity=min(part.opacity, opacity)) for part in drawn.parts),
+        *(_still(body, opacity) for body in drawn.flexible),
+    ]
+    drawn = replace(drawn, parts=tuple(solid), flexible=())
+    extra = [Part(None, surface, color) for surface, color in _lines(told, joints, gaps, drawn.size)]
+    marked = list(_marks(run, drawn, told, joints, gaps))
+    cloud = np.concatenate([drawn.cloud, *(part.surface.points for part in extra), *([m.point] for m in marked)])
+    drawn = replace(drawn, parts=(*drawn.parts, *extra), cloud=cloud)
+    return StartView(drawn, tuple(marked), tuple(_notes(told, gaps)), tuple(gaps), _gravity(told))
+
+
+def _still(body: Flexible, opacity: float) -> Part:
+    """A meshed body as it is where nothing is deformed."""
+    bundle = body.bundle
+    points, _ = surface(bundle, np.zeros(1))
+    shown = surfaces.shaded(
+        points - bundle["com"].values, surfaces.triangulated(faces(bundle)), sharp=not is_rod(bundle)
+    )
+    return Part(body.index, shown, body.color or COLORS[body.index % len(COLORS)], opacity)
+
+
+def page_view(seen: StartView) -> dict[str, Any]:
+    """What the viewer of a page shows: the pose, with its names."""
+    labels = [
+        {"text": mark.text, "detail": mark.detail, "at": mark.point.tolist(), "color": mark.color}
+        for mark in seen.marks
+    ]
+    return player.motion(seen.drawn) | {"labels": labels, "state": " · ".join(seen.notes)}
+
+
+def _joints(
+    run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset]
+) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
+    """Where each joint's second frame is in the world, and the axes of its first one."""
+    frames, bodies = list(run["frame"].values), [str(name) for name in run["body"].values]
+    for name, joint in told.get("joint", {}).items():
+        first, second = joint["between"]
+        body, (_, axes) = first.partition(".")[0], frame_pose(told, bundles, first)
+        if body in bodies:
+            axes = quaternion_to_matrix(run["quaternion"].values[0, bodies.index(body)]) @ axes
+        yield name, (run["frame_position"].values[0, frames.index(second)], axes)
+
+
+def _normal(told: Mapping[str, Any], joints: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray | None:
+    """The direction about which all joints turn and across which all slide; None where there is none."""
+    kinds = {name: joint["type"] for name, joint in told.get("joint", {}).items() if joint["type"] != "fixed"}
+    turning = [joints[name][1][:, 2] for name, kind in kinds.items() if kind in forms.TURNING]
+    sliding = [joints[name][1][:, 2] for name, kind in kinds.items() if kind == "prismatic"]
+    if not turning or len(turning) + len(sliding) < len(kinds):
+        return None
+    same = all(np.linalg.norm(np.cross(axis, turning[0])) < PARALLEL for axis in turning)
+    return turning[0] if same and all(abs(axis @ turning[0]) < PARALLEL for axis in sliding) else None
+
+
+def _lines(
+    told: Mapping[str, Any],
+    joints: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    gaps: Sequence[Missing],
+    size: float,
+) -> Iterator[tuple[Surface, str]]:
+    """Axes of joints, arrows of drives, and gaps."""
+    driven = {drive["joint"]: drive for drive in told.get("drive", {}).values() if "joint" in drive}
+    for name, (place, axes) in joints.items():
+        kind, z = told["joint"][name]["type"], axes[:, 2]
+        slides = kind in forms.SLIDING
+        if slides or kind in forms.TURNING:
+            yield surfaces.bar(place - AXIS * size * z, place + AXIS * size * z, THIN * size), JOINT
+        if name in driven and (slides or kind in forms.TURNING):
+            turns = not slides or driven[name].get("coordinate") == "rotation"
+            yield (_turning if turns else _sliding)(place, axes, size), DRIVE
+    for gap in gaps:
+        if np.linalg.norm(gap.end - gap.start) > 0.0:
+            yield surfaces.bar(gap.start, gap.end, THICK * size), GAP
+            yield surfaces.moved(surfaces.sphere(2.0 * THICK * size), gap.start), GAP
+
+
+def _turning(place: np.ndarray, axes: np.ndarray, size: float) -> Surface:
+    """A round arrow about the axis, in the sense in which the joint's coordinate grows."""
+    angle = np.linspace(0.2, 1.5 * np.pi, 40)[:, None]
+    ring = place + ARC * size * (np.cos(angle) * axes[:, 0] + np.sin(angle) * axes[:, 1])
+    way = ring[-1] - ring[-2]
+    tube = surfaces.tube(ring, 1.8 * THIN * size)
+    return surfaces.merged([replace(tube, triangles=tube.triangles[:, ::-1]), _cone(ring[-1], way, size)])
+
+
+def _sliding(place: np.ndarray, axes: np.ndarray, size: float) -> Surface:
+    """An arrow along the axis, next to it."""
+    side = place + 0.5 * ARC * size * axes[:, 0]
+    end = side + 1.5 * AXIS * size * axes[:, 2]
+    return surfaces.merged([surfaces.bar(side, end, 1.8 * THIN * size), _cone(end, axes[:, 2], size)])
+
+
+def _cone(base: np.ndarray, way: np.ndarray, size: float) -> Surface:
+    axes, turn = surfaces.along(way / np.linalg.norm(way)), np.linspace(0.0, 2.0 * np.pi, 25)[:-1, None]
+    ring = base + 5.0 * THIN * size * (np.cos(turn) * axes[:, 0] + np.sin(turn) * axes[:, 1])
+    points = np.vstack([ring, base + 12.0 * THIN * size * axes[:, 2], base])
+    k = np.arange(24)
+    after = (k + 1) % 24
+    sides, below = np.column_stack([k, after, np.full(24, 24)]), np.column_stack([after, k, np.full(24, 25)])
+    return surfaces.shaded(points, np.vstack([sides, below]), sharp=True)
+
+
+def _marks(
+    run: xr.Dataset,
+    drawn: Mechanism,
+    told: Mapping[str, Any],
+    joints: Mapping[str, tuple[np.ndarray, np.ndarray]],
+    gaps: Sequence[Missing],
+) -> Iterator[Mark]:
+    """Names; those that matter most come first."""
+    used, places = set(), dict(zip(run["frame"].values, run["frame_position"].values[0], strict=True))
+    for gap in gaps:
+        yield Mark(gap.joint, f"does not fit: {gap.said}", 0.5 * (gap.start + gap.end), GAP)
+    for name, body in told.get("body", {}).items():
+        if body["type"] != "ground":
+            index = list(run["body"].values).index(name)
+            yield Mark(name, _of_body(body), _middle(run, drawn, index), BODY)
+    for name, joint in told.get("joint", {}).items():
+        used |= set(joint["between"])
+        clear = joint.get("clearance")
+        played = f" {words(clear)}" if clear else ""
+        detail = f"{joint['type']}{played}: {' – '.join(joint['between'])}"
+        yield Mark(name, detail, joints[name][0], CLEARANCE if clear else JOINT)
+    for name, drive in told.get("drive", {}).items():
+        if "joint" in drive:
+            which = ".".join(filter(None, [drive["joint"], drive.get("coordinate")]))
+            place = joints[drive["joint"]][0]
+            yield Mark(name, f"drives {which}: {drive['law']['type']}", place, DRIVE)
+        else:
+            yield Mark(name, f"drives {drive['frame']}", places[drive["frame"]], DRIVE)
+            used.add(drive["frame"])
+    for name, load in told.get("load", {}).items():
+        at = load.get("between", [load["frame"]] if "frame" in load else [])
+        if at:
+            used |= set(at)
+            yield Mark(name, f"{load['type']}: {' – '.join(at)}", np.mean([places[f] for f in at], axis=0), LOAD)
+    for name, place in places.items():
+        if name not in used:
+            yield Mark(name, "frame", place, FRAME)
+
+
+def _of_body(body: Mapping[str, Any]) -> str:
+    flexible = "flexible, " if body["type"] == "flexible" else ""
+    return f"{flexible}{body['mass']:.4g} kg" if "mass" in body else f"{flexible}body".replace(", body", "")
+
+
+def _middle(run: xr.Dataset, drawn: Mechanism, index: int) -> np.ndarray:
+    """A point on what is drawn of a body, as near as possible to the middle of that."""
+    for part in drawn.parts:
+        if part.owner == index and part.frame is None and part.contact is None:
+            matrix = pose(run, index, 0)
+            low, high = part.surface.points.min(axis=0), part.surface.points.max(axis=0)
+            return np.asarray(matrix[:3, :3] @ (0.5 * (low + high)) + matrix[:3, 3])
+    return np.asarray(run["position"].values[0, index])
+
+
+def _notes(told: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
+    """What the names do not say."""
+    yield f"start at t = {told.get('time', {}).get('start', 0.0):g} s"
+    clear = {name: joint for name, joint in told.get("joint", {}).items() if joint.get("clearance")}
+    radii = {name: joint.get("ball_radius", joint.get("pin_radius")) for name, joint in clear.items()}
+    factors = sorted(
+        {
+            f"{(SOCKET - 1.0) * radii[name] / joint['clearance']:.2g}"
+            for name, joint in clear.items()
+            if joint["type"] != "ball-on-plane" and radii[name]
+        },
+        key=float,
+    )
+    if factors:
+        span = factors[0] if len(factors) == 1 else f"{factors[0]} to {factors[-1]}"
+        yield f"clearances drawn {span} times larger"
+    if not np.any(_gravity(told)):
+        yield "no gravity"
+    if gaps:
+        yield "red: joints that do not fit"
+
+
+def _gravity(told: Mapping[str, Any]) -> np.ndarray:
+    fields = [load["acceleration"] for load in told.get("load", {}).values() if load["type"] == "gravity"]
+    total: np.ndarray = np.sum(np.array(fields, dtype=float).reshape(-1, 3), axis=0)
+    return total

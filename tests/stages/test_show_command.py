@@ -1,0 +1,140 @@
+"""``flexclear show``: the start pose with names, for every scene, without anything that computes or compiles."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flexclear as fc
+from flexclear.pipeline.core.workflow.fingerprint import TREE
+from flexclear.pipeline.post.render import gl, surfaces
+from flexclear.pipeline.post.render.ruler import pixels_per_metre, project, round_length
+from flexclear.pipeline.post.render.start_picture import columns, heights
+from flexclear.pipeline.post.render.start_view import AXIS, page_view
+from flexclear.stages.__main__ import main
+
+SCENES = sorted(
+    path.relative_to(TREE).as_posix()
+    for folder in ("scenes/checks", "scenes/gallery", "scenes/sps4", "stages/templates")
+    for path in (TREE / folder).rglob("*.toml")
+    if re.search(r"^\[time\]|^extends", path.read_text(encoding="utf-8"), re.MULTILINE)
+)
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_every_scene_can_be_shown(scene: str, root: Path):
+    seen = fc.show(root / scene)
+    assert seen.refused is None
+    assert not seen.gaps
+    loaded = fc.load_scene(root / scene)
+    names = {mark.text for mark in seen.view.marks}
+    bodies = {name for name, body in loaded.body.items() if body.type != "ground"}
+    assert names >= bodies | set(loaded.joint) | set(loaded.drive)
+    for part in seen.view.drawn.parts:
+        assert np.isfinite(part.surface.points).all()
+    told = page_view(seen.view)
+    assert len(told["labels"]) == len(seen.view.marks)
+    assert np.isfinite([label["at"] for label in told["labels"]]).all()
+
+
+def test_nothing_that_compiles_is_imported(root: Path):
+    program = (
+        "import sys, flexclear as fc; fc.show(sys.argv[1]); "
+        "assert not {'numba', 'llvmlite'} & set(sys.modules), 'something that compiles was imported'"
+    )
+    for scene in ("scenes/sps4/csj.toml", "stages/templates/slider_crank/slider_crank.toml"):
+        subprocess.run([sys.executable, "-c", program, str(root / scene)], check=True)
+
+
+def test_a_loop_that_does_not_close_is_a_gap_of_its_length(root: Path):
+    """A four-bar whose rocker's foot is moved away by twice what the links can reach over."""
+    path = root / "stages/templates/four_bar/four_bar.toml"
+    scene = fc.load_scene(path)
+    low = np.array(scene.body["ground"].frames["D"].position)
+    whole = fc.load_scene(path, override={"body.ground.frames.D.position": (low + np.array((0.3, 0.0, 0.0))).tolist()})
+    seen = fc.show(whole)
+    assert seen.refused is not None
+    assert seen.refused.exit_code == 2
+    (gap,) = [gap for gap in seen.view.gaps if np.linalg.norm(gap.end - gap.start) > 1e-3]
+    assert np.linalg.norm(gap.end - gap.start) == pytest.approx(0.3, rel=1e-9)
+    assert "300 mm" in seen.gaps[gap.joint]
+    assert "does not fit: gap 300 mm" in {mark.detail for mark in seen.view.marks}
+
+
+def test_the_command_writes_where_it_runs(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.chdir(tmp_path)
+    scene = str(root / "scenes/checks/pendulum.toml")
+    assert main(["show", scene]) == 0
+    page = (tmp_path / "pendulum_start.html").read_text(encoding="utf-8")
+    told = json.loads(re.search(r"<script type='application/json'>(.*?)</script>", page, re.DOTALL)[1])  # type: ignore[index]
+    assert {label["text"] for label in told["labels"]} == {"bob", "hinge"}
+    assert (tmp_path / "pendulum_start.png").exists() == gl.works()
+    assert "pendulum_start.html" in capsys.readouterr().out
+
+
+def test_check_shows_what_it_refuses(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.chdir(tmp_path)
+    scene = (root / "stages/templates/four_bar/four_bar.toml").read_text(encoding="utf-8")
+    moved = re.sub(r"(frames\.D = .*position = \[)[^,]+", r'\g<1>"900 mm"', scene)
+    assert moved != scene
+    Path("apart.toml").write_text(moved, encoding="utf-8")
+    assert main(["check", "--show", "apart.toml"]) == 2
+    assert "does not fit at the start" in capsys.readouterr().err
+    assert Path("apart_start.html").exists()
+
+
+def test_a_wrong_scene_is_refused_as_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    assert main(["show", str(tmp_path / "nothing.toml")]) == 2
+    assert "nothing.toml" in capsys.readouterr().err
+
+
+def test_axes_lie_along_the_joints(root: Path):
+    """The drawn axis of a hinge reaches as far to both sides along its z, and nowhere else."""
+    seen = fc.show(root / "scenes/checks/pendulum.toml").view
+    hinge = next(mark for mark in seen.marks if mark.text == "hinge")
+    axis = seen.drawn.parts[-1].surface
+    assert isinstance(axis, surfaces.Surface)
+    extent = np.sort(np.ptp(axis.points, axis=0))
+    assert extent[2] == pytest.approx(2.0 * AXIS * seen.drawn.size, rel=1e-6)
+    assert extent[1] < 0.1 * extent[2]
+    assert 0.5 * (axis.points.max(axis=0) + axis.points.min(axis=0)) == pytest.approx(hinge.point, abs=1e-12)
+
+
+def test_the_bar_is_as_long_as_it_says(root: Path):
+    """Two points across the line of sight, in the plane of the point that is looked at."""
+    drawn = fc.show(root / "scenes/sps4/csj.toml").view.drawn
+    from flexclear.pipeline.post.render.view import eye
+
+    place, focus = eye(drawn.view, drawn.cloud, 1.6)
+    right = np.cross(drawn.view.up, place - focus)
+    ends = np.array([focus, focus + 0.1 * right / np.linalg.norm(right)])
+    pixels = project(drawn, ends, (1600, 1000))
+    assert pixels[0] == pytest.approx([800.0, 500.0], abs=1e-6)
+    assert pixels[1, 0] - pixels[0, 0] == pytest.approx(0.1 * pixels_per_metre(drawn, (1600, 1000)), rel=1e-9)
+
+
+@pytest.mark.parametrize("most, length", [(0.19, 0.1), (0.2, 0.2), (0.99, 0.5), (1.0, 1.0), (7e-6, 5e-6)])
+def test_bars_have_round_lengths(most: float, length: float):
+    assert round_length(most) == pytest.approx(length)
+
+
+def test_names_do_not_cover_each_other():
+    random = np.random.default_rng(0)
+    points = np.column_stack([random.uniform(0, 1600, 60), random.uniform(480, 520, 60)])
+    left, right = columns(points, 40)
+    assert sorted([*left, *right]) == list(range(60))
+    for names in (left, right):
+        found = heights(points[names, 1], 17.0, 70.0, 910.0)
+        assert np.diff(found).min() >= 17.0 - 1e-9
+        assert found.min() >= 70.0
+        assert found.max() <= 910.0
