@@ -186,6 +186,7 @@ def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambd
     """
     from filelock import FileLock  # here, since what finds everything fresh locks nothing
 
+    system.set_aside(path)
     lock = FileLock(path, thread_local=False, fallback_to_soft=False)
     mine = _acquire(lock, wait=False)
     if mine is None and wait:

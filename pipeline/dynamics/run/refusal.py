@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.bushings import overturned
 from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
@@ -22,6 +23,9 @@ def text(engine: Engine, rows: np.ndarray) -> str:
     """When and why the stepper stopped, in words; rows: of the record so far."""
     engine.complete()
     control, n, contacts = engine.control, engine.n, engine.model.contacts
+    turned = overturned(engine.model, engine.view(m.Y)) if "bushing" in engine.model.parts.loads else None
+    if turned is not None:
+        return f"at t = {control[m.TIME]:.6g} s: {turned}"
     if n[m.STATUS] in LOOPS and jammed(engine):
         return f"at t = {control[m.TIME]:.6g} s: {explanation(engine)}"
     if n[m.STATUS] in LOOPS:
