@@ -77,7 +77,7 @@ def _check(options: argparse.Namespace) -> None:
     kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
     others = {path for path in kernels if files.of_another_build(path)}
     damaged = [path for path in kernels if path not in others and not files.compiled(path)]
-    faults = [*inventory.damaged, *(f"{path} is damaged" for path in damaged)]
+    faults = [*inventory.damaged, *upkeep.shown_faults(store, store.root), *(f"{path} is damaged" for path in damaged)]
     for fault in faults[:SHOWN]:
         print(shown(fault))
     if len(faults) > SHOWN:
@@ -120,7 +120,7 @@ def _prune(options: argparse.Namespace) -> None:
         for artifact in chosen:
             upkeep.remove(store, artifact)
         for path in (*inventory.orphans, *inventory.unreadable):
-            path.unlink(missing_ok=True)
+            upkeep.take_away(path)
         kernels = _prune_kernels()
     verb = "would remove" if options.dry_run else "removed"
     print(f"{verb} {len(chosen)} artifacts and {len(inventory.orphans)} files without a record,{_megabytes(size)}")

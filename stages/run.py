@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from flexclear.pipeline.core.artifacts.disk import disk_limits, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
-from flexclear.pipeline.core.errors import InputError, InputErrors, SolverError
+from flexclear.pipeline.core.errors import InputError, InputErrors, ResourceError, SolverError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
 from flexclear.pipeline.core.scene.references import dangling
@@ -153,6 +153,8 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     """
     import xarray as xr
 
+    from flexclear.pipeline.core.artifacts import upkeep
+
     import_module("flexclear.pipeline.core.artifacts.modal")
     if str(scene).endswith(".nc"):
         from flexclear.pipeline.core.external_files import dataset
@@ -169,6 +171,9 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     )
     if not files:
         raise InputError(name, f"there are no results in {relative(folder)}", f"flexclear run {name}")
+    changed = upkeep.shown_faults(Store(results_root()), folder)
+    if changed:
+        raise ResourceError(f"{changed[0]}: flexclear run {name}")
     if _of_another_run(folder):
         files = [path for path in files if path != folder / "post.nc"]
     # read and closed: the garbage collector closes what stays open, inside of whatever NetCDF call runs then
@@ -214,6 +219,8 @@ def linear(
     *,
     moving: bool = False,
     vibrations: bool = True,
+    speeds: Sequence[float] | None = None,
+    drive: str | None = None,
     workplace: Workplace | None = None,
 ) -> xr.Dataset:
     """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is."""
@@ -223,7 +230,10 @@ def linear(
         )
     workplace = workplace or open_workplace()
     graph = Graph(scene, shown=as_in_its_file(scene))
-    task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
+    if speeds is None:
+        task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
+    else:
+        task = graph.campbell(speeds, drive, time, drives)
     outcome = workplace.bring([task])
     check(outcome)
     return workplace.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)

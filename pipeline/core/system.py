@@ -6,6 +6,7 @@ Modules that only some systems have are imported here, where they are used, and 
 from __future__ import annotations
 
 import contextlib
+import itertools
 import os
 import shutil
 import signal
@@ -145,7 +146,17 @@ def share_blocks(source: Any, target: Any) -> bool:
 
 def replace(made: Path, path: Path) -> None:
     """Give a file the name of another one, which is gone: Windows keeps what is read-only, and what is open."""
+    set_aside(path)
     _insist(lambda: os.replace(made, path), path)
+
+
+def set_aside(path: Path) -> None:
+    """Rename a folder that has the name of a file: nothing of ours makes one, and what it holds may be somebody's."""
+    if path.is_dir() and not path.is_symlink():
+        number = itertools.count(1)
+        while (other := path.with_name(f"{path.name}.folder{next(number)}")).exists():
+            pass
+        os.replace(path, other)
 
 
 def remove(path: Path) -> None:

@@ -186,6 +186,7 @@ def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambd
     """
     from filelock import FileLock  # here, since what finds everything fresh locks nothing
 
+    system.set_aside(path)
     lock = FileLock(path, thread_local=False, fallback_to_soft=False)
     mine = _acquire(lock, wait=False)
     if mine is None and wait:
@@ -229,7 +230,7 @@ def _acquire(lock: FileLock, *, wait: bool) -> FileLock | None:
 
 def sweep(root: Path) -> int:
     """Remove temporary files and locks below `root` that processes left which are no more, and unfinished work that
-    nobody has gone on with for long; how many."""
+    nobody has continued for long; how many."""
     removed = 0
     for folder, _, names in os.walk(root):
         for name in names:

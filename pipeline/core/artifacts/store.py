@@ -171,7 +171,8 @@ class Store:
         with disk_limits(self.root / folder):
             for name, target in shown.items():
                 source = self.path(record.stage, record.key, name)
-                if not is_copy(source, target):
+                # bit rot changes neither size nor time; what is read as data is compared whole
+                if not is_copy(source, target) or (name == MAIN and digest_of(target) != record.files[name]):
                     self._keep_edited(target, name, folder, label)
                     copy(source, target)
             _partial(shown[MAIN] if MAIN in shown else self.root / folder / label).unlink(missing_ok=True)
@@ -181,6 +182,7 @@ class Store:
     def _keep_edited(self, target: Path, name: str, folder: str, label: str) -> None:
         """Move a shown file out of the way that is neither of the artifact shown last nor of any other."""
         last = self.last(folder, label)
+        system.set_aside(target)
         if not target.is_file() or target.is_symlink():
             return
         # of what is not known to have been shown, what could be written to is not ours

@@ -8,8 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from flexclear.pipeline.core.artifacts.disk import digest_of, read_checked
-from flexclear.pipeline.core.artifacts.store import FAMILY, Record, Store, read_record
+from flexclear.pipeline.core import system
+from flexclear.pipeline.core.artifacts.disk import digest_of, read_checked, sha256
+from flexclear.pipeline.core.artifacts.store import FAMILY, PARTIAL, Record, Store, read_record
 
 #: what is next to artifacts and is none of their files
 BESIDE = (".json", ".lock", ".names", ".part", ".tmp")
@@ -61,7 +62,7 @@ def prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
     """Artifacts that no folder of results shows, and that were made more than `older` seconds ago.
 
     What the shown ones were made from stays as well: without it they would be made again. A sweep shows its families,
-    all of whose points stay, since it goes on with them.
+    all of whose points stay, since it continues with them.
     """
     made = {artifact.record.digest: artifact.record for artifact in listed.artifacts}
     in_use, waiting = set(), list(_shown(store))
@@ -81,7 +82,30 @@ def remove(store: Store, artifact: Artifact) -> None:
     record = artifact.record
     with store.lock(record.stage, record.key):
         for name in ("json", *record.files):
-            store.path(record.stage, record.key, name).unlink(missing_ok=True)
+            take_away(store.path(record.stage, record.key, name))
+
+
+def take_away(path: Path) -> None:
+    """Remove a file; a folder of its name is renamed."""
+    system.set_aside(path)
+    path.unlink(missing_ok=True)
+
+
+def shown_faults(store: Store, below: Path) -> list[str]:
+    """Shown files in a folder of results that differ from what was shown: sentences.
+
+    A shown file has the content of one of the artifacts whose records are in its folder's ``.facts``.
+    """
+    faults = []
+    for facts in sorted(below.rglob(".facts")):
+        records = [r for path in facts.glob("*.json") if (r := read_record(path)) is not None]
+        known = {digest for record in records for digest in record.files.values()}
+        names = {name for record in records for name in record.files}
+        for path in sorted(facts.parent.iterdir()) if known else ():
+            whole = path.suffix == ".nc" and not path.stem.endswith((PARTIAL, ".edited"))
+            if (whole or path.name in names) and path.is_file() and sha256(path.read_bytes()) not in known:
+                faults.append(f"{_below(store, path)} differs from what was shown; the next command shows it again")
+    return faults
 
 
 def find(store: Store, what: str) -> Record | None:
