@@ -164,7 +164,7 @@ def _plain(values: Any) -> Any:
 
 
 def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
-    """A motion that its laws repeat, looked at once in each period (schema SECTIONS), and the verdict on it.
+    """A motion that its laws repeat, sampled once in each period (schema SECTIONS), and the verdict on it.
 
     The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
     why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
@@ -202,17 +202,22 @@ def frequencies(
     drives: Mapping[str, float] | None = None,
     *,
     moving: bool = False,
+    speeds: Sequence[float] | None = None,
+    drive: str | None = None,
 ) -> xr.Dataset:
     """Natural frequencies, damping and shapes of the assembled mechanism about `equilibrium` (schema LINEAR).
 
-    Arguments and errors as there.
+    Arguments and errors as there.  speeds: of a drive [rad/s, or m/s]; the result is then a Campbell diagram, the
+    vibrations about steady motion at each of them (schema CAMPBELL).  drive: its name, where several drives move.
 
     >>> import flexclear as fc
     >>> found = fc.frequencies("scenes/checks/oscillator.toml")
     >>> round(found["frequency"].item(), 4), round(found["damping_ratio"].item(), 6)  # [Hz], [-]
     (1.5836, 0.1)
     """
-    return _linear(scene, time, drives, moving=moving, vibrations=True)
+    if speeds is None:
+        return _linear(scene, time, drives, moving=moving, vibrations=True)
+    return _stages("run").linear(_loaded(scene), time, drives, speeds=speeds, drive=drive)
 
 
 def compare(

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.units import quantity
-from flexclear.stages import as_json, run
+from flexclear.stages import as_json, export, run
 from flexclear.stages.workplace import common_arguments, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+
+#: characters of a bare number
+NUMBER = "+-.0123456789eE"
+#: speeds of one diagram
+MOST = 10_000
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,6 +33,15 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--moving",
         action="store_true",
         help="vibrations about steady motion: drives keep their speed instead of being held",
+    )
+    parser.add_argument(
+        "--speeds",
+        metavar="FIRST:LAST:STEP",
+        help="Campbell diagram: vibrations about steady motion at these speeds of the drive, e.g. 0:500rpm:50",
+    )
+    parser.add_argument("--drive", metavar="NAME", help="with --speeds: the drive, where several move")
+    parser.add_argument(
+        "--out", type=Path, action="append", metavar="FILE", help="with --speeds: write .nc, .png or .svg; repeatable"
     )
     as_json.json_argument(parser)
     common_arguments(parser)
@@ -34,8 +54,55 @@ def command(options: argparse.Namespace) -> None:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
+    if options.speeds is not None:
+        diagram(graph.scene, time, options)
+        return
+    for option in ("out", "drive"):
+        if getattr(options, option) is not None:
+            raise InputError(f"--{option}", "belongs to a Campbell diagram", "add --speeds, e.g. 0:500rpm:50")
     modes = run.linear(graph.scene, time, moving=options.moving, workplace=open_workplace(options))
     print(as_json.as_json(modes) if options.json else text(modes).rstrip("\n"))
+
+
+def diagram(scene: Scene, time: float | None, options: argparse.Namespace) -> None:
+    """Print the table of a Campbell diagram, and write its dataset and its picture."""
+    given = speeds(options.speeds)
+    targets = options.out or []
+    for target in targets:
+        export.check_format(target, (".nc", ".png", ".svg"))
+        run.check_target(target)
+    made = run.linear(scene, time, speeds=given, drive=options.drive, workplace=open_workplace(options))
+    from flexclear.pipeline.post.plotting import campbell
+
+    print(as_json.as_json(made) if options.json else campbell.text(made))
+    pictures = campbell.files("campbell", made) if any(target.suffix != ".nc" for target in targets) else {}
+    for target in targets:
+        with disk_limits(target.parent):
+            if target.suffix == ".nc":
+                export.write(made, target)
+            else:
+                publish(target, pictures[f"campbell{target.suffix}"])
+
+
+def speeds(text: str) -> list[float]:
+    """Speeds [rad/s] of FIRST:LAST:STEP, the last included; one unit is enough for all three. Raises InputError."""
+    parts = [part.strip() for part in text.split(":")]
+    rule = "takes FIRST:LAST:STEP, the step positive and the last speed above the first"
+    units = {part.lstrip(NUMBER).strip() for part in parts} - {""}
+    shared = units.pop() if len(units) == 1 else ""
+    try:
+        first, last, step = (
+            quantity(f"{part} {shared or 'rad/s'}" if part.lstrip(NUMBER) == "" else part, "angular velocity")
+            for part in parts
+        )
+    except ValueError as error:
+        raise InputError(f"--speeds {text}", f"{rule}: {error}", "for example 0:500rpm:50") from None
+    if not (step > 0.0 and last > first):
+        raise InputError(f"--speeds {text}", rule, "for example 0:500rpm:50")
+    count = int(np.floor((last - first) / step * (1.0 + 1e-12))) + 1
+    if count > MOST:
+        raise InputError(f"--speeds {text}", f"asks for {count} speeds; at most {MOST} are computed", "a larger step")
+    return [first + k * step for k in range(count)]
 
 
 def text(linear: xr.Dataset) -> str:
@@ -70,7 +137,9 @@ def text(linear: xr.Dataset) -> str:
 def _freedoms(linear: xr.Dataset) -> list[str]:
     """How many there are, how many of them nothing drives back, and what their count leaves open."""
     limp, repeated = linear.attrs["motions_without_stiffness"], linear.attrs["redundant_closure_rows"]
-    lines = [f"mobility {linear.attrs['mobility']}" + (f", {limp} of the motions without stiffness" if limp else "")]
+    lines = [
+        f"free motions besides the drives: {linear.attrs['mobility']}" + (f", {limp} without stiffness" if limp else "")
+    ]
     if joints := linear.attrs["undetermined_reactions"]:
         says = "condition of the closed loops follows" if repeated == 1 else "conditions of the closed loops follow"
         lines.append(

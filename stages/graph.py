@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -134,7 +134,7 @@ class Graph:
 
     @cached_property
     def sections(self) -> Task:
-        """The motion looked at once in each period of its laws; shown as ``sections.nc``."""
+        """The motion sampled once in each period of its laws; shown as ``sections.nc``."""
         params, modules = s4_sections.params(self.scene), s4_simulate.modules(self.scene)
         return self._scene_task(
             "sections",
@@ -195,6 +195,21 @@ class Graph:
         modules = s4_simulate.modules(self.scene)
         return self._scene_task(
             name, "flexclear.stages.s4_linear:run", params, self.bodies(), names={"nc": f"{name}.nc"}, modules=modules
+        )
+
+    def campbell(
+        self,
+        speeds: Sequence[float],
+        drive: str | None = None,
+        time: float | None = None,
+        drives: Mapping[str, float] | None = None,
+    ) -> Task:
+        """Vibrations over the speed of a drive, shown as ``campbell.nc``."""
+        params = s4_linear.campbell_params(self.scene, speeds, drive, time, drives)
+        modules = s4_simulate.modules(self.scene)
+        function = "flexclear.stages.s4_linear:campbell"
+        return self._scene_task(
+            "campbell", function, params, self.bodies(), names={"nc": "campbell.nc"}, modules=modules
         )
 
     def up_to(self, stage: str) -> list[Task]:

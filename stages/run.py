@@ -219,6 +219,8 @@ def linear(
     *,
     moving: bool = False,
     vibrations: bool = True,
+    speeds: Sequence[float] | None = None,
+    drive: str | None = None,
     workplace: Workplace | None = None,
 ) -> xr.Dataset:
     """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is."""
@@ -228,7 +230,10 @@ def linear(
         )
     workplace = workplace or open_workplace()
     graph = Graph(scene, shown=as_in_its_file(scene))
-    task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
+    if speeds is None:
+        task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
+    else:
+        task = graph.campbell(speeds, drive, time, drives)
     outcome = workplace.bring([task])
     check(outcome)
     return workplace.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from flexclear.stages import s4_simulate
@@ -25,6 +25,27 @@ def params(
     table = {name: part for name, part in common["scene"].items() if name not in LEFT_OUT}
     pose = {"time": time, "drives": dict(drives or {}), "moving": moving, "vibrations": vibrations}
     return {**common, "scene": table, "pose": pose}
+
+
+def campbell_params(
+    scene: Scene,
+    speeds: Sequence[float],
+    drive: str | None,
+    time: float | None,
+    drives: Mapping[str, float] | None,
+) -> dict[str, Any]:
+    """The scene as the engine sees it, and the speeds of a drive."""
+    common = params(scene, time, drives, moving=True, vibrations=True)
+    return {**common, "speeds": [float(speed) for speed in speeds], "drive": drive}
+
+
+def campbell(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """The vibrations over the speed of a drive (schema CAMPBELL); inputs are ``bundle/<body>``."""
+    from flexclear.pipeline import dynamics
+
+    pose, scene, bundles = params["pose"], s4_simulate.rebuild(params, inputs), s4_simulate.bundles(inputs)
+    where = params["speeds"], params["drive"], pose["time"], pose["drives"]
+    return {"nc": dynamics.campbell(scene, bundles, progress, *where)}
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

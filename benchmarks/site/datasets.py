@@ -23,6 +23,7 @@ DATASETS: dict[str, tuple[str, Schema]] = {
         "largest rate [1/s] at which a small motion grows, 0 where the state is stable",
         artifacts.LINEAR,
     ),
+    "Campbell diagram": ("from `flexclear frequencies --speeds`", artifacts.CAMPBELL),
     "Sections": ("from `flexclear sections`", artifacts.SECTIONS),
     "Verdict": ("from `flexclear sections`", VERDICT),
     "Reduced body": ("`bundle/<body>.nc`", artifacts.BUNDLE),

@@ -10,7 +10,7 @@ class Variable:
     """One variable of an artifact. `optional` ones are absent where the scene has no such part.
 
     units: as UDUNITS reads them; empty for words.  turning: units of entries that turn instead of sliding, where a
-    dimension has both.
+    dimension has both.  gaps: whether entries may be NaN, where there is nothing.
     """
 
     dims: tuple[str, ...]
@@ -18,6 +18,7 @@ class Variable:
     long_name: str
     optional: bool = False
     turning: str = ""
+    gaps: bool = False
 
 
 Schema = dict[str, Variable]

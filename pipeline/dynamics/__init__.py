@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.record.cost import Cost
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
-__all__ = ["cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate", "simulated"]
+__all__ = ["campbell", "cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate", "simulated"]
 
 
 def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
@@ -35,7 +35,7 @@ def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     bundles: reduced flexible bodies by name.  progress(fraction or None, text) is called now and then.
     A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for; where it
     names no integrator, by the one that suits it.
-    Raises InputError for a scene that cannot be built, SolverError when the run cannot go on, StoppedError with what
+    Raises InputError for a scene that cannot be built, SolverError when the run cannot continue, StoppedError with what
     there is of it, marked as incomplete, when it is asked to stop.
     """
     from flexclear.pipeline.core.artifacts.labelled import of
@@ -87,7 +87,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
 
 def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
-    """A scene whose laws repeat, looked at once in each period (schema SECTIONS)."""
+    """A scene whose laws repeat, sampled once in each period (schema SECTIONS)."""
     from flexclear.pipeline.dynamics.record.sections import sections as run
 
     return run(scene, bundles, progress)
@@ -135,3 +135,22 @@ def frequencies(
         return dataset.linear(*steady(scene, bundles, progress, time, drives), moving)
     bench, rest = at_rest(scene, bundles, progress, time, drives)
     return dataset.linear(bench, rest, vibrations(bench, rest.at), moving)
+
+
+def campbell(
+    scene: Scene,
+    bundles: Mapping[str, xr.Dataset],
+    progress: Progress,
+    speeds: Sequence[float],
+    drive: str | None = None,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+) -> xr.Dataset:
+    """Vibrations about steady motion over the speed of a drive (schema CAMPBELL).
+
+    speeds: [rad/s, or m/s].  drive: its name; the only one that moves when None.  time, drives: as of `equilibrium`.
+    Raises InputError for a drive that is not there, SolverError where no speed has a steady motion.
+    """
+    from flexclear.pipeline.dynamics.linear.campbell import campbell as over
+
+    return over(scene, bundles, progress, speeds, drive, time, drives)

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.load import load_scene
 from tests.analytic.linear_runs import frequencies
 from tests.analytic.mechanism_runs import run
+from tests.properties.mechanisms import scene, simulate
 
 K = np.array([[2000.0, 300.0, 10.0], [300.0, 1500.0, -20.0], [10.0, -20.0, 4.0]])
 C = np.diag([8.0, 6.0, 0.02])
@@ -81,3 +82,54 @@ def test_a_matrix_that_is_no_stiffness_is_refused_in_words(stiffness: str, tmp_p
     assert "load.mount" in str(error.value)
     for word in WRONG[stiffness]:
         assert word in str(error.value)
+
+
+def turning(speed: list[float], stiffness: list[float], end: float, **more: object) -> dict[str, object]:
+    """A round body on a bushing at its centre, set turning; SI."""
+    mount = {"type": "bushing", "between": ["ground.o", "b.o"], "stiffness": stiffness, **more}
+    bodies = {
+        "ground": {"type": "ground", "frames": {"o": {}}},
+        "b": {
+            "type": "rigid", "mass": 1.0, "inertia": [0.01] * 3, "pose": {}, "angular_velocity": speed,
+            "frames": {"o": {}},
+        },
+    }  # fmt: skip
+    return scene(bodies, {}, end, load={"mount": mount})
+
+
+@pytest.mark.parametrize("direction", [(0.0, 0.0, 1.0), (0.6, -0.48, 0.64)], ids=["along z", "oblique"])
+@pytest.mark.parametrize("share", [0.3, 0.9])
+def test_a_bushing_resists_beyond_half_a_turn_as_below(share: float, direction: tuple[float, float, float]) -> None:
+    """Alike in all directions it is a torsional spring about any axis: A sin(sqrt(k/J) t), up to a full turn."""
+    stiffness, inertia = 2.0, 0.01
+    omega, largest = np.sqrt(stiffness / inertia), share * 2.0 * np.pi
+    run = simulate(turning([largest * omega * d for d in direction], [1e3] * 3 + [stiffness] * 3, 0.6))
+    known = largest * np.sin(omega * run.time.values)
+    assert np.abs(known).max() > 0.9 * largest
+    # rtol 1e-12 over some hundred steps
+    turned = run.bushing_rotation.values[:, 0] @ np.array(direction)
+    assert turned == pytest.approx(known, abs=1e-8)
+    assert run.load_moment.values[:, 0] @ np.array(direction) == pytest.approx(-stiffness * known, abs=1e-7)
+    assert np.abs(run.energy_error).max() < 1e-9 * 0.5 * stiffness * largest**2
+
+
+def test_energy_is_kept_while_a_turning_body_passes_half_a_turn_about_changing_axes() -> None:
+    """Unequal stiffness moves the axis of rotation: the torque is the slope of one energy on both sides."""
+    run = simulate(turning([20.0, 35.0, -30.0], [1e3] * 3 + [2.0, 1.5, 1.0], 1.0))
+    size = np.linalg.norm(run.bushing_rotation.values[:, 0], axis=1)
+    assert size.max() > 1.1 * np.pi
+    # as accurate as rtol 1e-12 keeps a joule
+    assert np.abs(run.energy_error).max() < 1e-8
+
+
+@pytest.mark.parametrize("integrator", [{"rtol": 1e-8}, {"rtol": 1e-3}])
+def test_a_bushing_that_comes_to_a_full_turn_ends_the_run_in_words(integrator: dict[str, object]) -> None:
+    table = turning([0.0, 0.0, 100.0], [1e3] * 3 + [2.0] * 3, 1.0)
+    table["solver"] = integrator
+    with pytest.raises(SolverError, match=r"bushing mount has turned by 35\d deg.*joint-spring"):
+        simulate(table)
+
+
+def test_a_bushing_that_does_not_resist_rotation_turns_for_ever() -> None:
+    run = simulate(turning([0.0, 0.0, 100.0], [1e3] * 3 + [0.0] * 3, 0.5))
+    assert run.angular_velocity.values[:, 0, 2] == pytest.approx(np.full(run.sizes["time"], 100.0), rel=1e-12)

@@ -90,6 +90,8 @@ COORDINATES: Schema = {
     "member": _number("member", "number of the member, from 0"),
     "quantile": _number("quantile", "fraction of the members below"),
     "followed": _number("followed", "number of the period in which a neighbour was followed, from 0"),
+    "speed": _number("speed", "speed of the drive of a Campbell diagram; m s-1 where it slides", "rad s-1"),
+    "branch": _number("branch", "number of the branch of vibrations, from 1"),
     "vibration": _number("vibration", "number of the vibration, from 1"),
     "part": _words("part", "real or imaginary part"),
     "moving_body": _words("moving_body", "name of the body"),

@@ -318,6 +318,36 @@ LINEAR: Schema = EQUILIBRIUM | {
     "modal_shape": _V(("vibration", "part", "mode"), "1", "modal coordinates of the flexible bodies", optional=True),
 }
 
+#: Campbell diagram: vibrations about steady motion over the speed of a drive
+CAMPBELL: Schema = {
+    "frequency": _V(
+        ("speed", "branch"), "Hz", "frequency of the vibration in the axes of the mechanism, which turn", gaps=True
+    ),
+    "whirl_frequency": _V(
+        ("speed", "branch"),
+        "Hz",
+        "frequency in fixed axes, negative for backward whirls; NaN for what does not whirl",
+        gaps=True,
+    ),
+    "decay_rate": _V(
+        ("speed", "branch"), "s-1", "rate at which the vibration decays; negative when it grows", gaps=True
+    ),
+    "growth": _V(
+        ("speed",),
+        "s-1",
+        "largest rate at which a small motion grows; 0 where stable, NaN without steady motion",
+        gaps=True,
+    ),
+    "whirl": _V(("branch",), "", "forward or backward; empty for what does not whirl"),
+    "dominant": _V(("branch",), "", "body with the largest share of the kinetic energy at most speeds"),
+    "critical_speed": _V(
+        ("branch",), "rad s-1", "lowest speed at which the whirl is as fast as the turning, or NaN", gaps=True
+    ),
+    "frame_position": _V(
+        ("speed", "frame", "axis"), "m", "origin of the named frame in steady motion, world axes", gaps=True
+    ),
+}
+
 
 #: variables that say what the entries of their dimension are, where their schema has them
 _NAMING = ("event_time", "event_contact", "event_kind", "impact_time", "impact_contact")
@@ -350,7 +380,8 @@ def conformed(data: LabelledArrays, schema: Schema, *, title: str, **attributes:
         variable = schema.get(name) or COORDINATES[name]
         if array.dims != variable.dims:
             raise ValueError(f"{name} has dimensions {array.dims}, not {variable.dims}")
-        if array.values.dtype.kind == "f" and not name.startswith(_MAY_BE_OPEN) and not np.isfinite(array.values).all():
+        may_lack = variable.gaps or name.startswith(_MAY_BE_OPEN)
+        if array.values.dtype.kind == "f" and not may_lack and not np.isfinite(array.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         units, mixed = _units(data, name, variable)
         described = ({"units": units} if units else {}) | {"long_name": variable.long_name}

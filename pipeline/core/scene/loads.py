@@ -137,7 +137,8 @@ class Bushing(Part):
     """Elastic mount between two frames: force -(stiffness x + damping dx/dt) on six displacements x of the second one.
 
     The displacements are those of the second frame in the first one's axes: x, y, z of its origin and the rotation
-    vector.  stiffness, damping: six numbers on the diagonal, or a symmetric 6x6 matrix that stores and takes energy.
+    vector, which is followed up to a full turn.  stiffness, damping: six numbers on the diagonal, or a symmetric 6x6
+    matrix that stores and takes energy.
 
     between: the frame it is mounted in, and the frame it carries.
     """

@@ -303,7 +303,7 @@ def attempt(
 
 
 def _left(task: Task, stopped: StoppedError, store: Store) -> str:
-    """Message about a task that was stopped: what there is of it, and that it can go on."""
+    """Message about a task that was stopped: what there is of it, and that it can continue."""
     text = f"{stopped}; run it again, and it continues from there"
     time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
     if time is not None:  # else it is of a part of the work, such as a member of an ensemble, and no dataset

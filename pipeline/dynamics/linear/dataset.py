@@ -50,7 +50,7 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
     """The equilibrium with its natural vibrations (schema LINEAR)."""
     still = equilibrium(bench, rest, moving)
     value, w = small.value, small.shape
-    translation, rotation, energy = _motions(bench, rest, w)
+    translation, rotation, energy = motions(bench, rest, w)
     phase = _phase(translation, rotation, w)
     w, translation, rotation = w * phase, translation * phase[:, None, None], rotation * phase[:, None, None]
     size, parts = np.abs(value), list(energy)
@@ -81,7 +81,7 @@ def linear(bench: Bench, rest: Equilibrium, small: Vibrations, moving: bool) -> 
     return conform(made, LINEAR, **facts, motions_without_stiffness=small.free, growth=small.growth)
 
 
-def _motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
+def motions(bench: Bench, rest: Equilibrium, w: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]:
     """Motion of every named frame in each vibration, and the fraction of every body in its kinetic energy.
 
     Translations and rotations: world axes, complex, shape (n, frame, 3).

@@ -6,7 +6,9 @@ r"""Elastic mount between two frames F and G: stiffness and damping on six displ
 The force on G is -(K s + C ds/dt) along x; the torque along theta becomes one about the axes of F by the inverse
 tangent, :math:`T^{-T} = 1 + \tfrac12\tilde\theta + e\,\tilde\theta\tilde\theta`,
 :math:`e = (1 - \tfrac\theta2\cot\tfrac\theta2)/\theta^2`, so that power and energy agree for finite rotations. They act
-at the origin of G. The rotation vector is the shortest one: at half a turn its sign, and the torque's, changes.
+at the origin of G. The rotation vector is the shortest one at the start and continuous from there, its last value an
+internal state; at a full turn it has no direction, and the right-hand side is not a number, which ends the run. A
+bushing without stiffness and damping against rotation has no such state and may turn for ever.
 
 Source: Bauchau (2011), Flexible Multibody Dynamics, sec. 13.3 (rotation vector and tangent).
 """
@@ -17,6 +19,7 @@ import numpy as np
 
 from flexclear.pipeline.core.scene.loads import Bushing as Declared
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.gauge import internal_rate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, number
 from flexclear.pipeline.dynamics.loads.row import Row
@@ -27,6 +30,7 @@ from flexclear.pipeline.dynamics.vectors import (
     cross,
     dot,
     product,
+    put,
     scale,
     sub,
     transpose,
@@ -36,6 +40,8 @@ from flexclear.pipeline.dynamics.vectors import (
 
 #: angle^2 below which e is taken from its series; the next term is 1e-13 there
 SMALL = 1e-3
+#: square of the angle [rad] from which on there is no torque; 6.2 of 2 pi
+FULL = 6.2**2
 #: where the damping matrix begins among the numbers, and the blocks of a 6x6 matrix
 DAMPING, MIXED, SECOND = 36, 3, 18
 
@@ -55,6 +61,19 @@ def rotation_vector(R):
     axis = (q[1], q[2], q[3]) if q[0] >= 0.0 else (-q[1], -q[2], -q[3])
     size, cosine = np.sqrt(dot(axis, axis)), abs(q[0])
     return scale(2.0 * np.arctan2(size, cosine) / size if size > 0.0 else 2.0, axis)
+
+
+@kernel
+def continued(v, before):
+    """Of the two rotation vectors below a full turn that are the same rotation as v the one closer to `before`."""
+    size = np.sqrt(dot(v, v))
+    if size == 0.0:
+        return v
+    other = scale(1.0 - 2.0 * np.pi / size, v)
+    left, right = sub(v, before), sub(other, before)
+    if dot(left, left) <= dot(right, right):
+        return v
+    return other if dot(other, other) < FULL else scale(np.nan, other)
 
 
 @kernel
@@ -94,9 +113,14 @@ def apply(h, f, w, k):
     slide = sub(at(w, b + m.FRAME.velocity), add(at(w, a + m.FRAME.velocity), cross(omega, r)))
     spin = turn_back(F, sub(at(w, b + m.FRAME.omega), omega))
     x, x_rate, v = turn_back(F, r), turn_back(F, slide), rotation_vector(product(transpose(F), G))
+    state = m.LOADS.internal0(h, k)
+    if state >= 0:
+        v = continued(v, at(w, h[m.INTERNAL] + state))
     e = tangent_part(v)
     crossed = cross(v, spin)
     v_rate = add(spin, add(scale(-0.5, crossed), scale(e, cross(v, crossed))))
+    if state >= 0:
+        put(w, internal_rate(h, state), v_rate)
     pull, twist = product6(h, f, k, 0, x, v)
     damped_pull, damped_twist = product6(h, f, k, DAMPING, x_rate, v_rate)
     stored, lost = 0.5 * (dot(pull, x) + dot(twist, v)), dot(damped_pull, x_rate) + dot(damped_twist, v_rate)
@@ -116,6 +140,7 @@ class Bushing:
 
     @staticmethod
     def row(load: Declared, path: str) -> Row:
-        """Stiffness, then damping, row by row [SI]."""
+        """Stiffness, then damping, row by row [SI]; three states where it resists rotation."""
         numbers = [entry for matrix in (load.stiffness, load.damping) for row in matrix for entry in row]
-        return Row(frames=load.between, numbers=tuple(numbers))
+        resists = any(entry for matrix in (load.stiffness, load.damping) for row in matrix[3:] for entry in row)
+        return Row(frames=load.between, numbers=tuple(numbers), states=3 if resists else 0)

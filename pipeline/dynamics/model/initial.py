@@ -12,6 +12,7 @@ from flexclear.pipeline.core.scene.loads import SpringDamper
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
+from flexclear.pipeline.dynamics.model.bushings import rotations
 from flexclear.pipeline.dynamics.model.constraints import outboard_place
 from flexclear.pipeline.dynamics.model.deformation import start_place
 from flexclear.pipeline.dynamics.model.driving import joint_class
@@ -272,6 +273,8 @@ def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray
     y, first = y.copy(), model.ny - model.arrays.size(m.N_INTERNAL)
     for index, angle in angles(model.arrays.table(m.GAUGES), sites).items():
         y[first + index] = angle
+    for index, vector in rotations(model, sites, np.zeros(model.ny - first)).items():
+        y[first + index : first + index + 3] = vector
     return y
 
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import matrix_to_quaternion
 from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.model.bushings import nearest
 from flexclear.pipeline.dynamics.model.model import Model
 
 
@@ -20,13 +20,10 @@ def give(model: Model, seen: Observed) -> tuple[dict[str, tuple[tuple[str, ...],
         a, b = (seen.sites[:, wiring[places[name]][end]] for end in ("a", "b"))
         to_first = np.swapaxes(a["axes"], 1, 2)
         displacement[:, k] = np.einsum("tij,tj->ti", to_first, b["origin"] - a["origin"])
-        rotation[:, k] = [_vector(R) for R in to_first @ b["axes"]]
+        first = int(wiring[places[name]]["internal0"])
+        at = model.ny - model.arrays.size(m.N_INTERNAL) + first
+        # without resistance to rotation nothing follows it
+        before = seen.state[:, at : at + 3] if first >= 0 else np.zeros((len(seen.state), 3))
+        rotation[:, k] = [nearest(R, v) for R, v in zip(to_first @ b["axes"], before, strict=True)]
     dims = ("time", "bushing", "axis")
     return {"bushing_displacement": (dims, displacement), "bushing_rotation": (dims, rotation)}, {"bushing": names}
-
-
-def _vector(R: np.ndarray) -> np.ndarray:
-    """The shortest rotation vector of a rotation matrix, shape (3,)."""
-    q = matrix_to_quaternion(R)
-    q, half = (q if q[0] >= 0.0 else -q), np.linalg.norm(q[1:])
-    return np.asarray(q[1:] * (2.0 if half == 0.0 else 2.0 * np.arctan2(half, q[0]) / half))

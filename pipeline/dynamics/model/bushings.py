@@ -1,0 +1,54 @@
+"""Rotation vectors of bushings, followed continuously beyond half a turn."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexclear.pipeline.core.algebra import matrix_to_quaternion
+from flexclear.pipeline.core.scene.loads import Bushing
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.model import Model
+
+#: rotation [rad] at which a bushing ends a run: at a full turn its rotation vector has no direction
+LARGEST = 6.2
+
+
+def rotations(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int, np.ndarray]:
+    """Rotation vector [rad], shape (3,), of every bushing that resists rotation, by its first internal state.
+
+    sites: frames of all sites, rows of SITE_FRAMES with named fields.  internal: states that the vectors continue.
+    """
+    vectors = {}
+    for (name, _), row in zip(model.loads, model.arrays.table(m.LOADS), strict=True):
+        first = int(row["internal0"])
+        if first >= 0 and isinstance(model.scene.load[name], Bushing):
+            R = sites[row["a"]]["axes"].T @ sites[row["b"]]["axes"]
+            vectors[first] = nearest(R, internal[first : first + 3])
+    return vectors
+
+
+def nearest(R: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Of the two rotation vectors [rad] below a full turn of a matrix R the one closer to another, shape (3,)."""
+    q = matrix_to_quaternion(R)
+    q, half = (q if q[0] >= 0.0 else -q), float(np.linalg.norm(q[1:]))
+    shortest = q[1:] * (2.0 if half == 0.0 else 2.0 * np.arctan2(half, q[0]) / half)
+    if half == 0.0:
+        return np.asarray(shortest)
+    other = shortest - 2.0 * np.pi * q[1:] / half
+    return np.asarray(min((shortest, other), key=lambda v: float(np.sum((v - before) ** 2))))
+
+
+def overturned(model: Model, y: np.ndarray) -> str | None:
+    """What to say where a bushing has come to a full turn in state y, else None."""
+    first = model.ny - model.arrays.size(m.N_INTERNAL)
+    for (name, _), row in zip(model.loads, model.arrays.table(m.LOADS), strict=True):
+        at = first + int(row["internal0"])
+        if isinstance(model.scene.load[name], Bushing) and row["internal0"] >= 0:
+            angle = float(np.linalg.norm(y[at : at + 3]))
+            if angle > 0.99 * LARGEST:
+                return (
+                    f"bushing {name} has turned by {np.degrees(angle):.0f} deg: it is an elastic mount, whose rotation "
+                    "vector loses its direction at a full turn; let a joint carry the turning, with a joint-spring "
+                    "for its torque, or give the bushing no stiffness and no damping against rotation"
+                )
+    return None

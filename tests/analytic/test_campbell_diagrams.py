@@ -1,0 +1,93 @@
+"""Campbell diagrams of rotors against closed forms: whirls in fixed axes, branches, critical speeds, stability."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.stages.__main__ import main
+from flexclear.stages.frequencies import speeds
+from tests.analytic.test_unbalanced_rotors import ACROSS, ALONG, MASS, MIXED, SIDE, SLOPE, TURNS, Table, rotor
+
+
+def diagram(table: Table, at: list[float]) -> xr.Dataset:
+    return dynamics.campbell(Scene.model_validate(table), {}, silent, at)
+
+
+def whirls(speed: float) -> np.ndarray:
+    """The overhung rotor's four whirls, backward ones negative, ascending [rad/s]; Genta (2005), sec. 2.6."""
+    K, M = np.array([[SIDE, -MIXED], [-MIXED, SLOPE]]), np.diag([MASS, ACROSS])
+    gyroscopic = np.diag([0.0, ALONG * speed])
+    lower = np.hstack([-np.linalg.solve(M, K), 1j * np.linalg.solve(M, gyroscopic)])
+    return np.sort(np.linalg.eigvals(np.vstack([np.eye(2, 4, 2), lower])).imag)
+
+
+@pytest.mark.parametrize("unbalance, turn", [(0.0, "upright"), (1e-6, "oblique")])
+def test_an_overhung_rotor_has_the_whirls_and_the_critical_speed_of_its_equations(unbalance: float, turn: str) -> None:
+    at = [0.0, 60.0, 120.0, 140.0, 200.0, 400.0]
+    made = diagram(rotor(20.0, unbalance, TURNS[turn]), at)
+    kinds = made.whirl.values
+    assert sorted(kinds) == ["", "", "backward", "backward", "forward", "forward"]
+    branches = 2.0 * np.pi * made.whirl_frequency.values[:, kinds != ""]
+    known = np.array([whirls(speed) for speed in at])
+    # every branch keeps its place in the ascending order: whirls of this rotor never cross
+    order = np.argsort(branches[-1])
+    # differences of forces reach 1e-9, and the least whirl is a tenth of the fastest
+    assert branches[:, order] == pytest.approx(known, rel=1e-6)
+    assert np.all(made.growth.values == 0.0)
+    turning = np.linalg.eigvals(
+        np.linalg.solve(np.diag([MASS, ACROSS - ALONG]), [[SIDE, -MIXED], [-MIXED, SLOPE]])
+    ).real
+    critical = np.sqrt(turning[turning > 0.0])
+    # interpolated on a straight line between 120 and 140 rad/s
+    assert made.critical_speed.values[np.isfinite(made.critical_speed.values)] == pytest.approx(critical, rel=2e-3)
+
+
+def test_a_jeffcott_rotor_whirls_at_one_frequency_at_all_speeds() -> None:
+    """No gyroscopic moment: sqrt(k/m) forward and backward, and damping that drives it above that speed."""
+    table = rotor(20.0, damping=20.0)
+    table["load"]["shaft"]["stiffness"] = np.diag([SIDE, SIDE, 1e8, 1e6, 1e6, 1e6]).tolist()
+    at, natural = [100.0, 200.0, 300.0], np.sqrt(SIDE / MASS)
+    made = diagram(table, at)
+    first = np.abs(2.0 * np.pi * made.whirl_frequency.values)
+    slowest = np.nanargmin(np.where(made.whirl.values == "forward", first[0], np.nan))
+    # damping of 1.4 % moves the frequency by its square
+    assert first[:, slowest] == pytest.approx(natural, rel=5e-4)
+    assert made.critical_speed.values[slowest] == pytest.approx(natural, rel=1e-3)
+    assert (made.growth.values > 0.0).tolist() == [False, False, True]
+
+
+def test_speeds_are_first_last_and_step_in_one_unit() -> None:
+    assert speeds("0:500rpm:50") == pytest.approx(np.arange(0.0, 501.0, 50.0) * np.pi / 30.0)
+    assert speeds("10:30:10") == pytest.approx([10.0, 20.0, 30.0])
+    for wrong in ("500", "0:500rpm", "0:500kg:50", "0:500:-50", "500:0:50", "0:1e9:1"):
+        with pytest.raises(InputError, match="--speeds"):
+            speeds(wrong)
+
+
+def test_the_command_prints_a_table_and_writes_dataset_and_picture(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [tmp_path / "campbell.nc", tmp_path / "campbell.png"]
+    out = [word for file in files for word in ("--out", str(file))]
+    assert main(["frequencies", "checks/overhung_rotor", "--speeds", "0:100:50", *out]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines[3:6]] == ["0", "50", "100"]
+    assert any(line.startswith("critical speed of branch") for line in lines)
+    with xr.open_dataset(files[0]) as kept:
+        assert kept.speed.values.tolist() == [0.0, 50.0, 100.0]
+    assert files[1].read_bytes().startswith(b"\x89PNG")
+
+
+def test_options_of_a_diagram_need_its_speeds(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["frequencies", "checks/overhung_rotor", "--out", "campbell.png"]) == 2
+    assert "add --speeds" in capsys.readouterr().err
+    assert main(["frequencies", "checks/overhung_rotor", "--speeds", "0:100:50", "--drive", "motor"]) == 2
+    assert "there is no such drive" in capsys.readouterr().err
