@@ -164,7 +164,7 @@ def _plain(values: Any) -> Any:
 
 
 def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
-    """A motion that its laws repeat, looked at once in each period (schema SECTIONS), and the verdict on it.
+    """A motion that its laws repeat, sampled once in each period (schema SECTIONS), and the verdict on it.
 
     The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
     why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.

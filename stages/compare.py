@@ -118,10 +118,10 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
     for effects in sets.get(without, ((without,),)):
         there = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
         if there or not ideals:
-            other = ideal(scene, effects)
-            same = any(other.model_dump() == other.model_dump() for other in ideals)
-            other._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
-            ideals += [] if same else [other]
+            made = ideal(scene, effects)
+            same = any(made.model_dump() == other.model_dump() for other in ideals)
+            made._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
+            ideals += [] if same else [made]
     return ideals
 
 

@@ -137,7 +137,9 @@ def text(linear: xr.Dataset) -> str:
 def _freedoms(linear: xr.Dataset) -> list[str]:
     """How many there are, how many of them nothing drives back, and what their count leaves open."""
     limp, repeated = linear.attrs["motions_without_stiffness"], linear.attrs["redundant_closure_rows"]
-    lines = [f"mobility {linear.attrs['mobility']}" + (f", {limp} of the motions without stiffness" if limp else "")]
+    lines = [
+        f"free motions besides the drives: {linear.attrs['mobility']}" + (f", {limp} without stiffness" if limp else "")
+    ]
     if joints := linear.attrs["undetermined_reactions"]:
         says = "condition of the closed loops follows" if repeated == 1 else "conditions of the closed loops follow"
         lines.append(

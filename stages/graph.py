@@ -134,7 +134,7 @@ class Graph:
 
     @cached_property
     def sections(self) -> Task:
-        """The motion looked at once in each period of its laws; shown as ``sections.nc``."""
+        """The motion sampled once in each period of its laws; shown as ``sections.nc``."""
         params, modules = s4_sections.params(self.scene), s4_simulate.modules(self.scene)
         return self._scene_task(
             "sections",

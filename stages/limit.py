@@ -13,7 +13,7 @@ from flexclear.pipeline.core.units import quantity
 def argument(parser: argparse.ArgumentParser) -> None:
     """How long the command may take."""
     parser.add_argument(
-        "--limit", metavar="TIME", help="stop in good order after, e.g., 2h (exit code 4); run again to go on"
+        "--limit", metavar="TIME", help="stop in good order after, e.g., 2h (exit code 4); run again to continue"
     )
 
 

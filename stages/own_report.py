@@ -51,7 +51,7 @@ COST = {
     "projections": "times the closed loops were put together again",
 }
 STABILITY = {
-    "switched": "another integrator went on",
+    "switched": "another integrator continued",
     "stiff_share": "fraction of the steps that stability made shorter than accuracy would have",
     "redundant_closure_rows": "conditions of closed loops that follow from the others",
     "accuracy_verdict": "accuracy asked for",

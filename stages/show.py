@@ -31,15 +31,15 @@ def command(options: argparse.Namespace) -> int:
 
     Exit code 2 where a start does not fit; it is shown all the same.
     """
-    found = 0
+    result = 0
     for name in options.scenes:
         scene = run.loaded(name, options.set)
         run.require_names(scene)
         refused = shown(scene, quiet=options.quiet)
         if refused is not None:
             print(f"flexclear: {lines.located(refused)}", file=sys.stderr)
-            found = refused.exit_code
-    return found
+            result = refused.exit_code
+    return result
 
 
 def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> InputError | None:
@@ -151,7 +151,7 @@ def _unplaced(scene: Scene) -> list[str]:
 
 
 def _filled(scene: Scene, bodies: dict[str, xr.Dataset], lone: list[str]) -> Scene:
-    """The scene with numbers in the place of the recipes of rigid bodies, and without deformation at the start.
+    """The scene with numbers instead of the recipes of rigid bodies, and without deformation at the start.
 
     lone: bodies that are put at the origin.
     """

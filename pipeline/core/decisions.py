@@ -14,7 +14,7 @@ EVIDENCE = {
     BOUND: "a bound from the ideal motion",
     RESPONSE: "the first-order response along the ideal motion",
     PILOT: "short runs with and without it",
-    NONE: "not looked into",
+    NONE: "not examined",
 }
 #: why an effect stays for which no run was made
 NOT_WORTH = "to leave it out would save no time worth the look"

@@ -39,7 +39,7 @@ class Traits:
     long_steps: they hold many vibrations, whose work on the drives is known less exactly than the motion.
     retracts: it needs positions after a displacement (`pipeline.dynamics.equations.retraction`).
     reads_all: it reads more of some evaluations than the rates, and is given a second way to make these.
-    hands_over_to: implicit method that goes on where stability limits the steps that it chooses, and that is named as
+    hands_over_to: implicit method that continues where stability limits the steps that it chooses, and that is named as
         the remedy where steps are given; empty for methods that are stable themselves.
     tolerances, steps: at which `flexclear cost` runs it; steps in s.
     """

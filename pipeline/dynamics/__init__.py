@@ -35,7 +35,7 @@ def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
     bundles: reduced flexible bodies by name.  progress(fraction or None, text) is called now and then.
     A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for; where it
     names no integrator, by the one that suits it.
-    Raises InputError for a scene that cannot be built, SolverError when the run cannot go on, StoppedError with what
+    Raises InputError for a scene that cannot be built, SolverError when the run cannot continue, StoppedError with what
     there is of it, marked as incomplete, when it is asked to stop.
     """
     from flexclear.pipeline.core.artifacts.labelled import of
@@ -87,7 +87,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
 
 def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
-    """A scene whose laws repeat, looked at once in each period (schema SECTIONS)."""
+    """A scene whose laws repeat, sampled once in each period (schema SECTIONS)."""
     from flexclear.pipeline.dynamics.record.sections import sections as run
 
     return run(scene, bundles, progress)

@@ -18,13 +18,13 @@ from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
-#: releases of Numba with which `lowering` has been looked at
+#: releases of Numba with which `lowering` has been tested
 LOOKED_AT = ("0.67.", "0.68.")
 #: for debugging: kernels are the functions of Python that they look like, as Numba's own setting has it
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "") not in ("", "0")
 
 
-def looked_at() -> bool:
+def known_release() -> bool:
     """Whether the release of Numba is known to take `lowering`."""
     import numba
 
@@ -64,7 +64,7 @@ def _compiled(function: Callable) -> Any:
         "no_cfunc_wrapper": True,
         "no_cpython_wrapper": True,
     }
-    if looked_at():
+    if known_release():
         from flexclear.pipeline.dynamics.lowering import KernelDispatcher
 
         return KernelDispatcher.of(function, options)
@@ -92,7 +92,7 @@ def field_reader(index: int, size: int, field: int) -> Any:
 
 
 def _lookup(function: Callable, index: int, size: int, field: int | None) -> Any:
-    if not looked_at():
+    if not known_release():
         return _compiled(function)
     from flexclear.pipeline.dynamics.lookup import Lookup
 

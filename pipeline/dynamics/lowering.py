@@ -1,7 +1,7 @@
 """A step of Numba's compiler in another form: kernels become code without being optimised, so that what is called
 through n kernels is optimised once, and not n times.
 
-It needs parts of Numba that nobody promises to keep, and is taken with releases that it has been looked at with;
+It needs parts of Numba that nobody promises to keep, and is taken with releases that it has been tested with;
 `kernels` says which. With others kernels are compiled as Numba does it: longer, and just as right.
 """
 

@@ -6,7 +6,7 @@ are, what is joined to what, every number, is in four flat arrays that every ker
 - ``h`` (integers): a header with sizes and offsets, then the wiring tables;
 - ``f`` (floats): the numbers of the scene;
 - ``w`` (floats): the work space, the integrator's state and stages included;
-- ``n`` (integers): what changes while a run goes on.
+- ``n`` (integers): what changes while a run continues.
 
 Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the index in w where a stretch begins,
 ``m.LINKS.parent(h, i)`` a field of row i of a wiring table, ``m.LINK_NUMBERS.row(h, i)`` the index of row i of a

@@ -1,6 +1,6 @@
 """Whether a sequence of states, one per period, is periodic, quasi-periodic or chaotic: diagnostics.
 
-All take sections: states at equal phases, in any coordinates that tell states apart. None knows of mechanisms.
+All take sections: states at equal phases, in any coordinates that distinguish states. None knows of mechanisms.
 
 Sources: 0-1 test: Gottwald & Melbourne (2009), On the implementation of the 0-1 test for chaos, SIAM J. Appl. Dyn.
 Syst. 8, 129-145. Batch means: Schmeiser (1982), Batch size effects in the analysis of simulation output, Operations

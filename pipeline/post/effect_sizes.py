@@ -203,7 +203,7 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
                 panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
                 for y, value in zip(place, values, strict=True):
-                    text = "none" if value == 0.0 else "not looked into" if np.isnan(value) else "not comparable"
+                    text = "none" if value == 0.0 else "not examined" if np.isnan(value) else "not comparable"
                     text = "" if np.isfinite(value) and value > 0.0 else text
                     panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
             panel.set_xscale("log")

@@ -57,7 +57,7 @@ def decided(change: Influence, scale: float) -> bool:
 
 
 def undecided(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
-    """The quantities of which more members may tell more."""
+    """The quantities of which more members may decide more."""
     if pair.full.refused or pair.without.refused:
         return []
     return [q for q in chosen if not decided(compared(pair, q), size(pair.full, q))]
@@ -167,7 +167,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     said += [f"{name} calls for {more}." for name in calm[:1]]
     said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
     if result.attrs["undone"]:
-        said.append(f"Not looked into within the budget: {result.attrs['undone']}.")
+        said.append(f"Not examined within the budget: {result.attrs['undone']}.")
     return " ".join(said)
 
 

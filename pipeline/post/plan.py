@@ -233,7 +233,7 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
         tuple(rows),
         (
             "Each accuracy is that of all watched quantities; name one in [accuracy] to get its planned scene. "
-            "Kept without a look: leaving the effect out would save no time worth the runs that tell its size.",
+            "Unchanged without a run: leaving the effect out would save no time worth the runs that measure its size.",
         ),
     )
 

@@ -50,7 +50,7 @@ class Turning:
 def turning(time: np.ndarray, quaternion: np.ndarray, angular_velocity: np.ndarray) -> Turning:
     """How far a body has turned at each time [s]; quaternion: w x y z, shape (time, 4), of a body that may be flexible.
 
-    angular_velocity: world axes [rad/s], shape (time, 3); it tells how many full turns lie between two rows.
+    angular_velocity: world axes [rad/s], shape (time, 3); it determines how many full turns lie between two rows.
     """
     since = quaternion_product(quaternion, quaternion_conjugate(quaternion[:1]))
     _, sizes, axes = np.linalg.svd(since[:, 1:], full_matrices=False)

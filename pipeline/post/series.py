@@ -140,5 +140,5 @@ def _peak_force(run: xr.Dataset | LabelledArrays) -> np.ndarray:
 
 
 def parameters(run: xr.Dataset | LabelledArrays) -> dict:
-    """The scene's parameters as the run's attributes tell them; empty when they do not."""
+    """The scene's parameters from the run's attributes; empty when they do not."""
     return json.loads(run.attrs.get("parameters", "{}"))

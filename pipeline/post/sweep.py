@@ -122,7 +122,7 @@ def _coordinates(sweep: xr.Dataset) -> list[str]:
 
 
 def _walks(sweep: xr.Dataset, names: list[str]) -> bool:
-    """Whether all parameters go up, or down, together from point to point: then one of them tells the others."""
+    """Whether all parameters go up, or down, together from point to point: then one of them determines the others."""
     steps = [np.diff(sweep[name].values) for name in names]
     return all(bool((step > 0).all() or (step < 0).all()) for step in steps)
 

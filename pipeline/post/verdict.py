@@ -30,7 +30,7 @@ Kind = Literal["periodic", "quasi-periodic", "chaotic", "undecided"]
 REGULAR, CHAOTIC = 0.2, 0.8
 #: fraction of the variance that few lines hold in the spectrum of a motion with few frequencies
 DISCRETE = 0.95
-#: states below which the 0-1 test and the spectrum tell nothing
+#: states below which the 0-1 test and the spectrum show nothing
 ENOUGH = 200
 
 _V = Variable
@@ -38,7 +38,7 @@ VERDICT: Schema = {
     "exponent": _V((), "s-1", "largest Lyapunov exponent"),
     "exponent_low": _V((), "s-1", "lower end of its 95 % confidence interval"),
     "exponent_high": _V((), "s-1", "upper end of its 95 % confidence interval"),
-    "least_exponent": _V((), "s-1", "exponent that so many periods cannot tell from zero"),
+    "least_exponent": _V((), "s-1", "exponent that so many periods cannot distinguish from zero"),
     "zero_one": _V((), "1", "K of the 0-1 test, of the component that decides least for regular motion", optional=True),
     "returns_after": _V((), "1", "periods after which the states come back; 0 where they do not"),
     "return_distance": _V((), "1", "largest distance of a return, as a fraction of the motion's size"),

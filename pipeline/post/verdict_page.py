@@ -23,13 +23,14 @@ starts {distance:.0e} away, in units of the mechanism's size, and is brought bac
 mean rate at which it parts is the largest Lyapunov exponent, with the confidence interval of its batch means.
 
 - *periodic*: the states come back, and the exponent is not positive;
-- *chaotic*: all of the exponent's interval is above what {followed} periods cannot tell from zero, and the 0-1 test
+- *chaotic*: all of the exponent's interval is above what {followed} periods cannot distinguish from zero, and the 0-1
+test
   says so (K above 0.8);
 - *quasi-periodic*: the exponent may be zero, the 0-1 test says regular (K below 0.2), few lines hold the spectrum;
 - *undecided* otherwise.
 
 A freedom on which nothing depends, such as the spin of a leg with balls at both ends, has an exponent of zero. So the
-largest exponent of a periodic motion is zero there, and the contraction tells how fast the rest settles.
+largest exponent of a periodic motion is zero there, and the contraction shows how fast the rest settles.
 """
 COLUMNS = ("scene", "verdict", "periods", "exponent", "exponent_low", "exponent_high")
 HEAD = ("scene", "verdict", "exponent, 1/s", "95 %", "K", "comes back after", "to", "contraction", "in 16 lines")

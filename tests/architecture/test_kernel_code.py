@@ -11,11 +11,11 @@ import pytest
 from numba import carray, cfunc, njit
 from numba.core.codegen import CPUCodeLibrary
 
-from flexclear.pipeline.dynamics.kernels import field_reader, kernel, looked_at, row_reader
+from flexclear.pipeline.dynamics.kernels import field_reader, kernel, known_release, row_reader
 from flexclear.pipeline.dynamics.lowering import Part, Whole, WholeCompiler
 
 #: with other releases kernels compile as Numba does it, to the same results
-needs_lowering = pytest.mark.skipif(not looked_at(), reason="this release of Numba has not been looked at")
+needs_lowering = pytest.mark.skipif(not known_release(), reason="this release of Numba has not been looked at")
 
 
 def tower() -> tuple[Callable, Callable, Callable]:

@@ -86,10 +86,10 @@ def test_what_is_ideal_has_no_twin(tmp_path: Path):
 
 
 def test_each_twin_is_made_once(crank: Path, tmp_path: Path):
-    names = [twin.name for twin in compare.twins(load_scene(crank), "each")]
+    names = [twin.name for twin in compare.ideal_scenes(load_scene(crank), "each")]
     assert names == ["slider_crank ideal", "slider_crank without clearance", "slider_crank rigid"]
     rigid_only = load_scene(write("four-bar", tmp_path / "other")[0])
-    assert [twin.name for twin in compare.twins(rigid_only, "each")] == ["four_bar ideal"]
+    assert [twin.name for twin in compare.ideal_scenes(rigid_only, "each")] == ["four_bar ideal"]
 
 
 def pair() -> dict[str, xr.Dataset]:

@@ -43,7 +43,7 @@ def test_the_command_prints_pose_residual_and_mobility_then_the_table(
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "checks/pendulum at t = 0.5 s, drives held"
     assert lines[1].startswith("equilibrium: largest unbalanced force")
-    assert lines[2] == "mobility 1"
+    assert lines[2] == "free motions besides the drives: 1"
     number, hertz, damping, owner, fraction = lines[-1].split(maxsplit=4)
     assert (number, damping, owner, fraction) == ("1", "0", "bob", "(100 %)")
     assert float(hertz) == pytest.approx(np.sqrt(9.81) / (2.0 * np.pi), rel=1e-6)
@@ -57,7 +57,7 @@ def test_what_loops_say_twice_is_told_where_reactions_depend_on_it() -> None:
     }  # fmt: skip
     still = xr.Dataset(coords={"vibration": np.zeros(0, dtype=int)}, attrs=told)
     *_, mobility, repeated, nothing = text(still).splitlines()
-    assert mobility == "mobility 0"
+    assert mobility == "free motions besides the drives: 0"
     assert repeated.startswith("3 conditions of the closed loops follow from the others, as three do in a planar loop:")
     assert repeated.endswith("rigid bodies do not determine the reactions of A, B, C, D")
     assert nothing == "nothing vibrates: joints and drives hold all bodies"

@@ -230,7 +230,7 @@ def _acquire(lock: FileLock, *, wait: bool) -> FileLock | None:
 
 def sweep(root: Path) -> int:
     """Remove temporary files and locks below `root` that processes left which are no more, and unfinished work that
-    nobody has gone on with for long; how many."""
+    nobody has continued for long; how many."""
     removed = 0
     for folder, _, names in os.walk(root):
         for name in names:

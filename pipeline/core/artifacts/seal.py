@@ -1,7 +1,7 @@
 """Digests that only this user can make: of files that go into compiled code as they are.
 
 What a work space holds decides where compiled code reads and writes, so unfinished work that somebody else put into a
-folder of results must not be gone on with. The secret lies next to the compiled kernels, in the user's own folder.
+folder of results must not be continued. The secret lies next to the compiled kernels, in the user's own folder.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def same(one: str, other: str) -> bool:
 
 @cache
 def _secret() -> bytes:
-    """The user's; where none can be stored, one of this process, whose work no other one goes on with."""
+    """The user's; where none can be stored, one of this process, whose work no other one continues with."""
     path = kernel_root() / NAME
     try:
         if not path.is_file() or path.stat().st_size != BYTES:

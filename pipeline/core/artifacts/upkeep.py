@@ -62,7 +62,7 @@ def prunable(store: Store, listed: Inventory, older: float) -> list[Artifact]:
     """Artifacts that no folder of results shows, and that were made more than `older` seconds ago.
 
     What the shown ones were made from stays as well: without it they would be made again. A sweep shows its families,
-    all of whose points stay, since it goes on with them.
+    all of whose points stay, since it continues with them.
     """
     made = {artifact.record.digest: artifact.record for artifact in listed.artifacts}
     in_use, waiting = set(), list(_shown(store))

@@ -249,7 +249,7 @@ class Piecewise(Part):
 
 
 class Repeated(Part):
-    """A law that starts over: its course from `start` on for a `period`, `times` times; the last one goes on.
+    """A law that starts over: its course from `start` on for a `period`, `times` times; the last one continues.
 
     period: length of one course.  times: how often.  start: where the first course begins.  law: what is repeated.
     """

@@ -30,7 +30,7 @@ Bytes = Annotated[float, BeforeValidator(_bytes), Field(gt=0.0), WithJsonSchema(
 class Limits(Part):
     """What the work may take at most; it is estimated first, and refused at once (exit code 4).
 
-    time: on the clock, of each run, ensemble or study of sections; what there is by then is left, and can go on.
+    time: on the clock, of each run, ensemble or study of sections; what there is by then is left, and can continue.
     memory, disk: default: four fifths of what is free.
     parts: bodies, joints, drives and loads, of each at most so many.
     cells: elements or cells of one mesh.  modes: elastic coordinates of one body.

@@ -72,7 +72,7 @@ class Ensemble(Part):
 
 
 class Sections(Part):
-    """A motion that its laws repeat, looked at once in each period: see ``flexclear sections``.
+    """A motion that its laws repeat, sampled once in each period: see ``flexclear sections``.
 
     period: of the laws of drives and loads, from the run's start on; without it the run is one period.
     phase: when in the period the motion is examined [s].  transient: periods that are not recorded, before the

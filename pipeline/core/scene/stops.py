@@ -12,7 +12,8 @@ from flexclear.pipeline.core.scene.laws import Value
 class Stop(Part):
     """Contact where a joint coordinate reaches an end; the coordinate's zero and sign are those of the joint.
 
-    lower, upper: the ends, one or both; angles go on beyond half a turn, from within half a turn of zero at the start.
+    lower, upper: the ends, one or both; angles continue beyond half a turn, from within half a turn of zero at the
+    start.
     normal: a normal law of contacts with its stiffness, of angles in N m and rad.  floor: least approach speed used as
     impact rate; without it 1e-6 rad/s, or of lengths that of contacts.  initial_approach_speed: of an end that the
     scene's start has passed; without it, such a start is refused.

@@ -81,7 +81,7 @@ class _GivenUpError(Exception):
 def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Result]]:
     """Meanwhile a thread does some work that is mostly compiled code; gives what waits for its result.
 
-    work: is given a progress to call now and then, and while it waits, which ends it when what goes on next to it has
+    work: is given a progress to call now and then, and while it waits, which ends it when what continues next to it has
     failed.  Where no processor is free, or no thread is to be had, it is done when its result is asked for.  What waits
     raises what the work raised.
     """

@@ -1,4 +1,4 @@
-"""Unfinished work of a task on disk, so that what was killed goes on where it was, to the last bit.
+"""Unfinished work of a task on disk, so that what was killed continues where it was, to the last bit.
 
 A task does its work in pieces, one integration each. A piece is named by all that decides it, so that a later
 attempt at the same task asks for the same pieces, in the same order; what it finds, it need not do again. Pieces lie
@@ -31,7 +31,7 @@ DIGEST = 64
 
 @dataclass(frozen=True)
 class State:
-    """What a piece needs to go on.
+    """What a piece needs to continue.
 
     arrays: by name.  notes: what JSON can say.  grown: rows that are only added to.  seconds: what it has taken so far.
     """

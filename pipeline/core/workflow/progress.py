@@ -139,7 +139,7 @@ class Monitor:
         return " ".join([*parts, *([job.text] if job.text else [])])
 
     def _pace(self, job: Job) -> float:
-        """Seconds per fraction; what goes on counts as soon as it is slower than what was before."""
+        """Seconds per fraction; what continues counts as soon as it is slower than what was before."""
         known = pace(job.samples)
         if job.since is None or job.fraction is None:
             return known

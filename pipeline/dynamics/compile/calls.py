@@ -18,7 +18,7 @@ from numba.extending import intrinsic
 import flexclear.pipeline.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.files import compiles, interpreted
-from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, looked_at
+from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, known_release
 
 _INTEGERS, _FLOATS, _PLACE = types.CPointer(types.int64), types.CPointer(types.float64), types.int64
 _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
@@ -58,7 +58,7 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 def exported(name: str) -> Callable[[Callable], int]:
     """Decorator: compiles a C function; its address."""
     options: dict[str, Any] = {"error_model": "numpy"}
-    if not INTERPRETED and looked_at():  # before anything is compiled: it spares Numba an import
+    if not INTERPRETED and known_release():  # before anything is compiled: it spares Numba an import
         options["pipeline_class"] = import_module("flexclear.pipeline.dynamics.lowering").WholeCompiler
     return compiles(cfunc(SIGNATURES[name], **options))
 

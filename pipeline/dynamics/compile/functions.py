@@ -50,7 +50,7 @@ ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
 #: in this order this process compiles, and in the opposite one the second, so that they meet in the middle; the last
 #: two have most kernels in common, which each process compiles once
 ORDER = ("advance", "project", "retract", "observe", "evaluate", SPECIALISED)
-#: what is called first when a run has come to its end: not waited for where the second process is at it
+#: what is called first when a run has come to its end: without waiting where the second process is at it
 LATE = "observe"
 #: where the code of kernels is, and what they number by
 CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.artifacts.event_kinds")

@@ -1,8 +1,8 @@
-"""Functions that run on stacks of their own, and stop in the middle to be gone on with later.
+"""Functions that run on stacks of their own, and stop in the middle to be continued later.
 
-A stepper that needs an evaluation is stopped there, and goes on when the evaluation has been made, next to those that
+A stepper that needs an evaluation is stopped there, and continues when the evaluation has been made, next to those that
 other steppers wait for (`compile.lanes`). It knows nothing of that: it calls the right-hand side by its address, and at
-that address there is `wait`. To stop is to store the registers that a function must leave as they were, and to go on
+that address there is `wait`. To stop is to store the registers that a function must leave as they were, and to continue
 with another stack: some nanoseconds.
 
 Each stack begins with a record; a function finds its own by its stack pointer, since stacks begin at multiples of their
@@ -29,7 +29,7 @@ SIZE = 1 << 20
 #: words of a record: stack pointers of the function and of who lets it run; its state; the arguments of the evaluation
 #: that it waits for (h, f, w, n, y, dy, t); its address and arguments (h, f, w, n, t, then nine integers and places)
 POINTER, BACK, STATE, GIVEN, TIME, FUNCTION, ARGUMENTS = 0, 1, 2, 3, 9, 10, 11
-#: states: it may go on, it waits for an evaluation, it has come back, there is none
+#: states: it may continue, it waits for an evaluation, it has come back, there is none
 READY, WAITING, DONE, IDLE = 0, 1, 2, 3
 #: where Linux reports on this process
 STATUS = Path("/proc/self/status")
@@ -56,7 +56,7 @@ _WAIT = [
     f"movq {8 * BACK}(%rax), %rsp",
     *_GO_ON,
 ]
-#: called with a record: its function goes on, and this returns when that waits or has come back
+#: called with a record: its function continues, and this returns when that waits or has come back
 _RESUME = [*_KEEP, f"movq %rsp, {8 * BACK}(%rdi)", f"movq {8 * POINTER}(%rdi), %rsp", *_GO_ON]
 #: where a function begins: a call with the arguments in its record
 _START = [
@@ -83,7 +83,7 @@ def supported() -> bool:
 
 
 def shadowed(status: Path) -> bool:
-    """Whether the processor keeps a second stack of return addresses, next to which no other stack may be gone on with.
+    """Whether the processor keeps a second stack of return addresses, next to which no other stack may be continued.
 
     status: the system's text about a process.
     """

@@ -9,7 +9,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
 
 
 def pieces(law: Repeated, dimension: str) -> Pieces:
-    """The inner law's first period, set down `times` times; the last one goes on as the inner law does.
+    """The inner law's first period, set down `times` times; the last one continues as the inner law does.
 
     ValueError when the inner law does not cover its first period.
     """

@@ -153,11 +153,11 @@ def _point(bench: Bench, rest: Equilibrium, small: Vibrations, axis: np.ndarray)
             own[list(model.numbering.modal_coordinates[i])] = turning[i]
     omega = np.array([own[int(np.argmax(e))] for e in energy.T])
     same = np.array([e[np.isclose(own, w)].sum() / e.sum() for e, w in zip(energy.T, omega, strict=True)])
-    translation, rotation, shares = motions(bench, rest, small.shape)
+    translation, rotation, fractions = motions(bench, rest, small.shape)
     sense = _sense(np.concatenate([translation, model.length * rotation], axis=1), axis)
     sense[same < MOST] = 0.0
-    parts = list(shares)
-    heaviest = np.argmax(np.stack([shares[name] for name in parts], axis=1), axis=1)
+    parts = list(fractions)
+    heaviest = np.argmax(np.stack([fractions[name] for name in parts], axis=1), axis=1)
     frames = equilibrium(bench, rest, True).frame_position.values
     return Point(small, omega, sense, heavy, [parts[k] for k in heaviest], frames)
 

@@ -10,14 +10,14 @@ import numpy as np
 from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.model import given_start
+from flexclear.pipeline.dynamics.model import fitting, given_start
 from flexclear.pipeline.dynamics.model.chain import path_positions
 from flexclear.pipeline.dynamics.model.closing import EXACT, close, far_apart, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands
 from flexclear.pipeline.dynamics.model.deformation import start_place
 from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.laws import NONE
-from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
+from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.placing import assemblies, chosen
 from flexclear.pipeline.dynamics.model.start_table import Given, given_coordinates
@@ -58,6 +58,9 @@ def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mecha
     if mechanism.has_paths or not (mechanism.all_rigid or asked):
         return settled(mechanism, poses)
     closed = close(mechanism, joints, poses)
+    if closed is None and (scene := fitting.fitted(mechanism, joints, poses)) is not None:
+        fits = assembled(build(scene, {}), given)
+        return replace(fits, choice=" ".join([fitting.changed(mechanism.scene, scene), fits.choice]).strip())
     if closed is None and mechanism.all_rigid:
         _refuse_drives(mechanism, joints, poses)
         raise _impossible(mechanism, joints, poses)
@@ -122,7 +125,7 @@ def chain_positions(mechanism: Mechanism, link: Link, poses: Sequence[Placement]
 
 
 def residuals(joints: list[Constraint], poses: Sequence[Placement]) -> dict[str, float]:
-    """Largest residual per joint [m, or the sine of an angle], drives not looked at."""
+    """Largest residual per joint [m, or the sine of an angle], without drives."""
     worst = {}
     for joint in joints:
         values, _ = demands(joint.edge.kind, *joint.frames(poses))

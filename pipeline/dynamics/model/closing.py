@@ -62,11 +62,16 @@ class Misfit:
 
 
 def close(
-    mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement], still: Collection[int] = ()
+    mechanism: Mechanism,
+    joints: list[Constraint],
+    poses: Sequence[Placement],
+    still: Collection[int] = (),
+    within: float = 0.0,
 ) -> list[Placement] | None:
     """Poses nearby, in the metric of the mass, in which all joints fit; None when there are none.
 
-    still: links that are not moved.
+    still: links that are not moved.  within: largest residual with which they fit, in units of the mechanism's size;
+    by default what rounding leaves.
 
     Levenberg-Marquardt with the damping |r|, which converges quadratically also where joints ask for the
     same thing twice (Yamashita & Fukushima 2001, Computing Suppl. 15, 239-249).
@@ -95,7 +100,7 @@ def close(
             damping *= 10.0
         if now.worst <= exact or damping > 1e12:
             break
-    return here if now.worst <= closed else None
+    return here if now.worst <= max(closed, within) else None
 
 
 def _rounding(mechanism: Mechanism) -> float:

@@ -72,7 +72,7 @@ def misses(
 ) -> list[Miss]:
     """Starts of coordinates against the poses that the scene gives; a body without a pose contradicts nothing.
 
-    given: laws that replace the scene's; they were made for these poses and are not looked at.
+    given: laws that replace the scene's; they were made for these poses and are not examined.
     """
     placed = given_links(mechanism)
     driven = [joint for joint in joints if joint.values and {joint.link_a, joint.link_b} <= placed]

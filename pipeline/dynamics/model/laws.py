@@ -32,7 +32,7 @@ def drive_laws(scene: Scene, given: Mapping[str, Pieces]) -> list[Pieces]:
             raise InputError(
                 one.place,
                 f"the {broken[1]} of the prescribed motion jumps at {broken[0]:.6g} s",
-                "let value and rate go on without a jump; the second derivative may have one",
+                "let value and rate continue without a jump; the second derivative may have one",
             )
         laws.append(law)
     return laws

@@ -154,7 +154,7 @@ class Mechanism:
     components: its parts that fraction no force.
     start_residual: largest residual of a joint or drive in the poses that the scene gives [m, rad or a sine].
     placed: frames of all links as the scene gives them, before joints and drives are made to fit.
-    choice: which of several ways it was assembled in, in words; empty where there is one, or the scene chooses.
+    choice: which of several ways it was assembled in, and frames moved for that, in words; empty without these.
     deformation: modal coordinates at the start of the flexible links to which the scene gives some.
     """
 

@@ -46,7 +46,7 @@ class Mobility:
 
     rank: independent closure rows of `rows`; those of poses nearby where the start is singular.
     redundant_joints: joints whose reaction the equations of motion of rigid bodies do not determine.
-    singular_start: of a start in a singular pose, where it is and why it cannot go on by itself, in words.
+    singular_start: of a start in a singular pose, where it is and why it cannot continue by itself, in words.
     """
 
     coordinates: int
@@ -77,7 +77,7 @@ class Mobility:
         """In words, for the user."""
         says = "condition follows" if self.redundant == 1 else "conditions follow"
         more = f", {self.redundant} closure {says} from the others" if self.redundant else ""
-        return f"mobility {self.mobility}{more}"
+        return f"free motions besides the drives: {self.mobility}{more}"
 
 
 def analyse(model: Model) -> Mobility:
@@ -141,7 +141,7 @@ def _singular_start(model: Model, here: Rates) -> str:
     ratio = values[0] / max(values[min(here.rank, len(values) - 1)], values[0] / INFINITE, 1.0 / INFINITE)
     return (
         f"at t = {model.scene.time.start:.6g} s: the mechanism starts in a singular pose, where its "
-        f"loops (closed at joints {', '.join(names)}) can go on in several ways (condition number {ratio:.3g})"
+        f"loops (closed at joints {', '.join(names)}) can continue in several ways (condition number {ratio:.3g})"
     )
 
 

@@ -2,7 +2,7 @@
 
 Loops of a planar mechanism in space, or Bricard's, ask for the same thing several times. Their
 multipliers are then not unique and J M^-1 J^T is singular, though the motion is as determined as
-ever. A selection keeps as many rows as the rank says; the others are only looked at.
+ever. A selection keeps as many rows as the rank says; the others are only observed.
 """
 
 from __future__ import annotations

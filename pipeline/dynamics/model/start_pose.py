@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.model.stops import STOP
 if TYPE_CHECKING:
     import xarray as xr
 
-#: residuals below these are rounding of a closed mechanism: a share of its size, and an angle [rad]
+#: residuals below these are rounding of a closed mechanism: a fraction of its size, and an angle [rad]
 CLOSED, STRAIGHT = 1e-8, 1e-7
 
 
@@ -83,7 +83,7 @@ def _open(mechanism: Mechanism) -> Mechanism:
 
 
 def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Placement]) -> list[Gap]:
-    found = []
+    result = []
     for joint in joints:
         A, B = joint.frames(poses)
         parts = [demands(joint.edge.kind, A, B), prescribed(joint.edge.kind, A, B, joint.values)]
@@ -96,13 +96,13 @@ def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Pl
                     turned = max(turned, float(abs(value)))
         if np.linalg.norm(away) > CLOSED * mechanism.length or turned > STRAIGHT:
             end = B.p + mechanism.origin
-            found.append(Gap(joint.name, end - away, end, turned))
-    return found
+            result.append(Gap(joint.name, end - away, end, turned))
+    return result
 
 
 def _loose(mechanism: Mechanism) -> list[Gap]:
     """Balls and pins that start outside of their sockets."""
-    found = []
+    result = []
     for contact in mechanism.contacts:
         if contact.joint.type in (STOP, "ball-on-plane", "clearance-slot"):
             continue
@@ -112,8 +112,8 @@ def _loose(mechanism: Mechanism) -> list[Gap]:
             away = away - (away @ outer.R[:, 2]) * outer.R[:, 2]
         if np.linalg.norm(away) > 2.0 * contact.joint.clearance:
             end = inner.p + mechanism.origin
-            found.append(Gap(contact.name, end - away, end, 0.0))
-    return found
+            result.append(Gap(contact.name, end - away, end, 0.0))
+    return result
 
 
 def _data(mechanism: Mechanism, drawn: Mapping[str, xr.Dataset]) -> xr.Dataset:
@@ -162,11 +162,11 @@ def _pose(mechanism: Mechanism, body: str) -> Placement:
 
 def _coordinates(mechanism: Mechanism) -> list[tuple[str, float]]:
     """Names of joint coordinates, as records call them, and where they are [m or rad]."""
-    poses, found = [link.start for link in mechanism.links], list[tuple[str, float]]()
+    poses, result = [link.start for link in mechanism.links], list[tuple[str, float]]()
     for joint in constraints(mechanism):
         A, B = joint.frames(poses)
         declared, relative = joint_class(joint.edge.kind), A.inverse().of(B)
         now, names = declared.coordinates(relative.R, relative.p), [one.name for one in declared.COORDINATES]
         labels = [joint.name] if len(names) == 1 else [f"{joint.name}.{name}" for name in names]
-        found += [(label, float(value)) for label, value in zip(labels, now, strict=False)]
-    return found
+        result += [(label, float(value)) for label, value in zip(labels, now, strict=False)]
+    return result

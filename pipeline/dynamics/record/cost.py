@@ -53,7 +53,7 @@ def measure(
     checked: bool = True,
     brief: bool = False,
 ) -> Cost:
-    """The cost of a scene's run, its code fetched before; the scene's `[accuracy]` is not looked at.
+    """The cost of a scene's run, its code fetched before; the scene's `[accuracy]` is not examined.
 
     checked: whether a run whose energy ledger does not close is refused, as every run is.
     brief: whether the perturbed run of a scene with contacts and repeats of the record are left out; the first run is

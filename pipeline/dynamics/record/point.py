@@ -117,7 +117,7 @@ class Runner:
         return means, {name: values.std(axis=0, ddof=1) for name, values in stacked.items()}, count
 
     def _engines(self, scene: Scene) -> tuple[Engine, Callable[[str], Engine]]:
-        """What runs a point, and the maker of what goes on with another integrator; made one at a time."""
+        """What runs a point, and the maker of what continues with another integrator; made one at a time."""
         with self._making:
             engine, other = engines_alike(self.engine, scene, self.bundles)
             self.engine = self.engine or engine
@@ -138,7 +138,7 @@ class Runner:
 
 
 def in_sections(recorded: Sequence[Recorded]) -> bool:
-    """Whether points are motions that their laws repeat, looked at once in each period."""
+    """Whether points are motions that their laws repeat, sampled once in each period."""
     return any(one.reduction == "sections" for one in recorded)
 
 
@@ -181,14 +181,14 @@ def _sections(engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> 
     requested, period = scene.sections or Sections(), section_period(scene)
     start, parts = consistent_start(engine), stretches(engine, period, requested.phase)
     require_periodic(parts, start)
-    looked_at = next(k for k, part in enumerate(parts) if part.start == engine.start + requested.phase)
+    sampled_at = next(k for k, part in enumerate(parts) if part.start == engine.start + requested.phase)
     values, evaluations = dict[str, list[np.ndarray]](), 0
     for done in periods(parts, start, range(0), Cursor()):
         alive(None, f"period {done.number}")
         evaluations += sum(trajectory.counters["evaluations"] for trajectory in done.parts)
         if done.number >= requested.transient:
-            here = done.parts[looked_at]
-            motions = Motions(engine.model, observed(parts[looked_at], replace(here, rows=here.rows[:1])))
+            here = done.parts[sampled_at]
+            motions = Motions(engine.model, observed(parts[sampled_at], replace(here, rows=here.rows[:1])))
             for one in recorded:
                 values.setdefault(one.name, []).append(_series(motions, {}, one)[0])
         if done.number + 1 == requested.transient + requested.periods:

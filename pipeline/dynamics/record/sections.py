@@ -37,7 +37,7 @@ Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     """Sections of a scene whose laws repeat (schema SECTIONS).
 
-    Raises InputError for laws that do not repeat, SolverError when the run cannot go on.
+    Raises InputError for laws that do not repeat, SolverError when the run cannot continue.
     """
     requested = scene.sections or Sections()
     for name, load in scene.load.items():
@@ -124,7 +124,7 @@ class _Recorder:
         return _Recorder(current, name, begun, current.find(name))
 
     def keep(self, arrays: Mapping[str, np.ndarray], tape: _Tape) -> None:
-        """From here on the work can go on without the pieces that led here; the tape is as it is until the next."""
+        """From here on the work can continue without the pieces that led here; the tape is as it is until the next."""
         seconds = journal.seconds() - self.begun
         self.journal.cover(self.name, lambda: State({**arrays, **tape.packed()}, {}, np.zeros(0), seconds))
 

@@ -16,7 +16,7 @@ Series = tuple[np.ndarray, np.ndarray, np.ndarray]  #: coordinate, rate and seco
 
 
 def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
-    """By ``joint`` or, where it has several, ``joint.coordinate``; angles go on beyond half a turn."""
+    """By ``joint`` or, where it has several, ``joint.coordinate``; angles continue beyond half a turn."""
     series: dict[str, Series] = {}
     for i, link in enumerate(model.links):
         edge = link.branch.edge

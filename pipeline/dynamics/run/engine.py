@@ -201,7 +201,8 @@ class Engine:
 
 
 def prepare(model: Model, progress: Progress) -> Engine:
-    """The engine of a model, its kernels compiled or fetched from disk; SolverError for a start that cannot go on."""
+    """The engine of a model, its kernels compiled or fetched from disk; SolverError for a start that cannot
+    continue."""
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
     if mobility.singular_start and not may_start_singular(model):

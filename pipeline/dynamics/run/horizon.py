@@ -123,7 +123,7 @@ class Pair:
         return PerturbedRun(time, separation, engine.end if horizon is None else horizon)
 
     def _hear(self, rows: np.ndarray) -> bool:
-        """Note the rows that the run has so far; it goes on."""
+        """Note the rows that the run has so far; it continues."""
         with self._news:
             self._run.rows = rows
             self._news.notify_all()

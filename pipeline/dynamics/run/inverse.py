@@ -134,7 +134,7 @@ def _enough(engine: Engine, scene: Scene, requested: Mapping[str, PathDrive], na
     free = null_space(_closure_jacobian(engine), rcond=RANK)
     known = [k for k, name in enumerate(drives) if name.partition(".")[0] in requested]
     held = [k for k in range(len(drives)) if k not in known]
-    if held:  # other drives go on as they do
+    if held:  # other drives continue as they do
         free = free @ null_space(free[[nv + k for k in held]], rcond=RANK)
     of_path = free[[nv + k for k in known]]
     of_actuators = np.array([_rate(engine, scene, name) @ free for name in names])

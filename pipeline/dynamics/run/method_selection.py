@@ -148,7 +148,7 @@ class Suit:
         return min(self.possible(rtol), key=lambda name: self.cost(name, rtol))
 
     def heir(self, name: str, rtol: float) -> tuple[str, float]:
-        """What goes on where an integrator is too dear, if any, and what that one is foreseen to take."""
+        """What continues where an integrator is too dear, if any, and what that one is foreseen to take."""
         others = [
             one
             for one in self.names

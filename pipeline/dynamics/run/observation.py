@@ -24,7 +24,8 @@ CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
 #: first distance in time from a singular pose, as fraction of the polynomial over it, its factor from try to try, and
 #: how many tries there are
 NEAREST, WIDER, TRIES = 1e-4, 2.0, 11
-#: where it is looked, in units of the distance, and the weights there of the limit between: exact for quintics
+#: where the state is evaluated, in units of the distance, and the weights there of the limit between: exact for
+#: quintics
 SIDES, WEIGHTS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([1.0, -6.0, 15.0, 15.0, -6.0, 1.0]) / 20.0
 
 

@@ -1,6 +1,6 @@
 """A motion followed period after period, and a neighbour that shows at what rate such motions part.
 
-The laws of one period hold in each, so that the run's time starts over while its state goes on: memory does not grow
+The laws of one period hold in each, so that the run's time starts over while its state continues: memory does not grow
 with the number of periods, and neither does the rounding of the time. The neighbour starts a small distance away and is
 brought back to that distance, in its own direction, at every waypoint; the mean of the logarithms of what it went
 astray in between is the largest Lyapunov exponent. It is a motion like any other, so that what impacts do to it, which
@@ -40,7 +40,7 @@ SAME = 1e-6
 
 @dataclass(frozen=True)
 class Moment:
-    """All that goes on from one stretch of time to the next.
+    """All that continues from one stretch of time to the next.
 
     y: state.  modes, latched, watched: of the contacts, as in the work space.  begun: events of the contacts that are
     closed, as rows of the event table.
@@ -144,8 +144,8 @@ def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) 
     """Period after period from a consistent start y, for ever.
 
     parts: stretches of a period.  followed: numbers of the periods in which a neighbour is followed.
-    begin: from where it goes on.
-    Raises SolverError where the run cannot go on.
+    begin: from where it continues.
+    Raises SolverError where the run cannot continue.
     """
     period = parts[-1].end - parts[0].start
     scales = state_scales(parts[0], period)

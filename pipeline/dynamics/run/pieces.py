@@ -1,7 +1,7 @@
 """An integration as a piece of work in the task's journal: all that its stepper has, as arrays.
 
 The work space, the wiring with the rows solved for, the integers and the record are all that steps depend on, whatever
-the method keeps there; so an integration that goes on from them is the same to the last bit.
+the method keeps there; so an integration that continues from them is the same to the last bit.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Tape:
     """The arrays of one integration; rows and events may be replaced by larger ones.
 
     doubted: flexible bodies of which has been said that they left the range of their modes.
-    looks: where the run was when its pace was looked at, and where it began.
+    looks: where the run was when its pace was examined, and where it began.
     """
 
     outputs: np.ndarray
@@ -107,7 +107,7 @@ class Piece:
                 self.journal.finish(self.name, self._state(tape, done=True))
 
     def _state(self, tape: Tape, *, done: bool) -> State:
-        """All that the integration goes on from, copied; record and events may be written over by nobody else."""
+        """All that the integration continues from, copied; record and events may be written over by nobody else."""
         n, arrays = self.engine.n, memory(self.engine)
         arrays["events"] = tape.events[: n[m.N_EVENTS]].copy()
         arrays["selections"] = np.array([rows for _, rows in tape.selections])
@@ -205,7 +205,7 @@ def _described(scene: Scene) -> str:
 
 
 def _arrays(left: Handover | None) -> Iterator[np.ndarray]:
-    """What decides how another method goes on; nothing of how singular poses were passed before does."""
+    """What decides how another method continues; nothing of how singular poses were passed before does."""
     if left is None:
         return
     yield from (left.y, left.modes, left.latched, left.watched, left.counters, left.lasting, left.rows, left.events)

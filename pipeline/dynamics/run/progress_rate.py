@@ -1,4 +1,4 @@
-"""Whether a run gets on, and who decides that another method goes on with it."""
+"""Whether a run gets on, and who decides that another method continues with it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TRIAL, HOPELESS = 400_000, 10_000_000
 
 
 class Look(NamedTuple):
-    """Where a run was when it was looked at: time [s], and counts of evaluations, steps and steps that were stiff."""
+    """Where a run was when it was examined: time [s], and counts of evaluations, steps and steps that were stiff."""
 
     time: float
     evaluations: int
@@ -26,7 +26,7 @@ class Look(NamedTuple):
 
 @dataclass(frozen=True)
 class Judge:
-    """Who looks at a run now and then, whether another method should go on with it.
+    """Who looks at a run now and then, whether another method should continue with it.
 
     every: evaluations between two looks.  verdict: why another one should, or nothing; given the looks so far, too, of
     which the first is where the method began and the last the present one.
@@ -36,7 +36,7 @@ class Judge:
     verdict: Callable[[Engine, Sequence[Look]], str]
 
 
-#: by integrator, who looks at its run, and which one goes on if not
+#: by integrator, who judges its run, and which one continues if not
 Panel = Mapping[str, tuple[Judge, str]]
 
 

@@ -96,7 +96,7 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
 def rest(t: float, where: str) -> str:
     """A rest in a singular pose, in words."""
     return (
-        f"at t = {t:.6g} s: the mechanism comes to rest in a singular pose ({where}), where it can go on in several "
+        f"at t = {t:.6g} s: the mechanism comes to rest in a singular pose ({where}), where it can continue in several "
         "ways and no motion chooses one: let it pass the pose at speed, or stop elsewhere"
     )
 
@@ -118,7 +118,7 @@ def _too_fast(engine: Engine, t: float, where: str) -> str:
     if not causes:
         return ""
     return (
-        f"at t = {t:.6g} s: the mechanism passes a singular pose ({where}), where it can go on in several ways, and "
+        f"at t = {t:.6g} s: the mechanism passes a singular pose ({where}), where it can continue in several ways, and "
         f"{' and '.join(causes)} is too fast there for its branch to be determined: {', or '.join(remedies)}"
     )
 

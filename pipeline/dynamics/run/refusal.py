@@ -1,4 +1,4 @@
-"""Why a run does not go on, in words that say what to do about it."""
+"""Why a run does not continue, in words that say what to do about it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def text(engine: Engine, rows: np.ndarray) -> str:
     fixed = f"{control[m.FIXED]:.2g} s"
     too_long = f"the fixed step of {fixed} is too long for it, or " if control[m.FIXED] else ""
     unsolvable = (
-        f"the loops cannot be closed: {too_long}a singular pose in which they can go on in several ways ({where})"
+        f"the loops cannot be closed: {too_long}a singular pose in which they can continue in several ways ({where})"
     )
     if not engine.model.closures:
         unsolvable = f"the equations cannot be solved here: {too_long}the motion has grown beyond bounds"
@@ -55,7 +55,7 @@ def text(engine: Engine, rows: np.ndarray) -> str:
         "times, a softer contact or more damping separates them",
         m.STEPPED_OVER: f"the contact of {culprit} began unseen within a step: a smaller rtol or a shorter "
         "step finds it",
-        m.AT_SINGULAR: "the motion does not get away from a singular pose, where it can go on in several ways "
+        m.AT_SINGULAR: "the motion does not get away from a singular pose, where it can continue in several ways "
         f"({where}): let it pass the pose at speed, or stop elsewhere",
         m.LOST_CLOSURE: unsolvable,
     }

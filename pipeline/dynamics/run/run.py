@@ -102,7 +102,7 @@ def begun(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -
 def engines(
     scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 ) -> tuple[Engine, Callable[[str], Engine]]:
-    """The engine of a run, and the maker of one that goes on with another integrator, given by its name."""
+    """The engine of a run, and the maker of one that continues with another integrator, given by its name."""
     made = _maker(scene, bundles, progress)
     return made("", progress), cache(lambda name: made(name, progress))
 
@@ -111,7 +111,7 @@ def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
     """What makes the engine of a run by an integrator's name, that of the scene's own by none; it reports progress."""
     posed, choice = begun(scene, bundles, progress)
     moved, given = driven(posed, bundles, progress)
-    making = Lock()  # a run and its perturbed run may both go on with another integrator
+    making = Lock()  # a run and its perturbed run may both continue with another integrator
 
     def made(name: str, tell: Progress) -> Engine:
         requested = edited(moved, {"solver.integrator": name}) if name else moved
@@ -132,10 +132,10 @@ def integrate(
 ) -> Run:
     """Build, start, integrate and observe a scene; actuators that shall produce a path are driven as it demands.
 
-    bundles: reduced flexible bodies by name.  judges: who looks whether another integrator shall go on; without them
+    bundles: reduced flexible bodies by name.  judges: who looks whether another integrator shall continue; without them
     the explicit ones hand over where they would crawl.  The perturbed run of a scene with contacts is stepped
     concurrently where a processor is free.  Raises InputError for a scene that cannot be built, SolverError when the
-    run cannot go on, StoppedError with the run so far as `partial` when it is asked to stop.
+    run cannot continue, StoppedError with the run so far as `partial` when it is asked to stop.
     """
     made = _maker(scene, bundles, progress)
     engine = made("", progress)

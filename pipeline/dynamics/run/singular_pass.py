@@ -53,7 +53,7 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
     """Leave a polynomial ready for the stepper, over the singular pose ahead of it or out of one; and what it passes.
 
     Where there is none yet, the stepper's memory says how close to the pose it shall go before it asks again, or that
-    it shall go on by itself.  SolverError when the mechanism comes to rest in the pose.
+    it shall continue by itself.  SolverError when the mechanism comes to rest in the pose.
     """
     control = engine.control
     t, y = float(control[m.TIME]), engine.view(m.Y).copy()

@@ -29,7 +29,7 @@ from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring, wiring
 
-#: evaluations of one run after which it goes on so: those that it has taken cost what the code takes to make
+#: evaluations of one run after which it continues so: those that it has taken cost what the code takes to make
 MANY = 1_000_000
 #: selections of closure rows for which it is made, of one integration
 SELECTIONS = 4
@@ -43,7 +43,7 @@ _known: dict[tuple[Parts, Wiring, int], int] = {}
 def settle(engine: Engine, progress: Progress) -> None:
     """Let the steps from here on evaluate with what this integration calls for.
 
-    That is reported by the engine and its count of evaluations, so an integration that was interrupted goes on as it
+    That is reported by the engine and its count of evaluations, so an integration that was interrupted continues as it
     would.
     """
     engine.straight.used = engine.straight.requested or bool(engine.n[m.EVALUATIONS] >= MANY)
@@ -87,7 +87,7 @@ def suited(engine: Engine) -> bool:
 def _make(engine: Engine, progress: Progress) -> None:
     """Code for the engine's wiring and the closure rows that its selection keeps, unless that would be no faster.
 
-    An integration that goes on in another process needs that of the rows which it has met before, too.
+    An integration that continues in another process needs that of the rows which it has met before, too.
     """
     straight, rows_of_engine = engine.straight, engine.selected.tobytes()
     if not suited(engine):

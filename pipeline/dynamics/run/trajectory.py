@@ -34,7 +34,7 @@ EVENT_ROWS = 4096
 STALLED = (m.STEP_TOO_SMALL, m.NO_START, m.LOST_CLOSURE)
 #: why it stops that a polynomial over a singular pose may mend
 STOPPED = (*STALLED, m.NO_CONVERGENCE, m.AT_SINGULAR)
-#: control floats of a method that another one goes on with
+#: control floats of a method that another one continues with
 LASTING = [m.TIME, m.DRIFT, m.RATE_DRIFT, m.STEEPEST]
 
 Stop = Callable[[np.ndarray], bool]
@@ -100,7 +100,7 @@ Followed = tuple[Engine, Trajectory, str]
 
 
 class StiffError(SolverError):
-    """An explicit method crawls along at the limit of its stability; an implicit one may go on in long steps."""
+    """An explicit method crawls along at the limit of its stability; an implicit one may continue in long steps."""
 
     def __init__(self, text: str, handover: Handover) -> None:
         super().__init__(text)
@@ -129,10 +129,10 @@ def integrate(
 
     stop: asked now and then with the rows recorded so far, whether they are enough; also of what an earlier attempt has
         left.
-    left: what another method left of this run; it is gone on with from there.
+    left: what another method left of this run; it is continued from there.
     outputs: times of output [s], the start first; the scene's where there are none.
-    judge: whether another method goes on; by default where this one is explicit and would take far too long.
-    Where the task keeps a journal, what an earlier attempt left there is gone on with.  Raises StoppedError, with the
+    judge: whether another method continues; by default where this one is explicit and would take far too long.
+    Where the task keeps a journal, what an earlier attempt left there is continued.  Raises StoppedError, with the
     engine and the trajectory so far as `partial` if there is any, when the work is asked to stop.
     """
     judge = judge or Judge(SLICE, crawls)
@@ -258,7 +258,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
 
 
 def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
-    """Choose the closure rows in a state, from which the integration goes on; a copy of the choice."""
+    """Choose the closure rows in a state, from which the integration continues; a copy of the choice."""
     ratio = singular.select_rows(engine, y, t)
     engine.view(m.Y)[:] = y
     engine.view(m.PIVOT)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
@@ -376,7 +376,7 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
 
 
 def _rescued(engine: Engine, tape: Tape) -> bool:
-    """Whether a stepper that cannot go on has got a polynomial: the singular pose ahead may be what stopped it."""
+    """Whether a stepper that cannot continue has got a polynomial: the singular pose ahead may be what stopped it."""
     control, status = engine.control, engine.n[m.STATUS]
     if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
         return False

@@ -92,8 +92,8 @@ def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
     with style.style():
         made, axes = style.grid(1, 1, (6.4, 3.6))
         panel = axes[0, 0]
-        for method, found in by_method.items():
-            shown = sorted((c.seconds, c.error) for c in found if np.isfinite(c.error) and c.error > 0.0)
+        for method, result in by_method.items():
+            shown = sorted((c.seconds, c.error) for c in result if np.isfinite(c.error) and c.error > 0.0)
             color, mark = LOOKS.get(method, ("#6b6b6b", "x"))
             panel.plot(*np.array(shown).reshape(-1, 2).T, mark, color=color, ls="-", lw=1.0, ms=5, label=method)
         _, error = _worst(study)

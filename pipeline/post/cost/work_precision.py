@@ -124,7 +124,7 @@ def _panel(
     for m in marks:
         if np.isfinite(m.error.get(name, np.nan)):
             ax.plot(m.seconds, m.error[name], "*", color=INK, markersize=9, zorder=5)
-            # to the side where the panel goes on
+            # to the side where the panel continues
             side, shift = ("right", -4) if m.seconds > 0.5 * np.nanmax(seconds) else ("left", 4)
             ax.annotate(
                 m.name, (m.seconds, m.error[name]), xytext=(shift, 4), textcoords="offset points", fontsize=6.8, ha=side

@@ -304,7 +304,7 @@ def _enlarged(data: Data) -> Outcome:
 
 
 def _costs(*models: Model) -> Callable[[Data], Outcome]:
-    """Whether costs over the ideal model's are the paper's, by each way in which Table 10 tells them."""
+    """Whether costs over the ideal model's are the paper's, by each way in which Table 10 gives them."""
 
     def outcome(data: Data) -> Outcome:
         tests, words = [], []

@@ -70,7 +70,7 @@ def _effects(compared: xr.Dataset) -> list[str]:
             text = f"does not change: the runs agree to <b class='n'>{measured(difference + error, np.nan, unit)}</b>"
         elif np.isfinite(error) and difference < DISTINGUISHED * error:
             text = (
-                f"the runs are not exact enough to tell an effect: their difference ({value}) is less "
+                f"the runs are not exact enough to show an effect: their difference ({value}) is less "
                 f"than {DISTINGUISHED:g} times their errors together"
             )
         elif np.isfinite(fraction) and fraction < SLIGHT:

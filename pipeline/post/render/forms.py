@@ -1,7 +1,7 @@
 """What a rigid body looks like: bars, plates and blocks between the joints that it has.
 
 Mass and inertia say little about a shape: the uniform cylinder with the inertia of a crank is a drum that hides the
-mechanism. So bodies are drawn as links between their joints, and the inertia only tells the thickness of slender bars,
+mechanism. So bodies are drawn as links between their joints, and the inertia only gives the thickness of slender bars,
 the radius of discs, and the size of what has no joint.
 """
 

@@ -30,7 +30,7 @@ BALL, PIN, RAIL = 0.022, 0.011, 0.008
 SOCKET = 1.3
 #: size of what has none: one body that rests [m]
 LONE = 1.0
-#: outputs at which is looked how far a mechanism reaches
+#: outputs at which the program measures how far a mechanism reaches
 SAMPLES = 24
 _CORNERS = np.array([[k & 1, k & 2, k & 4] for k in range(8)], dtype=bool)
 #: largest drawn deformation as a fraction of the body's length

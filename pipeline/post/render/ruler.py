@@ -15,21 +15,21 @@ LONGEST = 190.0
 def project(drawn: Mechanism, points: np.ndarray, size: tuple[int, int], margin: int = 0) -> np.ndarray:
     """Pixels (across, down) of points of the world (n, 3) in a picture as of `film.still`, shape (n, 2)."""
     width, height = size
-    place, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
-    near = (place - focus) / np.linalg.norm(place - focus)
-    right = np.cross(drawn.view.up, near)
+    where, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
+    close = (where - focus) / np.linalg.norm(where - focus)
+    right = np.cross(drawn.view.up, close)
     right /= np.linalg.norm(right)
-    local = (points - place) @ np.column_stack([right, np.cross(near, right), -near])
+    local = (points - where) @ np.column_stack([right, np.cross(close, right), -close])
     scale = 0.5 * height / np.tan(0.5 * np.radians(ANGLE)) / local[:, 2]
-    found: np.ndarray = np.column_stack([0.5 * width + scale * local[:, 0], 0.5 * height - scale * local[:, 1]])
-    return found
+    result: np.ndarray = np.column_stack([0.5 * width + scale * local[:, 0], 0.5 * height - scale * local[:, 1]])
+    return result
 
 
 def pixels_per_metre(drawn: Mechanism, size: tuple[int, int], margin: int = 0) -> float:
-    """In the plane through the point that is looked at, across the line of sight."""
+    """In the plane through the point that is examined, across the line of sight."""
     width, height = size
-    place, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
-    return float(0.5 * height / np.tan(0.5 * np.radians(ANGLE)) / np.linalg.norm(place - focus))
+    where, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
+    return float(0.5 * height / np.tan(0.5 * np.radians(ANGLE)) / np.linalg.norm(where - focus))
 
 
 def round_length(most: float) -> float:

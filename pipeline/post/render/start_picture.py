@@ -47,13 +47,13 @@ def columns(points: np.ndarray, room: int) -> tuple[list[int], list[int]]:
 
     points: of the names in the picture, shape (n, 2), those that matter most first.
     """
-    kept = list(range(min(len(points), 2 * room)))
-    across = sorted(kept, key=lambda k: (points[k, 0], k))
-    half = (len(kept) + 1) // 2
+    recorded = list(range(min(len(points), 2 * room)))
+    across = sorted(recorded, key=lambda k: (points[k, 0], k))
+    half = (len(recorded) + 1) // 2
     middle = 0.5 * SIZE[0]
     # as many on either side as have room; a few more on one where they are
-    count = int(np.clip(sum(points[k, 0] < middle for k in kept), len(kept) - room, room))
-    count = count if abs(count - half) <= 0.25 * len(kept) else half
+    count = int(np.clip(sum(points[k, 0] < middle for k in recorded), len(recorded) - room, room))
+    count = count if abs(count - half) <= 0.25 * len(recorded) else half
     sides = across[:count], across[count:]
     return sorted(sides[0], key=lambda k: points[k, 1]), sorted(sides[1], key=lambda k: points[k, 1])
 
@@ -78,16 +78,16 @@ def _columns(axes: style.Axes, marks: Sequence[Mark], points: np.ndarray) -> int
     return sum(map(len, sides))
 
 
-def heights(wanted: np.ndarray, line: float, top: float, bottom: float) -> np.ndarray:
-    """Heights as near to those that are wanted (ascending) as lines of this height leave room; shape (n,)."""
-    found = np.array(wanted, dtype=float)
-    for k in range(len(found)):
-        found[k] = max(found[k], top + 0.5 * line if k == 0 else found[k - 1] + line)
+def heights(requested: np.ndarray, line: float, top: float, bottom: float) -> np.ndarray:
+    """Heights as near to those that are requested (ascending) as lines of this height leave room; shape (n,)."""
+    result = np.array(requested, dtype=float)
+    for k in range(len(result)):
+        result[k] = max(result[k], top + 0.5 * line if k == 0 else result[k - 1] + line)
     limit = bottom - 0.5 * line
-    for k in reversed(range(len(found))):
-        found[k] = min(found[k], limit)
-        limit = found[k] - line
-    return found
+    for k in reversed(range(len(result))):
+        result[k] = min(result[k], limit)
+        limit = result[k] - line
+    return result
 
 
 def _directions(axes: style.Axes, drawn: Mechanism, gravity: np.ndarray) -> None:

@@ -33,7 +33,7 @@ from flexclear.pipeline.post.series import parameters
 
 BODY, JOINT, FRAME, DRIVE, LOAD = "#1f2937", "#3b4754", "#6b7280", "#0072B2", "#7a4a00"
 CLEARANCE, GAP = "#a35f00", "#c4161c"
-#: as shares of the mechanism's size: half length of a drawn axis, its thickness, radius of a drive's arrow, of a gap
+#: as fractions of the mechanism's size: half length of a drawn axis, its thickness, radius of a drive's arrow, of a gap
 AXIS, THIN, ARC, THICK = 0.055, 0.0016, 0.035, 0.004
 #: axes of joints that differ by less are parallel [-]
 PARALLEL = 1e-3
@@ -81,11 +81,11 @@ def start_view(
     run: xr.Dataset, bundles: Mapping[str, xr.Dataset], gaps: Sequence[Missing], looks: Looks | None = None
 ) -> StartView:
     """The view of a start; gaps: of joints that do not fit."""
-    told, drawn = parameters(run), mechanism(run, bundles, looks)
-    joints = dict(_joints(run, told, bundles))
-    normal = _normal(told, joints)
+    text, drawn = parameters(run), mechanism(run, bundles, looks)
+    joints = dict(_joints(run, text, bundles))
+    normal = _normal(text, joints)
     if normal is not None and drawn.looks.direction is None:
-        drawn = replace(drawn, view=flat(normal, told, drawn.looks.up))
+        drawn = replace(drawn, view=flat(normal, text, drawn.looks.up))
     # with red lines to be seen inside of them
     opacity = 0.4 if gaps else 1.0
     solid = [
@@ -93,11 +93,11 @@ def start_view(
         *(_still(body, opacity) for body in drawn.flexible),
     ]
     drawn = replace(drawn, parts=tuple(solid), flexible=())
-    extra = [Part(None, surface, color) for surface, color in _lines(told, joints, gaps, drawn.size)]
-    marked = list(_marks(run, drawn, told, joints, gaps))
+    extra = [Part(None, surface, color) for surface, color in _lines(text, joints, gaps, drawn.size)]
+    marked = list(_marks(run, drawn, text, joints, gaps))
     cloud = np.concatenate([drawn.cloud, *(part.surface.points for part in extra), *([m.point] for m in marked)])
     drawn = replace(drawn, parts=(*drawn.parts, *extra), cloud=cloud)
-    return StartView(drawn, tuple(marked), tuple(_notes(told, gaps)), tuple(gaps), _gravity(told))
+    return StartView(drawn, tuple(marked), tuple(_notes(text, gaps)), tuple(gaps), _gravity(text))
 
 
 def _still(body: Flexible, opacity: float) -> Part:
@@ -120,21 +120,21 @@ def page_view(seen: StartView) -> dict[str, Any]:
 
 
 def _joints(
-    run: xr.Dataset, told: Mapping[str, Any], bundles: Mapping[str, xr.Dataset]
+    run: xr.Dataset, text: Mapping[str, Any], bundles: Mapping[str, xr.Dataset]
 ) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
     """Where each joint's second frame is in the world, and the axes of its first one."""
     frames, bodies = list(run["frame"].values), [str(name) for name in run["body"].values]
-    for name, joint in told.get("joint", {}).items():
+    for name, joint in text.get("joint", {}).items():
         first, second = joint["between"]
-        body, (_, axes) = first.partition(".")[0], frame_pose(told, bundles, first)
+        body, (_, axes) = first.partition(".")[0], frame_pose(text, bundles, first)
         if body in bodies:
             axes = quaternion_to_matrix(run["quaternion"].values[0, bodies.index(body)]) @ axes
         yield name, (run["frame_position"].values[0, frames.index(second)], axes)
 
 
-def _normal(told: Mapping[str, Any], joints: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray | None:
+def _normal(text: Mapping[str, Any], joints: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray | None:
     """The direction about which all joints turn and across which all slide; None where there is none."""
-    kinds = {name: joint["type"] for name, joint in told.get("joint", {}).items() if joint["type"] != "fixed"}
+    kinds = {name: joint["type"] for name, joint in text.get("joint", {}).items() if joint["type"] != "fixed"}
     turning = [joints[name][1][:, 2] for name, kind in kinds.items() if kind in forms.TURNING]
     sliding = [joints[name][1][:, 2] for name, kind in kinds.items() if kind == "prismatic"]
     if not turning or len(turning) + len(sliding) < len(kinds):
@@ -144,39 +144,39 @@ def _normal(told: Mapping[str, Any], joints: Mapping[str, tuple[np.ndarray, np.n
 
 
 def _lines(
-    told: Mapping[str, Any],
+    text: Mapping[str, Any],
     joints: Mapping[str, tuple[np.ndarray, np.ndarray]],
     gaps: Sequence[Missing],
     size: float,
 ) -> Iterator[tuple[Surface, str]]:
     """Axes of joints, arrows of drives, and gaps."""
-    driven = {drive["joint"]: drive for drive in told.get("drive", {}).values() if "joint" in drive}
-    for name, (place, axes) in joints.items():
-        kind, z = told["joint"][name]["type"], axes[:, 2]
+    driven = {drive["joint"]: drive for drive in text.get("drive", {}).values() if "joint" in drive}
+    for name, (where, axes) in joints.items():
+        kind, z = text["joint"][name]["type"], axes[:, 2]
         slides = kind in forms.SLIDING
         if slides or kind in forms.TURNING:
-            yield surfaces.bar(place - AXIS * size * z, place + AXIS * size * z, THIN * size), JOINT
+            yield surfaces.bar(where - AXIS * size * z, where + AXIS * size * z, THIN * size), JOINT
         if name in driven and (slides or kind in forms.TURNING):
             turns = not slides or driven[name].get("coordinate") == "rotation"
-            yield (_turning if turns else _sliding)(place, axes, size), DRIVE
+            yield (_turning if turns else _sliding)(where, axes, size), DRIVE
     for gap in gaps:
         if np.linalg.norm(gap.end - gap.start) > 0.0:
             yield surfaces.bar(gap.start, gap.end, THICK * size), GAP
             yield surfaces.moved(surfaces.sphere(2.0 * THICK * size), gap.start), GAP
 
 
-def _turning(place: np.ndarray, axes: np.ndarray, size: float) -> Surface:
+def _turning(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     """A round arrow about the axis, in the sense in which the joint's coordinate grows."""
     angle = np.linspace(0.2, 1.5 * np.pi, 40)[:, None]
-    ring = place + ARC * size * (np.cos(angle) * axes[:, 0] + np.sin(angle) * axes[:, 1])
+    ring = where + ARC * size * (np.cos(angle) * axes[:, 0] + np.sin(angle) * axes[:, 1])
     way = ring[-1] - ring[-2]
     tube = surfaces.tube(ring, 1.8 * THIN * size)
     return surfaces.merged([replace(tube, triangles=tube.triangles[:, ::-1]), _cone(ring[-1], way, size)])
 
 
-def _sliding(place: np.ndarray, axes: np.ndarray, size: float) -> Surface:
+def _sliding(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     """An arrow along the axis, next to it."""
-    side = place + 0.5 * ARC * size * axes[:, 0]
+    side = where + 0.5 * ARC * size * axes[:, 0]
     end = side + 1.5 * AXIS * size * axes[:, 2]
     return surfaces.merged([surfaces.bar(side, end, 1.8 * THIN * size), _cone(end, axes[:, 2], size)])
 
@@ -194,7 +194,7 @@ def _cone(base: np.ndarray, way: np.ndarray, size: float) -> Surface:
 def _marks(
     run: xr.Dataset,
     drawn: Mechanism,
-    told: Mapping[str, Any],
+    text: Mapping[str, Any],
     joints: Mapping[str, tuple[np.ndarray, np.ndarray]],
     gaps: Sequence[Missing],
 ) -> Iterator[Mark]:
@@ -202,32 +202,32 @@ def _marks(
     used, places = set(), dict(zip(run["frame"].values, run["frame_position"].values[0], strict=True))
     for gap in gaps:
         yield Mark(gap.joint, f"does not fit: {gap.said}", 0.5 * (gap.start + gap.end), GAP)
-    for name, body in told.get("body", {}).items():
+    for name, body in text.get("body", {}).items():
         if body["type"] != "ground":
             index = list(run["body"].values).index(name)
             yield Mark(name, _of_body(body), _middle(run, drawn, index), BODY)
-    for name, joint in told.get("joint", {}).items():
+    for name, joint in text.get("joint", {}).items():
         used |= set(joint["between"])
         clear = joint.get("clearance")
         played = f" {words(clear)}" if clear else ""
         detail = f"{joint['type']}{played}: {' – '.join(joint['between'])}"
         yield Mark(name, detail, joints[name][0], CLEARANCE if clear else JOINT)
-    for name, drive in told.get("drive", {}).items():
+    for name, drive in text.get("drive", {}).items():
         if "joint" in drive:
             which = ".".join(filter(None, [drive["joint"], drive.get("coordinate")]))
-            place = joints[drive["joint"]][0]
-            yield Mark(name, f"drives {which}: {drive['law']['type']}", place, DRIVE)
+            where = joints[drive["joint"]][0]
+            yield Mark(name, f"drives {which}: {drive['law']['type']}", where, DRIVE)
         else:
             yield Mark(name, f"drives {drive['frame']}", places[drive["frame"]], DRIVE)
             used.add(drive["frame"])
-    for name, load in told.get("load", {}).items():
+    for name, load in text.get("load", {}).items():
         at = load.get("between", [load["frame"]] if "frame" in load else [])
         if at:
             used |= set(at)
             yield Mark(name, f"{load['type']}: {' – '.join(at)}", np.mean([places[f] for f in at], axis=0), LOAD)
-    for name, place in places.items():
+    for name, where in places.items():
         if name not in used:
-            yield Mark(name, "frame", place, FRAME)
+            yield Mark(name, "frame", where, FRAME)
 
 
 def _of_body(body: Mapping[str, Any]) -> str:
@@ -245,10 +245,10 @@ def _middle(run: xr.Dataset, drawn: Mechanism, index: int) -> np.ndarray:
     return np.asarray(run["position"].values[0, index])
 
 
-def _notes(told: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
+def _notes(parameters: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
     """What the names do not say."""
-    yield f"start at t = {told.get('time', {}).get('start', 0.0):g} s"
-    clear = {name: joint for name, joint in told.get("joint", {}).items() if joint.get("clearance")}
+    yield f"start at t = {parameters.get('time', {}).get('start', 0.0):g} s"
+    clear = {name: joint for name, joint in parameters.get("joint", {}).items() if joint.get("clearance")}
     radii = {name: joint.get("ball_radius", joint.get("pin_radius")) for name, joint in clear.items()}
     factors = sorted(
         {
@@ -261,13 +261,13 @@ def _notes(told: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
     if factors:
         span = factors[0] if len(factors) == 1 else f"{factors[0]} to {factors[-1]}"
         yield f"clearances drawn {span} times larger"
-    if not np.any(_gravity(told)):
+    if not np.any(_gravity(parameters)):
         yield "no gravity"
     if gaps:
         yield "red: joints that do not fit"
 
 
-def _gravity(told: Mapping[str, Any]) -> np.ndarray:
-    fields = [load["acceleration"] for load in told.get("load", {}).values() if load["type"] == "gravity"]
+def _gravity(parameters: Mapping[str, Any]) -> np.ndarray:
+    fields = [load["acceleration"] for load in parameters.get("load", {}).values() if load["type"] == "gravity"]
     total: np.ndarray = np.sum(np.array(fields, dtype=float).reshape(-1, 3), axis=0)
     return total

@@ -67,7 +67,7 @@ def build(body: Body, requested: ModeRequest) -> Basis:
         # static shapes alone are a basis, no shape at all is none
         ends = [0] * bool(static.shape[1]) + [stop for _, stop in select.clusters(modes.values)]
         _check_first(modes, static, requested)
-        # the last cluster may go on beyond what was computed
+        # the last cluster may continue beyond what was computed
         for stop in ends if tried >= available else ends[:-1]:
             if _enough(body, static, modes, stop, requested):
                 return _joined(body, static, modes, stop)

@@ -97,7 +97,7 @@ def _integrate(mesh: xr.Dataset, M: sp.csr_array, component: np.ndarray) -> Call
             raise InputError(
                 WHERE,
                 "the mass matrix differs for motion along x, y and z and is not lumped at the nodes, so that it does "
-                "not tell the volume integrals",
+                "not determine the volume integrals",
                 "lump the mass, use nodes with three displacements, or give an npz with the integrals",
             )
         return partial(integrate, rigid)

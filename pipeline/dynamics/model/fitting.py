@@ -1,0 +1,77 @@
+"""Frames that are known only to a tolerance, as those of meshed bodies, moved so that joints fit that nearly do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexclear.pipeline.core.algebra import matrix_to_quaternion, rotation_vector_to_matrix, skew
+from flexclear.pipeline.core.scene.parts import RigidBody
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.model.closing import close
+from flexclear.pipeline.dynamics.model.constraints import Constraint, demands
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism
+from flexclear.pipeline.dynamics.model.merge import Placement
+
+#: steps of Newton's method for the frame of a joint, which converge quadratically from what a mesh leaves
+STEPS = 5
+
+
+def fitted(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> Scene | None:
+    """The scene with the frames of bodies moved by the least that lets joints fit which nearly do.
+
+    joints, poses: of the mechanism, which cannot be closed.  None where frames would move beyond their tolerance.
+    """
+    scene = mechanism.scene
+    tolerances = {n: body.frame_tolerance for n, body in scene.rigid().items() if body.frame_tolerance > 0.0}
+    if not tolerances or not mechanism.all_rigid:
+        return None
+    best = close(mechanism, joints, poses, within=max(tolerances.values()) / mechanism.length)
+    # the least misfit is spread over all joints: those between exact frames fit again, the others take all of it
+    loose = [any(f.partition(".")[0] in tolerances for f in (j.edge.frame_a, j.edge.frame_b)) for j in joints]
+    exact_joints = [joint for joint, moves in zip(joints, loose, strict=True) if not moves]
+    best = None if best is None else close(mechanism, exact_joints, best)
+    if best is None:
+        return None
+    bodies = dict(scene.body)
+    for joint in joints:
+        for name, link, far in ((joint.edge.frame_b, joint.link_b, True), (joint.edge.frame_a, joint.link_a, False)):
+            body, _, frame = name.partition(".")
+            if body not in tolerances:
+                continue
+            old = bodies[body]
+            assert isinstance(old, RigidBody)
+            place = best[link].of(mechanism.links[link].places[body]).inverse().of(_met(joint, best, far))
+            if np.linalg.norm(place.p - mechanism.frames[name].place.p) > tolerances[body]:
+                return None
+            pose = {"position": place.p.tolist(), "quaternion": matrix_to_quaternion(place.R).tolist()}
+            frames = old.frames | {frame: type(old.frames[frame]).model_validate(pose)}
+            bodies[body] = old.model_copy(update={"frames": frames})
+            break
+    exact = {name: bodies[name].model_copy(update={"frame_tolerance": 0.0}) for name in tolerances}
+    return scene.model_copy(update={"body": bodies | exact})
+
+
+def _met(joint: Constraint, poses: Sequence[Placement], far: bool) -> Placement:
+    """The joint's second frame in the world, or its first one, moved by the least that makes the joint fit."""
+    A, B = joint.frames(poses)
+    for _ in range(STEPS):
+        residual, wrench = demands(joint.edge.kind, A, B)
+        here = B if far else A
+        moment = wrench[:, :3] - wrench[:, 3:] @ skew(here.p).T
+        step = np.linalg.pinv(np.hstack([moment, wrench[:, 3:]])) @ residual * (-1.0 if far else 1.0)
+        there = Placement(here.p + step[3:], rotation_vector_to_matrix(step[:3]) @ here.R)
+        A, B = (A, there) if far else (there, B)
+    return B if far else A
+
+
+def changed(before: Scene, after: Scene) -> str:
+    """A sentence about the frames that were moved."""
+    away = {
+        body: max(float(np.linalg.norm(np.subtract(new.position, old.frames[frame].position))) for frame, new in frames)
+        for body, old in before.rigid().items()
+        if (frames := list(after.rigid()[body].frames.items()))
+    }
+    told = ", ".join(f"{body} by up to {size:.2g} m" for body, size in away.items() if size > 0.0)
+    return f"frames were moved within their frame_tolerance so that the joints fit: {told}"
