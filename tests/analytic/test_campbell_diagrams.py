@@ -91,3 +91,16 @@ def test_options_of_a_diagram_need_its_speeds(capsys: pytest.CaptureFixture[str]
     assert "add --speeds" in capsys.readouterr().err
     assert main(["frequencies", "checks/overhung_rotor", "--speeds", "0:100:50", "--drive", "motor"]) == 2
     assert "there is no such drive" in capsys.readouterr().err
+
+
+def test_branches_pass_a_critical_speed_that_has_no_steady_motion() -> None:
+    """A millimetre of unbalance; at 129 rad/s nothing small is steady."""
+    at = [100.0, 110.0, 128.9, 140.0, 150.0]
+    made = diagram(rotor(20.0, 1e-3, TURNS["oblique"]), at)
+    there = np.isfinite(made.growth.values)
+    assert there[[0, 1, 3, 4]].all()
+    kinds = made.whirl.values
+    branches = 2.0 * np.pi * made.whirl_frequency.values[:, kinds != ""]
+    known = np.array([whirls(speed) for speed in at])
+    # a deflection of 7 e at 140 rad/s enters in second order, and m e^2 is 1.5e-4 of I_t
+    assert np.sort(branches[[0, 4]], axis=1) == pytest.approx(known[[0, 4]], rel=5e-3)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import signal
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 
 from flexclear.pipeline.core.artifacts.paths import TREE
 from flexclear.pipeline.core.artifacts.store import Store
+from flexclear.pipeline.core.errors import ResourceError
 from flexclear.pipeline.core.workflow import cores, stopping, workers
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.progress import Monitor
@@ -70,3 +73,36 @@ def test_what_failed_in_a_worker_is_the_task_that_was_asked_for(tmp_path: Path) 
     tasks = [Task("post", scene, "flexclear.stages.s5_post:run", {"of": scene}, "") for scene in ("a", "b")]
     outcome = bring(tasks, Store(tmp_path), Sources(TREE), Monitor(), 2)
     assert {id(failure.task) for failure in outcome.failures} == {id(task) for task in tasks}
+
+
+@pytest.mark.parametrize("who", ["the idle worker", "the process of the progress"])
+def test_a_helper_that_is_killed_between_two_calls_is_one_sentence(who: str):
+    """As by the system where memory is full; before, a traceback or an end without a word."""
+    with workers.reused():
+        worker, server = one()
+        os.kill(worker if who == "the idle worker" else server, signal.SIGKILL)
+        wait_until(lambda: not running(worker if who == "the idle worker" else server))
+        with pytest.raises(ResourceError, match="a helper process was killed"), workers.lost():
+            often()
+    assert one() != (worker, server)
+
+
+def often() -> None:
+    """The pool notices a moment later that a worker is gone."""
+    for _ in range(100):
+        one()
+        time.sleep(0.05)
+
+
+def running(process: int) -> bool:
+    """Whether it is there and no zombie."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    end = time.monotonic() + 60.0
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)

@@ -222,7 +222,8 @@ def _submit(
             monitor.finish(name, failed=False)
             continue
         where = (store.root, sources.root, sources.memo)
-        future = pool.submit(_work, task, inputs, name, where, reports, others_idle)
+        with workers.lost():  # an idle one
+            future = pool.submit(_work, task, inputs, name, where, reports, others_idle)
         running[future] = _Running(task, key, name)
 
 
@@ -248,8 +249,13 @@ def _collect(plan: _Plan, running: dict[Future[Record | Failure], _Running], mon
 
 
 def _relay(reports: Any, monitor: Monitor) -> None:
-    while not reports.empty():
-        monitor.update(*reports.get())
+    """Progress of the workers, out of the process that keeps it."""
+    with workers.lost():
+        news = []
+        while not reports.empty():
+            news.append(reports.get())
+    for one in news:
+        monitor.update(*one)
 
 
 def _note(plan: _Plan, task: Task, result: Record | Failure) -> None:

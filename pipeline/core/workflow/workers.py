@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core import system
+from flexclear.pipeline.core.errors import ResourceError
 from flexclear.pipeline.core.workflow import cores, stopping
 from flexclear.pipeline.core.workflow.family import follow
 
@@ -72,6 +73,18 @@ def kill(workers: ProcessPoolExecutor) -> None:
     for process in list((workers._processes or {}).values()):
         process.kill()
     workers.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def lost() -> Iterator[None]:
+    """Meanwhile a helper process that somebody kills, as the system does where memory is full, is a limit in words."""
+    from concurrent.futures.process import BrokenProcessPool
+
+    try:
+        yield
+    except (BrokenProcessPool, EOFError, ConnectionError):
+        text = "a helper process was killed; is the memory full? Finished results are stored: run again to go on"
+        raise ResourceError(text) from None
 
 
 @dataclass(frozen=True)
@@ -137,10 +150,11 @@ def team(width: int) -> Iterator[Team]:
         while _idle and _idle[-1].width < width:
             _idle.pop().end()
         # a reused one may serve a wider call next; who is never needed is never started
-        mine = _idle.pop() if _idle else Team.begun(max(width, cores.cores()) if _keeping else width)
-        stack.callback(mine.kill)
-        while not mine.reports.empty():  # of the last call
-            mine.reports.get()
+        with lost():
+            mine = _idle.pop() if _idle else Team.begun(max(width, cores.cores()) if _keeping else width)
+            stack.callback(mine.kill)
+            while not mine.reports.empty():  # of the last call
+                mine.reports.get()
         yield mine
         if not stopping.requested():
             stack.pop_all()

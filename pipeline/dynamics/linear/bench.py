@@ -197,6 +197,8 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     """Forces, mass and closures in a state; SolverError where the equations are singular."""
     engine = bench.engine
     engine.evaluate(state(bench, q, v), bench.time)
+    if not np.all(np.isfinite(engine.view(m.BIAS)[: engine.model.nv])):
+        raise SolverError(f"at t = {bench.time:.6g} s: the forces are not numbers in this pose")
     modes = modes_of(engine.model.arrays)
     L = modes @ engine.mass_factor()
     return Balance(

@@ -59,10 +59,14 @@ def steady_near(bench: Bench, q: np.ndarray) -> tuple[Equilibrium, Vibrations]:
     governor whose arms rise.  Raises SolverError where there is none, or the motion is not steady.
     """
     reached, failure = list[tuple[Equilibrium, Vibrations]](), None
+    # angles with their turns, which the search follows, belong to the pose
+    internal, kept = bench.internal.copy(), list[np.ndarray]()
     for find in (_continued, descend) if np.any(bench.drives[:, 1]) else (descend,):
+        bench.internal[:] = internal
         try:
             rest = find(bench, q)
             reached.append((rest, vibrations(bench, rest.at)))
+            kept.append(bench.internal.copy())
         except SolverError as error:
             failure = failure or error
             continue
@@ -70,23 +74,31 @@ def steady_near(bench: Bench, q: np.ndarray) -> tuple[Equilibrium, Vibrations]:
             break
     if not reached:
         assert failure is not None
+        bench.internal[:] = internal
         _require_turning_frames(bench)
         raise failure
-    best = next((pair for pair in reached if pair[1].stable), reached[0])
-    _require_steady(bench, best[0].at)
-    return best
+    best = next((k for k, (_, small) in enumerate(reached) if small.stable), 0)
+    bench.internal[:] = kept[best]
+    _require_steady(bench, reached[best][0].at)
+    return reached[best]
 
 
 def _continued(bench: Bench, q: np.ndarray) -> Equilibrium:
     """The steady motion by Newton's method, at once or with the drives' speed growing from rest."""
+    internal = bench.internal.copy()
     try:
         return newton(bench, q)
     except SolverError:
-        pass
+        bench.internal[:] = internal
 
     def at(fraction: float, start: np.ndarray) -> Equilibrium:
         set_drives(bench, bench.drives * [1.0, fraction])
-        return newton(bench, start)
+        before = bench.internal.copy()
+        try:
+            return newton(bench, start)
+        except SolverError:
+            bench.internal[:] = before
+            raise
 
     try:
         set_drives(bench, bench.drives * [1.0, 0.0])
