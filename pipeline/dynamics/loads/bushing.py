@@ -73,7 +73,9 @@ def continued(v, before):
     left, right = sub(v, before), sub(other, before)
     if dot(left, left) <= dot(right, right):
         return v
-    return other if dot(other, other) < FULL else scale(np.nan, other)
+    beyond = dot(other, other) - FULL
+    # no number where neither is below a full turn: the run is then refused
+    return other if beyond < 0.0 else scale(np.sqrt(-1.0 - beyond), other)
 
 
 @kernel
