@@ -92,7 +92,7 @@ def _robot_arm(run: xr.Dataset, scene: Scene) -> str:
     tip, seat = (run["frame_position"].sel(frame=f"arm.{end}") for end in ("tip", "seat"))
     way = (tip - seat).isel(time=(run["time"] > 0.4).values)
     angle = np.arctan2(way.sel(axis="y").values, way.sel(axis="x").values)
-    return f"The tip swings on by ±{1e3 * 0.6 * 0.5 * float(np.ptp(angle)):.2g} mm about its new place."
+    return f"The tip swings on by ±{1e3 * 0.6 * 0.5 * float(np.ptp(angle)):.2g} mm about its new position."
 
 
 def _universal(run: xr.Dataset, scene: Scene) -> str:

@@ -161,7 +161,7 @@ def test_a_motion_that_stops_beside_the_pose_is_none_of_them(beyond: float) -> N
 
 
 def test_a_rest_that_rounding_cannot_tell_from_the_pose_is_refused() -> None:
-    with pytest.raises(SolverError, match="so near to a singular pose"):
+    with pytest.raises(SolverError, match="so close to a singular pose"):
         simulate(stopped(np.pi - 2.5 + 1e-5))
 
 

@@ -133,7 +133,7 @@ def test_where_the_explicit_method_is_dear_the_stiff_one_is_tried() -> None:
 def test_a_run_that_was_handed_on_tells_what_its_last_method_took() -> None:
     early, late = known(exponential=(1e-4, 5e4)), known(exponential=(1e-4, 5e4))
     for suit, left in ((early, (4e4, 0.2)), (late, (4e4, 0.97))):
-        suit.told["exponential"], suit.left = 9e4, left
+        suit.expected["exponential"], suit.left = 9e4, left
         suit.learn(1e-5, "exponential", xr.Dataset(attrs={"method": "radau", "evaluations": 44_000}))
     assert early.seen["radau"] == {1e-5: pytest.approx(5000.0)}
     assert "radau" not in late.seen

@@ -22,8 +22,9 @@ from flexclear.pipeline.core.errors import SolverError
 FACTOR, LEVELS = 2.5, 22
 #: columns of the table: error orders 2, 4, .. 10
 ORDERS = 5
-#: rows of the shortest steps, 600 times apart, that show what rounding does
-SHORTEST = 8
+#: steps of the probe of rounding, as fractions of the widest: many roundings of a coordinate of its size, and so short
+#: that a contact closed by a nanometre changes its slope by 1e-5
+PROBE = 1e-12 * np.arange(-3, 4)
 
 
 @dataclass(frozen=True)
@@ -40,9 +41,9 @@ def derivative(force: Callable[[float], np.ndarray], widest: float, rounding: Ro
     force(s): shape (n,); it may raise SolverError where it does not exist, which steps inward.
     widest: the largest step tried.  Raises SolverError when `force` exists nowhere close by.
     """
+    noise = max(rounding.noise, _noise(force, widest))
     steps = widest / FACTOR ** np.arange(LEVELS)
     table = [_row(force, float(step)) for step in steps]
-    noise = max(rounding.noise, _noise(steps, table))
     for above, row in pairwise(table):
         for j in range(min(len(above), ORDERS) if row else 0):
             gain = FACTOR ** (2 * (j + 1))
@@ -60,14 +61,18 @@ def derivative(force: Callable[[float], np.ndarray], widest: float, rounding: Ro
     return best
 
 
-def _noise(steps: np.ndarray, table: list[list[np.ndarray]]) -> float:
-    """What rounding does to the force, by how its slopes over the shortest steps scatter; table: with first entries.
+def _noise(force: Callable[[float], np.ndarray], widest: float) -> float:
+    """What rounding does to the force: its scatter about a straight line over very short steps.
 
     Terms that balance leave nothing of their size in the force, only their rounding.
     """
-    firsts = [row[0] for row in table[-SHORTEST:] if row]
-    scatter = [float(np.linalg.norm(b - a)) for a, b in pairwise(firsts)]
-    return float(np.median(np.array(scatter) * steps[len(steps) - len(scatter) :])) if scatter else 0.0
+    try:
+        values = np.array([force(float(widest * step)) for step in PROBE])
+    except SolverError:
+        return 0.0
+    line = np.stack([np.ones(len(PROBE)), PROBE / PROBE[-1]], axis=1)
+    left = values - line @ np.linalg.lstsq(line, values, rcond=None)[0]
+    return float(np.linalg.norm(left)) / np.sqrt(len(PROBE) - 2)
 
 
 def _row(force: Callable[[float], np.ndarray], step: float) -> list[np.ndarray]:

@@ -74,8 +74,8 @@ class Suit:
     """What is known of a scene's costs.
 
     span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  missed: by integrator, the
-    loosest tolerance at which a run with it has been handed on.  told: by integrator, what the present run was foreseen
-    to take when it was handed on from it.  left: evaluations and fraction of the motion when that happened last.
+    loosest tolerance at which a run with it has been handed on.  expected: by integrator, the evaluations
+    expected of the present run when it was handed on from it.  left: evaluations and fraction of the motion when that happened last.
     touching: whether there are contacts.
     """
 
