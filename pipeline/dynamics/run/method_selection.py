@@ -75,8 +75,8 @@ class Suit:
 
     span: of the run [s].  seen: by integrator, evaluations of its runs by tolerance.  missed: by integrator, the
     loosest tolerance at which a run with it has been handed on.  expected: by integrator, the evaluations
-    expected of the present run when it was handed on from it.  left: evaluations and fraction of the motion when that happened last.
-    touching: whether there are contacts.
+    expected of the present run when it was handed on from it.  left: evaluations and fraction of the motion when that
+    happened last.  touching: whether there are contacts.
     """
 
     rates: Rates
