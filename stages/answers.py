@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.artifacts.points import Point
-    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
 
 #: without a budget the answers may take so many times the run's own processor time, and at least so long [s]

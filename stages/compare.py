@@ -156,7 +156,7 @@ def _labels(sides: list[Scene]) -> list[str]:
 
 
 def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
-    quantities = {q.name: [q.owner, q.kind] for graph in graphs.values() for q in graph.scene.watched()}
+    quantities = {q.name: q.written() for graph in graphs.values() for q in graph.scene.watched()}
     labels = list(graphs)
     inputs = {f"run{k}": graphs[label].simulate for k, label in enumerate(labels)}
     inputs |= {f"tight{k}": tight[label] for k, label in enumerate(labels) if label in tight}

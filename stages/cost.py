@@ -180,7 +180,7 @@ class Study:
             run="flexclear.stages.cost_study:run",
             params={
                 "points": listed,
-                "quantities": [[q.owner, q.kind] for q in chosen],
+                "quantities": [q.written() for q in chosen],
                 "title": self.scene.title,
                 "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
                 "complete": self._complete and not self.undone,

@@ -33,7 +33,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from flexclear.pipeline import dynamics
     from flexclear.pipeline.core import quantities
     from flexclear.pipeline.core.errors import SolverError
-    from flexclear.pipeline.core.scene.requested_accuracy import parse
+    from flexclear.pipeline.core.scene.quantity import parse
 
     scene = rebuild(params["simulate"], inputs)
     reduced = bundles(inputs)
@@ -65,7 +65,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     from flexclear.pipeline import dynamics
     from flexclear.pipeline.core import quantities
     from flexclear.pipeline.core.errors import SolverError
-    from flexclear.pipeline.core.scene.requested_accuracy import parse
+    from flexclear.pipeline.core.scene.quantity import parse
 
     scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
     warm(scene, reduced, progress)

@@ -22,14 +22,14 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     `complete`, and `peers`, as of `stages.cost_peers`.  The reference is the tightest run among the points, and a run
     by another method confirms it.
     """
-    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.cost import answer, causes, price, statistics, work_precision
     from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
     from flexclear.pipeline.post.plotting.table import files
 
     points = [Point(p["key"], p["group"], p["factors"]) for p in params["points"]]
     runs = {p["key"]: inputs[p["input"]] for p in params["points"]}
-    chosen = [Quantity(*pair) for pair in params["quantities"]]
+    chosen = [Quantity.read(data) for data in params["quantities"]]
     points = with_reference(points, runs, chosen)
     study = assemble(points, runs, chosen)
     study.attrs |= params["own"] | {"undone": params["undone"], "complete": int(params["complete"])}

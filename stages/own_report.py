@@ -38,6 +38,7 @@ FIGURES = {
     ),
     "wear.png": ("Wear of contacts", "Load times sliding way over time, and how deep the surfaces wear over the angle"),
     "joint_friction.png": ("Friction of ideal joints", "Normal force in the bearings and energy lost, over time"),
+    "watched.png": ("Watched quantities", "What the scene watches, over time"),
     "energy.png": ("Energy", "Energies over time, and the error of their balance"),
 }
 #: of a run's attributes, those that tell how it was made, and what they are called

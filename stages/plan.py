@@ -197,8 +197,7 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
     fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
-    there = {name for names in owners.values() for name in names}
-    watch = [q.name for q in scene.watched() if q.owner in there and (q.kind in _kinds(owners, q.owner))]
+    watch = [q.name for q in scene.watched() if q.is_there(owners)]
     view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
     solver: dict[str, Any] = {key: decided[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in decided}
     if "evaluations" in scene.solver.model_fields_set:
@@ -215,13 +214,6 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
     )
     result._name, result._path = f"{scene.name}-planned", None
     return result
-
-
-def _kinds(owners: dict[str, tuple[str, ...]], name: str) -> set[str]:
-    """Kinds of quantities that a part of this name may own."""
-    from flexclear.pipeline.core.scene.requested_accuracy import KINDS
-
-    return {kind for kind, of_kind in KINDS.items() if name in owners[of_kind.owner]}
 
 
 def page(planned: Planned) -> bytes:
@@ -292,7 +284,7 @@ def _compared(results: Planned, workplace: Workplace, members: int) -> xr.Datase
     """Distance of the planned run from the full one over so many members."""
     from flexclear.pipeline.core import effect_size
     from flexclear.pipeline.core.errors import SolverError
-    from flexclear.pipeline.core.scene.requested_accuracy import parse
+    from flexclear.pipeline.core.scene.quantity import parse
 
     assert results.scene.accuracy is not None
     names = list(results.scene.accuracy.quantities)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.artifacts.points import Point
     from flexclear.pipeline.core.progress import Progress
-    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
 
 #: settings of a scene that a watched run does not look at
@@ -39,7 +39,7 @@ def task(scene: Scene, chosen: Sequence[Quantity], members: int) -> Task:
         run="flexclear.stages.s4_watched:run",
         params={
             "simulate": s4_simulate.params(variant),
-            "quantities": [[q.owner, q.kind] for q in chosen],
+            "quantities": [q.written() for q in chosen],
             "members": _members(variant, members),
         },
         inputs=graph.bodies(),
@@ -57,10 +57,10 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """One point as a dataset; refusals of the solver are in it, since they, too, say what an effect does."""
     from flexclear.pipeline.core.artifacts.points import batch
     from flexclear.pipeline.core.effect_size import recorded
-    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.core.scene.quantity import Quantity
 
     scene = s4_simulate.rebuild(params["simulate"], inputs)
-    chosen = [Quantity(*pair) for pair in params["quantities"]]
+    chosen = [Quantity.read(data) for data in params["quantities"]]
     progress(None, f"{scene.summary()}")
     point = watch(scene, s4_simulate.bundles(inputs), chosen, params["members"])
     return {"nc": batch({"point": point}, recorded(scene.owners(), chosen))}

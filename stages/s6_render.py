@@ -51,7 +51,10 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
         asked = scene.view.model_dump(mode="json", include=set(SEEN), exclude_none=True)
         values |= {"view": asked} if asked else {}
     if (what == "joint" and kind in ("png", "html")) or (what == "motion" and kind in ("gif", "mp4")):
-        values["watched"] = list(dict.fromkeys(quantity.owner for quantity in scene.watched()))
+        terms = [term for quantity in scene.watched() for term in quantity.terms()]
+        values["watched"] = list(dict.fromkeys(term.owner for term in terms if term.owner))
+        if what == "motion" and scene.view is not None and scene.view.watch is not None:
+            values["curves"] = [quantity.written() for quantity in scene.watched()]
     return values
 
 
@@ -74,6 +77,7 @@ def _looks(scene: Scene) -> dict[str, Any]:
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Files by name; inputs are ``run`` or ``linear``, and ``bundle/<body>``."""
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.render.mechanism import Looks
     from flexclear.pipeline.post.render.pictures import Shown, make
 
@@ -83,6 +87,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
         bundles=bundles(inputs),
         looks=Looks(bodies=params.get("bodies", {}), **params.get("view", {})),
         watched=params.get("watched", ()),
+        curves=[Quantity.read(data) for data in params.get("curves", ())],
         title=str(params.get("title", "")),
         progress=progress,
     )

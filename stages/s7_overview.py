@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 def params(scene: Scene) -> dict[str, Any]:
     """What is examined."""
-    return {"watched": [[quantity.owner, quantity.kind] for quantity in scene.watched()]}
+    return {"watched": [quantity.written() for quantity in scene.watched()]}
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """PNG and SVG by file name; inputs are ``run`` and ``post``."""
-    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.overview import figures
 
     progress(None, "figures")
-    return dict(figures.make(inputs["run"], [Quantity(*pair) for pair in params["watched"]], inputs["post"]))
+    return dict(figures.make(inputs["run"], [Quantity.read(data) for data in params["watched"]], inputs["post"]))

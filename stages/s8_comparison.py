@@ -17,13 +17,13 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     params: `labels` of the runs, the reference first; `quantities` (owner, kind).  inputs: ``run<k>``, and ``tight<k>``
     where there is one.
     """
-    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.overview import comparison, overlay
     from flexclear.pipeline.post.plotting.table import files
 
     runs = {label: inputs[f"run{k}"] for k, label in enumerate(params["labels"])}
     tighter = {label: inputs[f"tight{k}"] for k, label in enumerate(params["labels"]) if f"tight{k}" in inputs}
-    chosen = [Quantity(*pair) for pair in params["quantities"]]
+    chosen = [Quantity.read(data) for data in params["quantities"]]
     progress(None, "comparing")
     compared = comparison.assemble(runs, tighter, chosen)
     result: dict[str, Any] = {"nc": compared}

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.progress import Progress
-    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
 
 Names = frozenset[str]
@@ -30,8 +30,6 @@ def task(
     scene: Scene, effects: Sequence[Effect], chosen: Sequence[Quantity], watched: Mapping[Names, Task], members: int
 ) -> Task:
     """The task of all differences."""
-    from flexclear.pipeline.dynamics.model.driving import unit_of
-
     return Task(
         stage="effects",
         scene=scene.name,
@@ -40,8 +38,8 @@ def task(
             "scene": scene.name,
             "title": scene.title,
             "effects": [[effect.name, effect.kind, effect.within] for effect in effects],
-            "quantities": [[q.owner, q.kind] for q in chosen],
-            "units": [unit_of(scene, q) for q in chosen],
+            "quantities": [q.written() for q in chosen],
+            "units": [q.unit for q in chosen],
             "variants": [sorted(gone) for gone in watched],
             "owners": [{k: list(v) for k, v in _variant(scene, effects, gone).owners().items()} for gone in watched],
             "members": members,
@@ -60,12 +58,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """``effects.nc``, its table and its chart.  params: see `task`.  inputs: ``variant<k>``, as of `s4_watched`."""
     from flexclear.pipeline.core import effect_size
     from flexclear.pipeline.core.artifacts.points import unpacked
-    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post import effect_sizes
     from flexclear.pipeline.post.plotting.table import files
 
     effects = [Effect(*three) for three in params["effects"]]
-    chosen = [Quantity(*pair) for pair in params["quantities"]]
+    chosen = [Quantity.read(data) for data in params["quantities"]]
     points = {}
     for k, gone in enumerate(params["variants"]):
         recorded = effect_size.recorded(params["owners"][k], chosen)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.progress import Progress
-    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
 
 
@@ -28,8 +28,6 @@ def task(
     words: of the effects.  variants: the scene without each effect, by its name (the full one by the empty name), and
     its tasks by the number of members (`stages.s4_watched`).  pairs: members with which each effect is compared.
     """
-    from flexclear.pipeline.dynamics.model.driving import unit_of
-
     used = {("", members) for members in pairs.values()} | set(pairs.items())
     return Task(
         stage="matters",
@@ -37,8 +35,8 @@ def task(
         run="flexclear.stages.s8_matters:run",
         params={
             "title": scene.title,
-            "quantities": [[q.owner, q.kind] for q in chosen],
-            "units": [unit_of(scene, q) for q in chosen],
+            "quantities": [q.written() for q in chosen],
+            "units": [q.unit for q in chosen],
             "words": dict(words),
             "pairs": dict(pairs),
             "owners": {name: {k: list(v) for k, v in made.owners().items()} for name, (made, _) in variants.items()},
@@ -54,11 +52,11 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """``matters.nc``, its table and its chart.  params: see `task`.  inputs: ``<effect>:<members>``."""
     from flexclear.pipeline.core import effect_size
     from flexclear.pipeline.core.artifacts.points import unpacked
-    from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post import effect_sizes, matters
     from flexclear.pipeline.post.plotting.table import files
 
-    chosen = [Quantity(*pair) for pair in params["quantities"]]
+    chosen = [Quantity.read(data) for data in params["quantities"]]
 
     def point(name: str, members: int) -> Any:
         recorded = effect_size.recorded(params["owners"][name], chosen)

@@ -33,8 +33,6 @@ PAIR, LEAST_HALVED = 2, 4
 
 def task(scene: Scene) -> Task:
     """The plan of a scene; shown as ``plan.nc``."""
-    from flexclear.pipeline.dynamics.model.driving import unit_of
-
     rigid = edited(
         variants.without(scene, [effect for effect in variants.effects(scene) if effect.name.startswith("body.")]),
         {"accuracy": None},
@@ -57,7 +55,7 @@ def task(scene: Scene) -> Task:
             "simulate": simulate,
             "title": scene.title,
             "elements": counts,
-            "units": {q.name: unit_of(scene, q) for q in scene.requested()},
+            "units": {q.name: q.unit for q in scene.requested()},
         },
         context={"name": scene.name, "limits": scene.limits.written()},
         inputs=inputs,

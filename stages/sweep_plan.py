@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Any
 from flexclear.pipeline.core.artifacts.store import FAMILY
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.design import Axis, Design, design
-from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.limits import check_members
 from flexclear.pipeline.core.scene.load import edited, with_numbers
-from flexclear.pipeline.core.scene.output_quantities import Recorded, parse_recorded
+from flexclear.pipeline.core.scene.quantity import Recorded, parse_recorded
 from flexclear.pipeline.core.scene.schema import Sections
 from flexclear.pipeline.core.workflow.task import Task, facts, key
 from flexclear.pipeline.core.workflow.workers import without_main
@@ -90,7 +89,7 @@ class Family:
 class Plan:
     """A sweep whose paths, values and quantities are known to fit its scene.
 
-    scene: with what is set, at the first point.  turning: names of the quantities that are about an axis, not along.
+    scene: with what is set, at the first point.
     families, jobs: once the flexible bodies are there; see `prepare`.
     """
 
@@ -98,7 +97,6 @@ class Plan:
     scene: Scene
     design: Design
     recorded: tuple[Recorded, ...]
-    turning: frozenset[str]
     families: tuple[Family, ...] = ()
     jobs: tuple[Job, ...] = ()
 
@@ -118,7 +116,6 @@ class Plan:
             points,
             self.time,
             self.sections,
-            self.turning,
             attributes,
             self.statistics,
         )
@@ -165,7 +162,8 @@ def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
     base = edited(base, made.points()[0])
     recorded = tuple(_kept(base, name, where) for name in sweep.keep)
     _check_recorded(sweep, base, made, recorded, where)
-    return Plan(sweep, base, made, recorded, _turning(base, made, recorded, where))
+    _check_units(base, made, recorded, where)
+    return Plan(sweep, base, made, recorded)
 
 
 def _placed(where: str, error: InputError) -> InputError:
@@ -230,10 +228,6 @@ def _check_recorded(sweep: Sweep, base: Scene, made: Design, recorded: Sequence[
             )
         if one.reduction == "sections" and varied & set(COUNTS):
             raise InputError(f"{where} [vary.{COUNTS[0]}]", "points would have different numbers of sections", "set it")
-        if one.quantity.kind == "drive_force" and isinstance(base.drive[one.quantity.owner], PathDrive):
-            raise InputError(
-                f"{where} [keep]", f"'{one.quantity.owner}' leads a frame along a path and has no single force"
-            )
     sections = [one.reduction == "sections" for one in recorded]
     if any(sections) and not (all(sections) and not sweep.members and not sweep.error):
         raise InputError(
@@ -254,20 +248,16 @@ def _check_recorded(sweep: Sweep, base: Scene, made: Design, recorded: Sequence[
         )
 
 
-def _turning(base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> frozenset[str]:
-    """Names of the quantities that are about an axis; InputError for one that is so at some of the points only."""
-    from flexclear.pipeline.dynamics.model.driving import turns
-
-    turning = frozenset(one.quantity.name for one in recorded if turns(base, one.quantity))
+def _check_units(base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> None:
+    """InputError for a quantity that is about an axis at some of the points only."""
     for axis, scene in _worded(base, made):
         for one in recorded:
-            if turns(scene, one.quantity) != (one.quantity.name in turning):
+            if _kept(scene, one.name, where).unit != one.unit:
                 raise InputError(
                     f"{where} [vary.{axis.name}]",
                     f"'{one.name}' is a force at some points and a torque at others",
                     "make two sweeps of it",
                 )
-    return turning
 
 
 def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:

@@ -45,7 +45,7 @@ def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
     """The scene of a family and what runs its points; stored by a worker, since it holds the compiled functions."""
     import pickle
 
-    from flexclear.pipeline.core.scene.output_quantities import parse_recorded
+    from flexclear.pipeline.core.scene.quantity import parse_recorded
     from flexclear.pipeline.dynamics.record.point import Runner
     from flexclear.stages.s4_simulate import bundles, rebuild
 

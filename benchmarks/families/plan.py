@@ -22,7 +22,7 @@ from benchmarks.plan_scenes import drawn
 from flexclear.pipeline.core import effect_size
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.requested_accuracy import parse
+from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
 
 SEED, SCENES = 9, 60

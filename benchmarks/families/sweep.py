@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import percent, table
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
-from flexclear.pipeline.core.scene.output_quantities import parse_recorded
+from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.dynamics.compile.functions import Entry
 from flexclear.pipeline.dynamics.record.point import Runner

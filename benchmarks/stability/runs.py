@@ -18,7 +18,7 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.errors import FlexclearError, SolverError
 from flexclear.pipeline.core.progress import silent
-from flexclear.pipeline.core.scene.requested_accuracy import parse
+from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.pipeline.dynamics.run.run import engine_of

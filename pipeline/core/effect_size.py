@@ -22,8 +22,7 @@ from scipy.special import stdtrit
 
 from flexclear.pipeline.core.algebra import rotation_between
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.output_quantities import Recorded, parse_recorded
-from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity, Recorded
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 
 #: a difference of means that chance alone makes less often than this counts: of hundred independent looks one in ten
@@ -35,8 +34,6 @@ FRACTION, LEAST = 1e-3, 1e-8
 #: what is recorded of a quantity to compare it by: the series, and of what impacts make large its extreme, which is
 #: read where it is and not at an output
 OF_KIND = {
-    "position": ("series",),
-    "orientation": ("series",),
     "peak_force": ("largest",),
     "impulse": ("final",),
     "impact_times": ("count", "first", "last"),
@@ -83,8 +80,11 @@ def recorded(owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) ->
 
     owners: of the scene, by what they are.
     """
-    there = [q for q in chosen if q.owner in owners[KINDS[q.kind].owner]]
-    return [parse_recorded(f"{q.name}.{r}", owners) for q in there for r in OF_KIND.get(q.kind, OTHERS)]
+    return [Recorded(q, r) for q in chosen if q.is_there(owners) for r in _reductions(q)]
+
+
+def _reductions(quantity: Quantity) -> tuple[str, ...]:
+    return ("series",) if quantity.of_place else OF_KIND.get(quantity.kind, OTHERS)
 
 
 def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
@@ -97,7 +97,7 @@ def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence
         return _impact_times(a, b, name)
     parts = [
         _apart(a, b, f"{name}.{reduction}", members, turning=quantity.kind == "orientation")
-        for reduction in OF_KIND.get(quantity.kind, OTHERS)
+        for reduction in _reductions(quantity)
     ]
     return Influence(max(p.difference for p in parts), max(p.uncertainty for p in parts))
 
@@ -149,7 +149,7 @@ def size(point: Point, quantity: Quantity) -> float:
     values = _rows(point.values[f"{name}.series"])
     if quantity.kind == "orientation":
         return float(rotation_between(values[:1], values).max())
-    if quantity.kind == "position":
+    if quantity.of_place:
         return float(np.linalg.norm(values - values[:1], axis=1).max())
     return float(np.abs(point.values[f"{name}.largest"]))
 

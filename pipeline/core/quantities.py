@@ -1,4 +1,4 @@
-"""Quantities of interest (`pipeline.core.scene.requested_accuracy`) read from a run, and compared between two runs.
+"""Quantities of interest (`pipeline.core.scene.quantity`) read from a run, and compared between two runs.
 
 Series are compared at the regular output times that both runs have, never interpolated.
 """
@@ -11,11 +11,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.pipeline.core.algebra import rotation_between
-from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
+from flexclear.pipeline.core.artifacts.coordinates import ROTATION
+from flexclear.pipeline.core.artifacts.run_schema import RUN
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.quantity import COMPONENTS, KINDS, Quantity, parse
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
     from flexclear.pipeline.core.scene.output import Output
     from flexclear.pipeline.core.scene.schema import TimeSpan
 
@@ -46,11 +50,80 @@ def lasting(time: np.ndarray, separated: np.ndarray, least: float) -> int | None
     return int(first[0]) if len(first) else None
 
 
-def series(run: xr.Dataset, quantity: Quantity) -> np.ndarray:
-    """Values over time, shape (time, components); only of quantities that have a value at every time."""
+def series(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
+    """Values over time, shape (time, components); only of quantities that have a value at every time [SI]."""
+    if not quantity.steps:
+        return _of_part(run, quantity)
+    stack: list[np.ndarray] = []
+    for step in quantity.steps:
+        if isinstance(step, Quantity):
+            stack.append(_of_part(run, step))
+        elif isinstance(step, tuple):
+            stack.append(np.full((1, 1), step[0]))
+        elif step == "norm":
+            stack.append(np.linalg.norm(stack.pop(), axis=1, keepdims=True))
+        elif step == "minus":
+            stack.append(-stack.pop())
+        else:
+            b, a = stack.pop(), stack.pop()
+            stack.append(_OPERATORS[step](a, b))
+    return stack[0]
+
+
+_OPERATORS = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
+
+
+def _of_part(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
     kind = KINDS[quantity.kind]
-    values: np.ndarray = run[kind.variable].sel({kind.owner: quantity.owner}).values
-    return values.reshape(len(values), -1)
+    values: np.ndarray = run[kind.variable].values
+    if kind.owner == "section":  # of all sections of the body the one where it is largest
+        mine = values[:, run["section_body"].values == quantity.owner].reshape(len(values), -1, 3 if kind.dim else 1)
+        largest = np.argmax(np.linalg.norm(mine, axis=2), axis=1)
+        values = np.take_along_axis(mine, largest[:, None, None], axis=1)
+    elif kind.owner:
+        values = values[:, run[kind.owner].values.tolist().index(quantity.owner)]
+    values = values.reshape(len(values), -1)
+    return values[:, [COMPONENTS.index(quantity.component)]] if quantity.component else values
+
+
+def evaluate(run: xr.Dataset, text: str) -> xr.DataArray:
+    """A quantity of a run by its name, over time, with its unit; the contacts' of each event, or of the run.
+
+    text: as `[view] watch` has it (`pipeline.core.scene.quantity`).  Raises InputError for one that the run lacks.
+    """
+    import xarray as xr  # here, since a run needs none of it
+
+    try:
+        quantity = parse(text, owners(run))
+    except ValueError as error:
+        raise InputError(f"quantity '{text}'", str(error)) from None
+    attributes = {"units": unit(run, quantity), "long_name": quantity.name}
+    if not quantity.over_time:
+        return xr.DataArray(np.squeeze(events(run, quantity)), name=quantity.name, attrs=attributes)
+    values, dim = series(run, quantity), quantity.dim
+    coordinates = {"time": run["time"].values} | ({dim: run[dim].values} if dim else {})
+    shown, dims = (values, ("time", dim)) if dim else (values[:, 0], ("time",))
+    return xr.DataArray(shown, coordinates, dims, quantity.name, attributes)
+
+
+def owners(run: xr.Dataset) -> dict[str, dict[str, bool]]:
+    """Names of what owns the quantities of a run, and whether they are about an axis, as `parse` takes them."""
+    known: dict[str, dict[str, bool]] = {"": {}}
+    for dim in {kind.owner for kind in KINDS.values()} - {""}:
+        names = "section_body" if dim == "section" else dim
+        if names in run.coords:
+            turns = (
+                run[f"{dim}_motion"].values == ROTATION if f"{dim}_motion" in run.coords else [False] * run.sizes[dim]
+            )
+            known[dim] = dict(zip(map(str, run[names].values), map(bool, turns), strict=True))
+    known[""] = {key: False for key, kind in KINDS.items() if not kind.owner and kind.variable in run}
+    return known
+
+
+def has(run: xr.Dataset, quantity: Quantity) -> bool:
+    """Whether a run holds this quantity."""
+    known = owners(run)
+    return quantity.is_there(known) and all(KINDS[term.kind].variable in run for term in quantity.terms())
 
 
 #: where a run says of each part whether it pushes or turns, where that is not the quantity's own variable
@@ -58,14 +131,15 @@ PUSHES = {"peak_force": "contact_normal_force"}
 
 
 def unit(run: xr.Dataset, quantity: Quantity) -> str:
-    """The SI unit of a quantity in a run: of drives and contacts along a rotation that of a torque or its impulse."""
+    """The SI unit of a quantity in a run: of what acts along a rotation that of a torque."""
     kind = KINDS[quantity.kind]
     name = PUSHES.get(quantity.kind, kind.variable)
-    if kind.owner not in ("drive", "contact") or quantity.kind == "impact_times" or name not in run:
-        return quantity.unit
     if f"{name}_units" in run.coords:
         return str(run[f"{name}_units"].sel({kind.owner: quantity.owner}).values)
-    return str(run[name].attrs.get("units") or quantity.unit)
+    turns = (
+        kind.units[0] != kind.units[1] and name in run and run[name].attrs.get("units") == RUN[kind.variable].turning
+    )
+    return kind.units[1] if turns else quantity.unit
 
 
 def events(run: xr.Dataset, quantity: Quantity, until: float = np.inf) -> np.ndarray:
@@ -82,11 +156,6 @@ def events(run: xr.Dataset, quantity: Quantity, until: float = np.inf) -> np.nda
     impact = mine & (run["event_approach_speed"].values > IMPACT)
     times: np.ndarray = run["event_time"].values[impact]
     return times
-
-
-def is_series(quantity: Quantity) -> bool:
-    """Whether it has a value at every time."""
-    return KINDS[quantity.kind].owner != "contact"
 
 
 def common_times(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -109,7 +178,7 @@ def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: flo
 
     Infinite when the runs differ in the number of impacts before `until`.
     """
-    if is_series(quantity):
+    if quantity.over_time:
         time, distance = deviation(run, reference, quantity)
         return float(distance[time <= until].max(initial=0.0))
     if quantity.kind == "impulse":
@@ -131,6 +200,8 @@ def standard_error(ensemble: xr.Dataset, quantity: Quantity) -> float | None:
     if quantity.owner not in ensemble[kind.owner].values:
         return None
     values = ensemble[kind.variable].sel({kind.owner: quantity.owner}).transpose("member", "time", ...).values
+    if quantity.component:
+        values = values[..., COMPONENTS.index(quantity.component)]
     spread = np.sqrt(values.var(axis=0, ddof=1).reshape(values.shape[1], -1).sum(axis=1))
     return float(spread.max() / np.sqrt(len(values)))
 
@@ -143,25 +214,25 @@ def scale(run: xr.Dataset, quantity: Quantity) -> float:
     if quantity.kind == "impact_times":
         times = events(run, quantity)
         return float(times[-1] - run["time"].values[0]) if len(times) else 0.0
-    if not is_series(quantity):
+    if not quantity.over_time:
         return float(np.abs(events(run, quantity)).max(initial=0.0))
     values = series(run, quantity)
     if quantity.kind == "orientation":
         return float(rotation_between(values[:1], values).max())
-    start = values[:1] if quantity.kind == "position" else 0.0
+    start = values[:1] if quantity.of_place else 0.0
     return float(np.linalg.norm(values - start, axis=1).max())
 
 
 def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
     """The part of a run that `error` and `scale` need for these quantities."""
     recorded: dict[str, xr.DataArray] = {}
-    for owner in ("body", "joint", "drive"):
-        mine = [q for q in chosen if KINDS[q.kind].owner == owner]
-        names = sorted({q.owner for q in mine})
-        recorded |= {KINDS[q.kind].variable: run[KINDS[q.kind].variable].sel({owner: names}) for q in mine}
-    if any(KINDS[q.kind].owner == "contact" for q in chosen):
+    terms = [term for quantity in chosen for term in quantity.terms()]
+    for kind in {KINDS[term.kind] for term in terms if term.kind not in ("peak_force", "impact_times")}:
+        names = sorted({term.owner for term in terms if KINDS[term.kind].owner == kind.owner})
+        whole = kind.owner in ("", "section")
+        recorded[kind.variable] = run[kind.variable] if whole else run[kind.variable].sel({kind.owner: names})
+    if any(not term.over_time for term in terms):
         recorded |= {str(name): run[name] for name in run.data_vars if str(name).startswith("event_")}
-        recorded |= {name: run[name] for name in ("contact_impulse",) if name in run}
     if "horizon" in run:
         recorded["horizon"] = run["horizon"]
     import xarray as xr  # here, since a run needs none of it
@@ -170,7 +241,7 @@ def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
 
 
 def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
-    """Recorded values of a series (`pipeline.core.scene.output_quantities`); shape () or (components,).
+    """Recorded values of a series (`pipeline.core.scene.quantity`); shape () or (components,).
 
     time: shape (n,), increasing; its steps are the weights of means.  values: shape (n, components).
     """

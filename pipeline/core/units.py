@@ -57,6 +57,7 @@ UNITS: dict[str, tuple[float, str]] = {
     "W": (1.0, "power"),
     "kW": (1e3, "power"),
     "N s": (1.0, "impulse"),
+    "N m s": (1.0, "angular impulse"),
     "Pa": (1.0, "pressure"),
     "kPa": (1e3, "pressure"),
     "bar": (1e5, "pressure"),
@@ -117,6 +118,7 @@ _EXPONENTS: dict[str, Exponents] = {
     "energy": (1, 2, -2, 0),
     "power": (1, 2, -3, 0),
     "impulse": (1, 1, -1, 0),
+    "angular impulse": (1, 2, -1, 0),
     "pressure": (1, -1, -2, 0),
     "angular velocity": (0, 0, -1, 1),
     "angular acceleration": (0, 0, -2, 1),
@@ -140,6 +142,8 @@ _EXPONENTS: dict[str, Exponents] = {
     "force per angle": (1, 1, -2, -1),
     "force per angular velocity": (1, 1, -1, -1),
 }
+#: what the exponents belong to
+_BASE = ("kg", "m", "s", "rad")
 #: a unit and its power; powers of more digits measure nothing, and would not be numbers
 _FACTOR = re.compile(r"([A-Za-z]+)(?:\^(-?\d(?:\.\d{1,3})?))?")
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "u", "μ": "u", "°": "deg"})
@@ -195,6 +199,26 @@ def udunits(text: str) -> str:
                 return ""
             factors.append(f"{match[1] if match else part}{int(power) if power != 1.0 else ''}")
     return " ".join(factors)
+
+
+def measured(text: str) -> Exponents:
+    """Exponents of kg, m, s and rad in a product of known units, or of "1"; ValueError for anything else."""
+    product = (1.0, _EXPONENTS["number"]) if text == "1" else _product(_plain(text))
+    if product is None:
+        raise ValueError(f"'{text}' is no unit")
+    return product[1]
+
+
+def si(exponents: Exponents) -> str:
+    """The SI unit with these exponents of kg, m, s and rad: by its name where it has one, "1" of a number."""
+    name = next((name for name, known in _EXPONENTS.items() if known == exponents), "")
+    if one := _example(name, factor=1.0):
+        return one
+    over, under = (
+        [f"{u}^{n:g}" if n != 1 else u for u, e in zip(_BASE, exponents, strict=True) if (n := sign * e) > 0]
+        for sign in (1, -1)
+    )
+    return (" ".join(over) or "1") + (f"/{' '.join(under)}" if under else "")
 
 
 def coefficient(value: object, dimension: str, order: int) -> float:

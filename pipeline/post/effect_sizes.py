@@ -13,7 +13,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.effect_size import Influence, influence
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.post.overview.curves import measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table

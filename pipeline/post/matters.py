@@ -16,7 +16,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.effect_size import Influence, chance, influence, size
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.effect_sizes import written
 from flexclear.pipeline.post.overview.curves import measured, rounded
 from flexclear.pipeline.post.plotting.table import Table

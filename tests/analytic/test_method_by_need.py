@@ -12,7 +12,7 @@ import xarray as xr
 
 from flexclear.pipeline import dynamics, load_scene
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.scene.requested_accuracy import parse
+from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.effects import schemes
 from flexclear.pipeline.dynamics.run.accuracy import FINER, Attempt, Search

@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline.core.quantities import standard_error
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.cost import statistics
 
 POSITION = Quantity("slider", "position")

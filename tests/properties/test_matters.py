@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.matters import (
     IDEAL,
     Pair,

@@ -13,7 +13,7 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
 from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.requested_accuracy import parse
+from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions

@@ -14,7 +14,7 @@ from flexclear.pipeline.core.effect_size import chance, influence
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.effect_sizes import closed
 from flexclear.pipeline.post.effect_sizes import variants as needed
 from flexclear.stages.new import write

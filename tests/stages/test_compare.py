@@ -12,7 +12,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.ideal import ideal
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.parts import MeshedRigidBody
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.overview import comparison, curves, figures, overlay, page
 from flexclear.pipeline.structure.fe import mesh as meshes
 from flexclear.pipeline.structure.fe.recipe import read_recipe

@@ -12,7 +12,7 @@ from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.requested_accuracy import parse
+from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order

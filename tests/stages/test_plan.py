@@ -19,7 +19,7 @@ from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.coupling import uncoupled
 from flexclear.pipeline.core.scene.load import edited, load_scene
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.linear.clearance_response import RANK, Bounds, bounds, lever_of
 from flexclear.pipeline.dynamics.linear.response import Response, first_excited, response, vibration

@@ -11,7 +11,7 @@ import pytest
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
-from flexclear.pipeline.core.scene.output_quantities import parse_recorded
+from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.dynamics.compile import stacks

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION, RUN
+from flexclear.pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION
 from flexclear.pipeline.core.scene.design import Axis, Design
-from flexclear.pipeline.core.scene.output_quantities import Recorded
-from flexclear.pipeline.core.scene.requested_accuracy import KINDS
+from flexclear.pipeline.core.scene.quantity import Recorded
 from flexclear.pipeline.core.units import udunits
 
 Values = dict[str, np.ndarray]
@@ -66,16 +65,8 @@ def unpacked(stored: xr.Dataset, recorded: Sequence[Recorded]) -> dict[str, Poin
 
 
 def variable(one: Recorded, statistic: str) -> str:
-    """Name of a variable."""
-    return one.name if statistic == "values" else f"{one.name}.{statistic}"
-
-
-def unit(one: Recorded, turning: Collection[str]) -> str:
-    """Unit of a recorded quantity, as UDUNITS reads it. turning: names of the quantities that are about an axis, not
-    along."""
-    declared = RUN[KINDS[one.quantity.kind].variable]
-    along = declared.turning if one.quantity.name in turning else declared.units
-    return "1" if one.reduction == "count" else along
+    """Name of a variable; files take no stroke in it."""
+    return (one.name if statistic == "values" else f"{one.name}.{statistic}").replace("/", "÷")
 
 
 def dataset(
@@ -85,14 +76,13 @@ def dataset(
     points: Mapping[str, Point],
     time: np.ndarray,
     sections: int,
-    turning: Collection[str],
     attributes: Mapping[str, str | int],
     statistics: Sequence[str] = STATISTICS[:1],
 ) -> xr.Dataset:
     """All points of a sweep on its own dimensions; nan where there is no value.
 
     keys: of the points, in their order.  points: the finished ones.  time: of the recorded series [s].
-    sections: how many there are of each point.  turning: as of `unit`.  shares: of `SHARES`, those that are asked for.
+    sections: how many there are of each point.  statistics: of `STATISTICS`, those that are asked for.
     """
     dims, shape = design.dims, design.shape
     every = [points.get(key) for key in keys]
@@ -122,7 +112,7 @@ def dataset(
     coordinates |= {"quat": list(QUATERNION)} if "quat" in sizes else {}
     coordinates |= {"time": time} if "time" in sizes else {}
     result = xr.Dataset(variables, coords=coordinates)
-    _describe(result, design.axes, recorded, turning)
+    _describe(result, design.axes, recorded)
     for name, (_, meaning) in plain.items():
         result[name].attrs = {"long_name": meaning}
     result["status"].attrs |= {"flag_values": np.arange(3, dtype=np.int8), "flag_meanings": " ".join(STATUS)}
@@ -154,7 +144,7 @@ def _arrays(
     return arrays
 
 
-def _describe(result: xr.Dataset, axes: Sequence[Axis], recorded: Sequence[Recorded], turning: Collection[str]) -> None:
+def _describe(result: xr.Dataset, axes: Sequence[Axis], recorded: Sequence[Recorded]) -> None:
     """Units and meanings."""
     words = {
         "values": "",
@@ -165,7 +155,7 @@ def _describe(result: xr.Dataset, axes: Sequence[Axis], recorded: Sequence[Recor
         for statistic, more in words.items():
             if variable(one, statistic) in result:
                 result[variable(one, statistic)].attrs = {
-                    "units": unit(one, turning),
+                    "units": udunits(one.unit),
                     "long_name": f"{one.meaning}{more}",
                 }
     for axis in axes:

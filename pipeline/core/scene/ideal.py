@@ -9,7 +9,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.appearance import UNSEEN
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.requested_accuracy import parse
+from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
 
 #: effects that can be taken away, and how a scene without them is called
@@ -54,9 +54,11 @@ def owned(scene: Scene, left: Collection[str]) -> dict[str, Any]:
     keys: dict[str, Any] = {}
     owners = scene.owners()
     if left:
-        contacts = tuple(name for name in owners["contact"] if name.partition(".")[0] not in left)
-        owners = {**owners, "contact": contacts}
-        if not contacts:
+        loosened = ("contact", "worn")
+        owners |= {
+            of: {n: turns for n, turns in owners[of].items() if n.partition(".")[0] not in left} for of in loosened
+        }
+        if not owners["contact"]:
             keys["ensemble"] = None
         if scene.accuracy is not None:
             requested = {
@@ -73,7 +75,7 @@ def owned(scene: Scene, left: Collection[str]) -> dict[str, Any]:
     return keys
 
 
-def _has(name: str, owners: dict[str, tuple[str, ...]]) -> bool:
+def _has(name: str, owners: dict[str, dict[str, bool]]) -> bool:
     try:
         parse(name, owners)
     except ValueError:

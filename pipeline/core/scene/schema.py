@@ -20,6 +20,7 @@ from flexclear.pipeline.core.scene.gears import Gear
 from flexclear.pipeline.core.scene.limits import Limits, check_members, check_rows
 from flexclear.pipeline.core.scene.loads import Gravity, Load, SampledPid
 from flexclear.pipeline.core.scene.output import Output
+from flexclear.pipeline.core.scene.owners import owners
 from flexclear.pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
@@ -29,11 +30,11 @@ from flexclear.pipeline.core.scene.parts import (
     MeshedRigidBody,
     RigidBody,
 )
-from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity, parse, usual
+from flexclear.pipeline.core.scene.quantity import Quantity, parse, usual
 from flexclear.pipeline.core.scene.solver import PlainIntegrator, Solver
 from flexclear.pipeline.core.scene.start import Start
 from flexclear.pipeline.core.scene.stops import Stop
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.units import any_quantity, measured, quantity
 
 Positive = Field(gt=0.0)
 #: types of joints with one freedom: driving it determines the whole relative motion
@@ -93,10 +94,12 @@ class Sections(Part):
 class Request(Part):
     """A requested accuracy: absolute in SI, or relative to the quantity's own size.
 
-    absolute: in the SI unit of the quantity.  relative: fraction of the largest change of the quantity.
+    absolute: in SI.  unit: SI unit that the number was written with, if it was.  relative: fraction of the largest
+    change of the quantity.
     """
 
     absolute: Annotated[Number, Field(gt=0.0)] | None = None
+    unit: str | None = None
     relative: Annotated[Number, Field(gt=0.0, lt=1.0)] | None = None
 
 
@@ -104,8 +107,8 @@ class Accuracy(Part):
     """Requested accuracy of the time integration per quantity, e.g. ``platform.position = "1 um"``.
 
     The value is an absolute one with a unit (or bare, in SI), or a fraction like ``"0.1 %"`` or
-    ``{ relative = 1e-6 }`` of the quantity's largest change.  Kinds of quantities:
-    `pipeline.core.scene.requested_accuracy`.
+    ``{ relative = 1e-6 }`` of the quantity's largest change; expressions are quoted, as
+    ``"force(A1) - force(A2)" = "1 N"``.
     quantities: a file writes them without this key.
     allow_missed: what is missed is reported either way, and the run is stored; without this the command ends with an
     error.
@@ -130,7 +133,7 @@ class Accuracy(Part):
 class View(Part):
     """What is examined; no effect on the motion.
 
-    watch: quantities that comparisons, error tables and films show, as ``platform.position`` or ``A1.peak_force``;
+    watch: quantities that comparisons, error tables and films show, as ``platform.position`` or ``A1.force - A2.force``;
     default: those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts.
     direction: from which pictures and films look at the mechanism, a vector from it to the eye; default: of a planar
     mechanism its normal, else from above and in front.
@@ -168,7 +171,7 @@ def _leaves(table: dict[str, Any], where: str) -> list[tuple[str, Any]]:
     leaves = []
     for key, value in table.items():
         name = f"{where}.{key}".lstrip(".")
-        if isinstance(value, dict) and not set(value) <= {"absolute", "relative"}:
+        if isinstance(value, dict) and not set(value) <= {"absolute", "relative", "unit"}:
             leaves += _leaves(value, name)
         elif name != "source":
             leaves.append((name, value))
@@ -180,16 +183,14 @@ def _requested(name: str, value: Any) -> Any:
         return value
     if isinstance(value, str) and value.rstrip().endswith("%"):
         return {"relative": quantity(value, "number")}
-    kind = KINDS.get(name.rpartition(".")[2])
-    if kind is None:
-        return {"absolute": 1.0}  # the scene, which knows its parts, names what could have been meant
-    problems = []
-    for dimension in kind.dimensions:
-        try:
-            return {"absolute": quantity(value, dimension)}
-        except ValueError as error:
-            problems.append(str(error))
-    raise ValueError(f"{name}: {problems[0]}")
+    try:
+        read = any_quantity(value)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from None
+    if not isinstance(read, str):
+        return {"absolute": read}
+    number, _, unit = read.partition(" ")  # whether it fits is known to the scene, which has the quantity
+    return {"absolute": float(number), "unit": unit}
 
 
 class Scene(Part):
@@ -241,9 +242,13 @@ class Scene(Part):
     def _quantities_are_there(self) -> None:
         named = [("accuracy.", name) for name in (self.accuracy.quantities if self.accuracy else ())]
         named += [("view.watch: ", name) for name in (self.view and self.view.watch) or ()]
+        known = self.owners() if named else {}
         for where, name in named:
             try:
-                parse(name, self.owners())
+                one = parse(name, known)
+                written = self.accuracy.quantities[name].unit if self.accuracy and where == "accuracy." else None
+                if written is not None and measured(written) != measured(one.unit):
+                    raise ValueError(f"its accuracy is in {written}, but it is in {one.unit}")
             except ValueError as error:
                 raise ValueError(f"{where}{name}: {error}") from None
 
@@ -295,15 +300,9 @@ class Scene(Part):
         """Whether the integrator is chosen for the accuracy that is asked for."""
         return bool(self.accuracy is not None and self.accuracy.quantities and self.accuracy.by_need)
 
-    def owners(self) -> dict[str, tuple[str, ...]]:
-        """Names of the parts that may own a quantity, by what they are."""
-        moving = tuple(name for name, body in self.body.items() if not isinstance(body, Ground))
-        return {
-            "body": moving,
-            "joint": tuple(self.joint),
-            "drive": tuple(self.drive),
-            "contact": tuple([*self.contacts(), *self.stop_ends()]),
-        }
+    def owners(self) -> dict[str, dict[str, bool]]:
+        """Names of the parts that may own a quantity, by what they are; whether what they do is about an axis."""
+        return owners(self)
 
     def requested(self) -> list[Quantity]:
         """The quantities that `[accuracy]` names; without it the usual ones."""
@@ -319,7 +318,8 @@ class Scene(Part):
         known = self._prescribed()
         pairs = {n: [hosts[b] for b in pair] for n, pair in joints.items()}
         free = {n: [b for b in pair if b not in known] for n, pair in pairs.items()}
-        return usual(free if any(free.values()) else pairs, tuple([*self.contacts(), *self.stop_ends()]))
+        chosen = usual(free if any(free.values()) else pairs, tuple([*self.contacts(), *self.stop_ends()]))
+        return [parse(one.name, self.owners()) for one in chosen]
 
     def _prescribed(self) -> set[str]:
         """Rigid bodies whose motion drives tell: from the ground on by fixed joints and driven ones of one freedom."""

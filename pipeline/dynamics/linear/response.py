@@ -26,7 +26,7 @@ import scipy.linalg
 import xarray as xr
 
 from flexclear.pipeline.core.scene.parts import RigidBody
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.dynamics.linear import clearance_response
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement

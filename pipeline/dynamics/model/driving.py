@@ -10,7 +10,6 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import lookup, suggestion
 from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import PathDrive
-from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.effects import JOINTS
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
@@ -85,24 +84,6 @@ def named_coordinate(scene: Scene, text: str, path: str) -> tuple[str, Coordinat
         return joint, coordinate_of(scene, joint, coordinate or None, path)[2]
     except InputError as error:  # the joint and its coordinate are in one text here
         raise InputError(path, error.problem, error.remedy) from None
-
-
-def turns(scene: Scene, quantity: Quantity) -> bool:
-    """Whether a quantity of a drive or a stop belongs to an angle, so that its forces are torques."""
-    owner, kind = quantity.owner, KINDS[quantity.kind].owner
-    if kind == "drive":
-        return any(c.dimension == "angle" for c in prescribed(scene) if c.name == owner)
-    if kind == "contact" and owner in scene.stop_ends():
-        name = owner.rpartition(".")[0]
-        stop = scene.stop[name]
-        return coordinate_of(scene, stop.joint, stop.coordinate, f"[stop.{name}]")[2].turning
-    return False
-
-
-def unit_of(scene: Scene, quantity: Quantity) -> str:
-    """The SI unit of a quantity, forces along angles being torques; `core.quantities.unit` returns it for a run."""
-    force = "N m" if turns(scene, quantity) else "N"
-    return {"drive_force": force, "peak_force": force, "impulse": f"{force} s"}.get(quantity.kind, quantity.unit)
 
 
 def joint_drives(scene: Scene) -> dict[str, tuple[str | None, ...]]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from flexclear.pipeline.core import effect_size
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.scene.requested_accuracy import KINDS, Quantity
+from flexclear.pipeline.core.scene.quantity import KINDS, OF_CLEARANCE, Quantity
 from flexclear.pipeline.core.scene.schema import Scene
 
 #: peaks of forces between flexible bodies are at least this fraction of those between rigid ones
@@ -28,7 +28,7 @@ def requested_in(
     where = f"{scene.path or scene.name} [accuracy]"
     assert scene.accuracy is not None
     for q in quantities:
-        of_contact = KINDS[q.kind].owner == "contact"
+        of_contact = any(KINDS[term.kind].owner in OF_CLEARANCE for term in q.terms())
         point = rigid() if of_contact else ideal
         if point.refused:
             raise SolverError(f"{scene.name}: the mechanism with rigid bodies cannot be run: {point.refused}")

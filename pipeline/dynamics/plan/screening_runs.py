@@ -14,7 +14,7 @@ from flexclear.pipeline.core.effect_size import Influence, influence, recorded, 
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect, with_modes, without
 from flexclear.pipeline.dynamics.model.mechanism import build

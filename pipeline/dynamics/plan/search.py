@@ -18,7 +18,7 @@ from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.decisions import BOUND, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
-from flexclear.pipeline.core.scene.requested_accuracy import KINDS, parse
+from flexclear.pipeline.core.scene.quantity import KINDS, OF_CLEARANCE, parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE, bounds
@@ -60,7 +60,7 @@ def plan(
     """
     assert scene.accuracy is not None
     quantities = [parse(name, scene.owners()) for name in scene.accuracy.quantities]
-    uncoupled_parts = uncoupled(scene, {q.owner.partition(".")[0] for q in quantities})
+    uncoupled_parts = uncoupled(scene, {term.owner.partition(".")[0] for q in quantities for term in q.terms()})
     bare = lessened(_plain(scene), uncoupled_parts)
     mine, *less = ({n: b for n, b in given.items() if n in bare.flexible()} for given in (bundles, *fewer))
     pilots = Pilots(bare, mine, less, filled, quantities, progress)
@@ -97,7 +97,7 @@ def _rigid(search: Search, gone: Sequence[Effect]) -> Run:
 
 def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect], rigid: Run | None) -> None:
     """Which joints stay loose: by bounds where only the pose is asked for, else by runs of rigid bodies."""
-    asked = {q.owner for q in search.pilots.chosen if KINDS[q.kind].owner == "contact"}
+    asked = {t.owner for q in search.pilots.chosen for t in q.terms() if KINDS[t.kind].owner in OF_CLEARANCE}
     for effect in loose:
         if effect.owner in asked:
             search.decide(effect, True, NONE, "a quantity of this contact is asked for")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Collection, Iterator
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -15,6 +17,8 @@ from flexclear.pipeline.core.artifacts.schema import RUN, conformed
 from flexclear.pipeline.core.citations import cited
 from flexclear.pipeline.core.quantities import PERTURBATION
 from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.output import VARIABLES
+from flexclear.pipeline.core.scene.quantity import KINDS, Quantity
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics.compile.sources import named
@@ -45,47 +49,93 @@ def dataset(run: Run) -> xr.Dataset:
 
 def recorded(run: Run) -> LabelledArrays:
     """All that is recorded of a run (schema RUN)."""
-    model, trajectory, seen = run.model, run.trajectory, run.observed
-    motions = Motions(model, seen)
-    parts = [_motion(motions), _modes(motions), _drives(run), _joint_coordinates(model, seen)]
-    if model.loads:
-        parts.append(_loads(model, seen))
-    if "bushing" in model.parts.loads:
-        from flexclear.pipeline.dynamics.record.bushings import give
-
-        parts.append(give(model, seen))
-    if {"pid", "sampled-pid"} & set(model.parts.loads):
-        from flexclear.pipeline.dynamics.record.controllers import controllers
-
-        parts.append(controllers(model, seen))
-    if model.parts.couplings:
-        from flexclear.pipeline.dynamics.record.gears import gear_series
-
-        parts.append(gear_series(model, seen))
-    if model.parts.joint_frictions:
-        from flexclear.pipeline.dynamics.record.joint_friction import friction_series
-
-        parts.append(friction_series(model, seen))
+    model, trajectory = run.model, run.trajectory
+    motions = Motions(model, run.observed)
+    parts = [_motion(motions), *(made() for _, made in _makers(run.scene, motions))]
     if model.contacts:
-        parts += [_contacts(model, seen), (_events(model, trajectory), {})]
-    if model.parts.wear:
-        from flexclear.pipeline.dynamics.record.wear import wear_series
-
-        parts.append(wear_series(model, seen))
+        parts.append((_events(model, trajectory), {}))
     if run.perturbed is not None:
         horizon: Variables = {"horizon": ((), np.array(run.perturbed.horizon))}
         separation: Variables = {"separation": (("separation_time",), run.perturbed.separation)}
         parts.append((separation | horizon, {"separation_time": run.perturbed.time}))
-    for name, asked in run.scene.output.requests().items():
-        record = lookup(RECORDS, name, where="[output]")
-        parts.append(record(motions, asked))
-    parts += [(ledger.series(model, seen), {}), topology(run)]
+    parts.append(topology(run))
     variables, coordinates = Variables(), dict[str, object](time=trajectory.time)
     for part in parts:
         variables |= part[0]
         coordinates |= part[1]
     title, facts = f"Motion of {subject(run.scene)}", attributes(run.scene) | _report(run)
     return conformed(labelled(variables, coordinates), RUN, title=title, **facts)
+
+
+def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity]) -> LabelledArrays:
+    """What of a run these quantities are read from (`core.quantities.series`), and little else.
+
+    terms: no expressions, but what they consist of.
+    """
+    names: dict[str, list[str]] = {}
+    for term in terms:
+        mine = names.setdefault(KINDS[term.kind].owner, [])
+        mine += [term.owner] if term.owner not in mine else []
+    wanted, parts, model = {KINDS[term.kind].variable for term in terms}, list[Part](), motions.model
+    if bodies := names.get("body"):
+        those = motions.several(bodies)
+        moved = motion_series(those, model.mechanism.origin)
+        moved["angular_acceleration"] = (("time", "body", "axis"), those.alpha)
+        parts.append((moved, {"body": bodies}))
+    if joints := names.get("joint"):
+        moment, force = every_joint_wrench(motions, joints)
+        dims = ("time", "joint", "axis")
+        parts.append(({"joint_moment": (dims, moment), "joint_force": (dims, force)}, {"joint": joints}))
+    if frames := names.get("frame"):
+        places = shifted(motions.positions(frames), model.mechanism.origin)
+        parts.append(({"frame_position": (("time", "frame", "axis"), places)}, {"frame": frames}))
+    parts += [made() for makes, made in _makers(scene, motions) if any(name.startswith(makes) for name in wanted)]
+    variables = {name: values for part in parts for name, values in part[0].items() if name in wanted}
+    return labelled(variables, {name: values for part in parts for name, values in part[1].items()})
+
+
+#: beginnings of the variables that the ledger makes
+_LEDGER = (
+    ("kinetic", "potential", "elastic", "dissipated", "drive_work", "energy_error", "constraint_error", "load_work")
+    + ("load_loss", "joint_friction_loss", "modal_damping_loss", "contact_elastic", "contact_damping_loss")
+    + ("contact_impulse", "contact_friction_loss")
+)
+
+
+def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], Callable[[], Part]]]:
+    """What makes the variables of this scene but those of bodies, frames and joints, by how their names begin."""
+    model, seen = motions.model, motions.seen
+    yield ("modal_",), lambda: _modes(motions)
+    yield ("drive_force", "drive_position"), lambda: _drives(model, seen)
+    yield ("joint_position", "joint_velocity", "joint_acceleration"), lambda: _joint_coordinates(model, seen)
+    if model.loads:
+        yield ("load_",), lambda: _loads(model, seen)
+    if "bushing" in model.parts.loads:
+        from flexclear.pipeline.dynamics.record.bushings import give
+
+        yield ("bushing_",), lambda: give(model, seen)
+    if {"pid", "sampled-pid"} & set(model.parts.loads):
+        from flexclear.pipeline.dynamics.record.controllers import controllers
+
+        yield ("controller_",), lambda: controllers(model, seen)
+    if model.parts.couplings:
+        from flexclear.pipeline.dynamics.record.gears import gear_series
+
+        yield ("gear_",), lambda: gear_series(model, seen)
+    if model.parts.joint_frictions:
+        from flexclear.pipeline.dynamics.record.joint_friction import friction_series
+
+        yield ("joint_bearing", "joint_sliding", "joint_friction_"), lambda: friction_series(model, seen)
+    if model.contacts:
+        yield ("contact_",), lambda: _contacts(model, seen)
+    if model.parts.wear:
+        from flexclear.pipeline.dynamics.record.wear import wear_series
+
+        yield ("wear_",), lambda: wear_series(model, seen)
+    for name, asked in scene.output.requests().items():
+        record = lookup(RECORDS, name, where="[output]")
+        yield tuple(VARIABLES[name]), partial(record, motions, asked)
+    yield _LEDGER, lambda: (ledger.series(model, seen), {})
 
 
 def subject(scene: Scene) -> str:
@@ -255,8 +305,8 @@ def _modes(motions: Motions) -> Part:
     }
 
 
-def _drives(run: Run) -> Part:
-    model, seen, names = run.model, run.observed, list(run.model.drives)
+def _drives(model: Model, seen: Observed) -> Part:
+    names = list(model.drives)
     if not names:
         return {}, {}
     force, position = model.drive_signs * seen.drive_force, model.drive_signs * seen.positions[:, model.nq :]

@@ -10,20 +10,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.artifacts.points import Point, Values
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
 from flexclear.pipeline.core.scene.load import with_numbers
-from flexclear.pipeline.core.scene.output_quantities import OF_CONTACTS, Recorded
+from flexclear.pipeline.core.scene.quantity import MAGNITUDES, Recorded
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.ensemble import ball_offsets
-from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
+from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
-from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.alike import engines_alike
 from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroups, Place, groups
 from flexclear.pipeline.dynamics.run.engine import Engine
@@ -108,7 +109,7 @@ class Runner:
         for start in self._starts(engine):
             last, trajectory, _ = follow(engine, start, alive, other)
             with self._looking:
-                rows.append(_kept(last, trajectory, self.recorded))
+                rows.append(_kept(scene, last, trajectory, self.recorded))
             count += trajectory.counters["evaluations"]
         if not self.members:
             return rows[0], {}, count
@@ -153,25 +154,25 @@ def thinned(scene: Scene, recorded: Sequence[Recorded]) -> Scene:
     return scene.model_copy(update={"output": scene.output.model_copy(update={"interval": interval})})
 
 
-def _kept(engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
+def _kept(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[Recorded]) -> Values:
     seen = observed(engine, trajectory)
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
-    motions, series = Motions(engine.model, seen), dict[str, np.ndarray]()
-    forces = joint_wrenches(motions, sorted({k.quantity.owner for k in kept if k.quantity.kind in ("force", "moment")}))
+    terms = {t for k in kept if k.quantity.over_time for t in k.quantity.terms()}
+    arrays, series = chosen(scene, Motions(engine.model, seen), terms), dict[str, np.ndarray]()
     values: Values = {}
     for one in kept:
-        if one.quantity.kind in OF_CONTACTS:
+        if not one.quantity.over_time:
             values[one.name] = np.asarray(_of_contact(engine, trajectory, seen, one))
             continue
         if one.quantity.name not in series:
-            series[one.quantity.name] = _series(motions, forces, one)
+            series[one.quantity.name] = quantities.series(arrays, one.quantity)
         recorded = series[one.quantity.name]
         if one.reduction == "series":
             value = recorded[_regular(engine, trajectory.time)]
         else:
             value = reduced(trajectory.time, recorded, one.reduction)
-        values[one.name] = value if "axis" in one.dims or "quat" in one.dims else value.reshape(value.shape[:1])
+        values[one.name] = value if one.quantity.dim or one.reduction in MAGNITUDES else value[..., 0]
     return values
 
 
@@ -189,26 +190,13 @@ def _sections(engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> 
         if done.number >= requested.transient:
             here = done.parts[sampled_at]
             motions = Motions(engine.model, observed(parts[sampled_at], replace(here, rows=here.rows[:1])))
+            arrays = chosen(scene, motions, {term for one in recorded for term in one.quantity.terms()})
             for one in recorded:
-                values.setdefault(one.name, []).append(_series(motions, {}, one)[0])
+                row = quantities.series(arrays, one.quantity)[0]
+                values.setdefault(one.name, []).append(row if one.quantity.dim else row[0])
         if done.number + 1 == requested.transient + requested.periods:
             break
     return {name: np.array(rows) for name, rows in values.items()}, evaluations
-
-
-def _series(motions: Motions, forces: Mapping[str, tuple[np.ndarray, np.ndarray]], one: Recorded) -> np.ndarray:
-    """Values at all rows, shape (rows, components), as the run's dataset has them."""
-    owner, kind = one.quantity.owner, one.quantity.kind
-    if kind in ("force", "moment"):
-        return forces[owner][kind == "force"]
-    if kind == "drive_force":
-        drives = list(motions.model.drives)
-        column = drives.index(owner)
-        force: np.ndarray = motions.model.drive_signs[column] * motions.seen.drive_force[:, [column]]
-        return force
-    series = motion_series(motions.several([owner]), motions.model.mechanism.origin)
-    _, values = series["quaternion" if kind == "orientation" else kind]
-    return values[:, 0]
 
 
 def _of_contact(engine: Engine, trajectory: Trajectory, seen: Observed, one: Recorded) -> float:

@@ -23,7 +23,7 @@ from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity, parse
+from flexclear.pipeline.core.scene.quantity import Quantity, parse
 from flexclear.pipeline.core.scene.schema import Scene
 
 if TYPE_CHECKING:
@@ -239,7 +239,7 @@ def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> st
 
 
 def _trusted_until(search: Search, best: Attempt, quantity: Quantity, requested: float) -> str:
-    if not quantities.is_series(quantity):
+    if not quantity.over_time:
         return ""
     other = search.runs[min(search.runs, key=lambda r: (r == best.rtol, abs(math.log(r / best.rtol))))]
     time, distance = quantities.deviation(best.run, other, quantity)

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.cost.statistics import relative_error
 from flexclear.pipeline.post.cost.study import Point, believed, relative
 
@@ -109,7 +109,7 @@ def _sampling(
 ) -> float:
     """What the largest value changes when the output is denser; events are located, not sampled."""
     denser = next((runs[p.key] for p in points if p.key == "denser output"), None)
-    if asis is None or denser is None or not quantities.is_series(quantity):
+    if asis is None or denser is None or not quantity.over_time:
         return np.nan
     return relative(abs(quantities.scale(denser, quantity) - quantities.scale(asis, quantity)), size)
 

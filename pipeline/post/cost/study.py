@@ -16,7 +16,7 @@ import xarray as xr
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.integrators import INTEGRATORS
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 
 #: groups of points and the factors that span each
 GROUPS: dict[str, tuple[str, ...]] = {

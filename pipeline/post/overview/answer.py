@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.horizon import sentence
 from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
 from flexclear.pipeline.post.series import parameters

@@ -16,15 +16,13 @@ import xarray as xr
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.horizon import sentence
-from flexclear.pipeline.post.overview.curves import curves, has, measured, rounded, scaled
+from flexclear.pipeline.post.overview.curves import curves, measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table
 
 #: what a run reports of its cost, by its attribute
 COSTS = {"evaluations": "evaluations", "steps": "steps", "rejected_steps": "rejected steps"}
-#: kinds whose largest value is that of their change from the start
-FROM_THE_START = ("position", "orientation")
 
 
 def assemble(
@@ -52,14 +50,14 @@ def assemble(
             curve = drawn[i]
             if curve is not None:
                 series["value"][i, j] = curve.values[_at(curve.time, time)]
-            if not has(run, quantity):
+            if not quantities.has(run, quantity):
                 continue
             numbers["largest"][i, j] = quantities.scale(run, quantity)
             if label in tighter:
                 numbers["error"][i, j] = quantities.error(run, tighter[label], quantity)
-            if has(reference, quantity):
+            if quantities.has(reference, quantity):
                 numbers["difference"][i, j] = _difference_of(run, reference, quantity)
-                if quantities.is_series(quantity):
+                if quantity.over_time:
                     when, distance = quantities.deviation(run, reference, quantity)
                     series["distance"][i, j] = distance[_at(when, time)]
     data: dict[str, tuple[tuple[str, ...], np.ndarray]]
@@ -89,7 +87,7 @@ def _difference_of(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -
     For vectors a, b over time, max |a - b| >= | max |a| - max |b| |, taken at the time of the larger one.
     """
     difference = quantities.error(run, reference, quantity)
-    if not quantities.is_series(quantity) or quantity.kind in FROM_THE_START:
+    if not quantity.over_time or quantity.of_place:
         return difference
     return max(difference, abs(quantities.scale(run, quantity) - quantities.scale(reference, quantity)))
 

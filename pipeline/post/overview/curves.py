@@ -10,7 +10,7 @@ import xarray as xr
 
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.algebra import first_largest
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
+from flexclear.pipeline.core.scene.quantity import KINDS, Quantity
 from flexclear.pipeline.post.rotations import Turning, turning
 
 #: factor and unit of smaller and larger values, largest first
@@ -20,10 +20,9 @@ PREFIXES = {
     "rad": ((180.0 / np.pi, "°"), (1e3, "mrad"), (1e6, "µrad")),
     "N": ((1e-3, "kN"), (1.0, "N"), (1e3, "mN")),
     "s": ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns")),
+    "Pa": ((1e-6, "MPa"), (1e-3, "kPa"), (1.0, "Pa")),
     "J": ((1e-3, "kJ"), (1.0, "J"), (1e3, "mJ"), (1e6, "µJ")),
 }
-#: kinds of which one component is drawn, that with the largest range
-BY_COMPONENT = ("position", "velocity", "angular_velocity")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,18 +41,16 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
 
     A contact's quantities are drawn as its force; where the joint has no clearance, as the joint's.
     """
-    if not quantities.is_series(quantity):
+    if not quantity.over_time:
         return [_force(run, quantity.owner) for run in runs]
     if quantity.kind == "orientation":
-        return [_turned(run, quantity) if has(run, quantity) else None for run in runs]
-    lines = [quantities.series(run, quantity) if has(run, quantity) else None for run in runs]
+        return [_turned(run, quantity) if quantities.has(run, quantity) else None for run in runs]
+    lines = [quantities.series(run, quantity) if quantities.has(run, quantity) else None for run in runs]
     there = [values for values in lines if values is not None]
-    if quantity.kind in BY_COMPONENT and there:
+    k, title = 0, _title(runs, quantity)
+    if _by_component(quantity) and there:
         k = int(first_largest(np.max([np.ptp(values, axis=0) for values in there], axis=0)))
-        title = f"{quantity.owner}: {quantity.kind.replace('_', ' ')} along {'xyz'[k]}"
-        title = title.replace("angular velocity along", "angular velocity about")
-    else:
-        k, title = 0, f"{quantity.owner}: {_kind(runs, quantity)}"
+        title += f" {'about' if quantity.kind.startswith('angular') else 'along'} {'xyz'[k]}"
     return [
         None
         if values is None
@@ -73,14 +70,6 @@ NONE = np.empty((0, 2))
 SHORT = 4.0
 
 
-def has(run: xr.Dataset, quantity: Quantity) -> bool:
-    """Whether a run holds this quantity."""
-    from flexclear.pipeline.core.scene.requested_accuracy import KINDS
-
-    kind = KINDS[quantity.kind]
-    return kind.owner in run.coords and quantity.owner in run[kind.owner].values
-
-
 def _turned(run: xr.Dataset, quantity: Quantity) -> Curve:
     turned = turned_by(run, quantity.owner)
     return Curve(f"{quantity.owner}: {turned.title}", quantity.unit, run["time"].values, turned.angle, NONE)
@@ -92,21 +81,31 @@ def turned_by(run: xr.Dataset, body: str) -> Turning:
     return turning(run["time"].values, mine["quaternion"].values, mine["angular_velocity"].values)
 
 
-def _kind(runs: Sequence[xr.Dataset], quantity: Quantity) -> str:
+def _by_component(quantity: Quantity) -> bool:
+    """Whether one component is drawn, that with the largest range; of other vectors the magnitude."""
+    return quantity.dim == "axis" and KINDS[quantity.kind].owner in ("body", "frame")
+
+
+def _title(runs: Sequence[xr.Dataset], quantity: Quantity) -> str:
     """What the quantity is called: what a drive supplies about an axis is a torque."""
-    turns = any(has(run, quantity) and quantities.unit(run, quantity) == "N m" for run in runs)
-    return "drive torque" if quantity.kind == "drive_force" and turns else quantity.kind.replace("_", " ")
+    if quantity.steps or not quantity.owner:
+        return quantity.name.replace("_", " ") if not quantity.steps else quantity.name
+    turns = any(quantities.has(run, quantity) and quantities.unit(run, quantity) == "N m" for run in runs)
+    kind = quantity.kind.replace("force", "torque") if turns else quantity.kind
+    return f"{quantity.owner}: {kind.replace('_', ' ')}{f' along {c}' if (c := quantity.component) else ''}"
 
 
 def _drawn(values: np.ndarray, quantity: Quantity, component: int) -> np.ndarray:
-    if quantity.kind in BY_COMPONENT:
+    if _by_component(quantity):
         return values[:, component]
     return values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
 
 
 def _size(run: xr.Dataset, quantity: Quantity) -> float:
     """Largest range of such a quantity among all bodies, along any axis; 0 of other kinds, which have no noise."""
-    return float(np.ptp(run[quantity.kind].values, axis=0).max(initial=0.0)) if quantity.kind in BY_COMPONENT else 0.0
+    kind = KINDS[quantity.kind]
+    noisy = kind.owner in ("body", "frame")
+    return float(np.ptp(run[kind.variable].values, axis=0).max(initial=0.0)) if noisy else 0.0
 
 
 def _force(run: xr.Dataset, joint: str) -> Curve | None:

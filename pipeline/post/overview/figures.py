@@ -11,11 +11,13 @@ from matplotlib.axes import Axes
 
 from flexclear.pipeline.core import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
-from flexclear.pipeline.post.overview.curves import by_unit, impacts, measured, turned_by, without_noise
+from flexclear.pipeline.core.scene.quantity import OF_CONTACTS, Quantity
+from flexclear.pipeline.post.overview.curves import by_unit, curves, impacts, measured, turned_by, without_noise
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.series import derive, parameters
 
+#: kinds of quantities that other figures show
+ELSEWHERE = ("position", "orientation", "velocity", "force", "drive_force", *OF_CONTACTS)
 #: most bodies, joints and contacts that are drawn; those that are watched come first, then those with most of it
 BODIES, JOINTS, CONTACTS = 6, 8, 4
 AXES_COLORS = {"x": "#D55E00", "y": "#009E73", "z": "#0072B2"}
@@ -42,9 +44,9 @@ def make(run: xr.Dataset, watched: Sequence[Quantity] = (), post: xr.Dataset | N
     """
     require_complete(run)
     post = derive(run) if post is None else post
-    first = [quantity.owner for quantity in watched]
+    first = [term.owner for quantity in watched for term in quantity.terms()]
     with style.style():
-        panels = _motion(run, post, first) | _energy(run)
+        panels = _motion(run, post, first) | _energy(run) | _watched(run, watched)
         if post.sizes["joint"]:
             panels |= _reactions(run, post, first)
         if "contact" in run.sizes:
@@ -91,6 +93,23 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
     style.shared_legend(figure, axes[0, 0], 3)
     style.heading(figure, f"Motion of the bodies{_rest(len(names), BODIES)}", "centre of mass, axes of the world")
     return style.files("motion", figure)
+
+
+def _watched(run: xr.Dataset, watched: Sequence[Quantity]) -> dict[str, bytes]:
+    """Watched quantities that none of the other figures has."""
+    others = [quantity for quantity in watched if quantity.component or quantity.kind not in ELSEWHERE]
+    lines = [line for quantity in others for line in curves([run], quantity) if line is not None]
+    if not lines:
+        return {}
+    figure, axes = style.grid(len(lines), 1, (8.0, 0.9 + 1.8 * len(lines)), sharex=True)
+    for panel, line in zip(axes.flat, lines, strict=True):
+        factor, unit = by_unit({"": line.values}, line.unit)
+        panel.plot(1e3 * line.time, factor * line.values, lw=0.9)
+        panel.set_title(f"{line.title} ({unit})")
+        panel.set_xlim(1e3 * line.time[0], 1e3 * line.time[-1])
+    axes.flat[-1].set_xlabel("time (ms)")
+    style.heading(figure, "Watched quantities", "of vectors without a component: the magnitude, or the component named")
+    return style.files("watched", figure)
 
 
 def _without_noise(values: np.ndarray) -> np.ndarray:

@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
-from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, has, scaled
+from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, scaled
 from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.series import derive, parameters
@@ -94,7 +94,7 @@ def _apart(
     (_, reference), *others = runs.items()
     lines: list[tuple[int, np.ndarray, np.ndarray]] = []
     for k, (_, run) in enumerate(others, start=1):
-        if quantities.is_series(quantity) and has(run, quantity) and has(reference, quantity):
+        if quantity.over_time and quantities.has(run, quantity) and quantities.has(reference, quantity):
             lines.append((k, *quantities.deviation(run, reference, quantity)))
         elif (mine := curves_drawn[k]) is not None and (theirs := curves_drawn[0]) is not None:
             i, j = quantities.common_times(mine.time, theirs.time)

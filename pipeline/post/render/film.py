@@ -11,6 +11,7 @@ import pyvista as pv
 import xarray as xr
 
 from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.body_shape import faces
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import pace
@@ -54,19 +55,30 @@ def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900), marg
 
 
 def film(
-    drawn: Mechanism, post: xr.Dataset, watched: Sequence[str] = (), progress: Progress = silent, kind: str = "mp4"
+    drawn: Mechanism,
+    post: xr.Dataset,
+    watched: Sequence[str] = (),
+    progress: Progress = silent,
+    kind: str = "mp4",
+    curves: Sequence[Quantity] = (),
 ) -> tuple[str, bytes]:
     """File suffix and content: MP4 where that is asked for and ffmpeg is there, else GIF; the whole run.
 
-    watched: names of bodies, joints and contacts, of which the first of each is shown next to the mechanism.
+    watched: names of bodies, joints and contacts, of which the first of each is shown next to the mechanism.  curves:
+    quantities that are shown instead of them.
     Around the strongest impacts time is stretched, so that they are seen (`pace`).
     """
     rate = RATE if kind == "mp4" else RATE // 2
-    return write(_frames(drawn, post, watched, progress, rate), rate, kind)
+    return write(_frames(drawn, post, watched, curves, progress, rate), rate, kind)
 
 
 def _frames(
-    drawn: Mechanism, post: xr.Dataset, watched: Sequence[str], progress: Progress, rate: int
+    drawn: Mechanism,
+    post: xr.Dataset,
+    watched: Sequence[str],
+    curves: Sequence[Quantity],
+    progress: Progress,
+    rate: int,
 ) -> Iterator[np.ndarray]:
     time = drawn.run.time.values
     shown = pace.pace(drawn.run, drawn.looks.duration, drawn.looks.impact_slowdown, rate)
@@ -81,7 +93,7 @@ def _frames(
     bar = round_length(0.2 * VIEW / scale)
     long = round(bar * scale)
     with style.style():
-        plots = panel(drawn.run, post, (SIDE, HEIGHT), watched)
+        plots = panel(drawn.run, post, (SIDE, HEIGHT), watched, curves)
         for k, step in enumerate(steps):
             struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
             _place(drawn, actors, int(step), struck)

@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.scene.requested_accuracy import Quantity
-from flexclear.pipeline.post.overview.curves import turned_by
+from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.post.overview.curves import Curve, by_unit, turned_by
+from flexclear.pipeline.post.overview.curves import curves as watched_curves
 from flexclear.pipeline.post.overview.figures import centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import joint_view
@@ -46,11 +47,18 @@ class Panel:
         return np.asarray(self.canvas.buffer_rgba())[:, :, :3].copy()
 
 
-def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Sequence[str] = ()) -> Panel:
+def panel(
+    run: xr.Dataset,
+    post: xr.Dataset,
+    size: tuple[int, int],
+    watch: Sequence[str] = (),
+    curves: Sequence[Quantity] = (),
+) -> Panel:
     """Plots of one run: the watched body's motion, a reaction, and a ball or pin in its socket where there is one.
 
     watch: names of bodies, joints and contacts, of which the first of each is shown; else the body that moves
-    farthest, the first contact, the first joint.
+    farthest, the first contact, the first joint.  curves: quantities, the first two of which the run has take the place
+    of motion and reaction.
     """
     loose = [str(run["contact"].values[k]) for k in joint_view.with_clearance(run)]
     contact = bool(loose)
@@ -59,11 +67,12 @@ def panel(run: xr.Dataset, post: xr.Dataset, size: tuple[int, int], watch: Seque
     )
     figure = canvas.figure
     axes = figure.subplots(3 if contact else 2, 1, height_ratios=[1, 1, 1.7] if contact else [1, 1])
-    cursors = [_motion(axes[0], run, post, _body(run, watch))]
-    if post.sizes["joint"]:
-        cursors.append(_reaction(axes[1], run, post, watch))
-    else:
-        cursors.append(_energy(axes[1], run, post))
+    lines = {line.title: line for quantity in curves for line in watched_curves([run], quantity) if line is not None}
+    cursors = [_watched(panel, run, line) for panel, line in zip(axes, list(lines.values())[:2], strict=False)]
+    if not cursors:
+        cursors.append(_motion(axes[0], run, post, _body(run, watch)))
+    if len(cursors) < 2:
+        cursors.append((_reaction if post.sizes["joint"] else _energy)(axes[1], run, post, watch))
     if contact:
         number = list(run["contact"].values).index(loose[_first(loose, watch) or 0])
         x, y = orbit(axes[2], run, float(post.clearance[number]), number)
@@ -132,7 +141,15 @@ def _reaction(
     return _curve(axes, run, post.reaction.sel(joint=name).values, "#D55E00", 0.8)
 
 
-def _energy(axes: style.Axes, run: xr.Dataset, post: xr.Dataset) -> tuple[Any, np.ndarray, np.ndarray]:
+def _watched(axes: style.Axes, run: xr.Dataset, line: Curve) -> tuple[Any, np.ndarray, np.ndarray]:
+    factor, unit = by_unit({"": line.values}, line.unit)
+    axes.set_title(f"{line.title} ({unit})")
+    return _curve(axes, run, factor * line.values, "#0072B2", 1.2)
+
+
+def _energy(
+    axes: style.Axes, run: xr.Dataset, post: xr.Dataset, watch: Sequence[str]
+) -> tuple[Any, np.ndarray, np.ndarray]:
     """Instead of a reaction, where there is no joint."""
     axes.set_title("kinetic energy (J)")
     return _curve(axes, run, run.kinetic.values, "#0072B2")

@@ -12,6 +12,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.overview.page import media, viewer_page
 from flexclear.pipeline.post.pages import viewer
 from flexclear.pipeline.post.plotting import mode_sheet
@@ -27,8 +28,8 @@ SERIES, KEYS = 100, 240
 class Shown:
     """What there is to be shown.
 
-    run: schema RUN; linear: schema LINEAR; bundles: schema BUNDLE by name of the flexible body.  watched: as of
-    `film.film`.  title: of pages.
+    run: schema RUN; linear: schema LINEAR; bundles: schema BUNDLE by name of the flexible body.  watched,
+    curves: as of `film.film`.  title: of pages.
     """
 
     run: xr.Dataset | None = None
@@ -36,6 +37,7 @@ class Shown:
     bundles: Mapping[str, xr.Dataset] = field(default_factory=dict)
     looks: Looks = field(default_factory=Looks)
     watched: Sequence[str] = ()
+    curves: Sequence[Quantity] = ()
     title: str = ""
     progress: Progress = silent
 
@@ -88,7 +90,7 @@ def _film(kind: str) -> Callable[[Shown], dict[str, bytes]]:
         from flexclear.pipeline.post.render import film
 
         drawn = shown.mechanism()
-        suffix, content = film.film(drawn, derive(drawn.run), shown.watched, shown.progress, kind)
+        suffix, content = film.film(drawn, derive(drawn.run), shown.watched, shown.progress, kind, shown.curves)
         return {f"film.{suffix}": content}
 
     return make_film

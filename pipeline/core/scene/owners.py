@@ -1,0 +1,110 @@
+"""Which parts of a scene own quantities: by the dimension of a run that has them, and whether they are about an axis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.loads import Bushing, Pid, SampledPid
+from flexclear.pipeline.core.scene.parts import Ground
+from flexclear.pipeline.core.scene.quantity import KINDS
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.scene.schema import Scene
+
+#: joint type -> its coordinates by name, and whether each is an angle, as the classes of the joints have them
+COORDINATES: Mapping[str, Mapping[str, bool]] = {
+    "revolute": {"rotation": True},
+    "prismatic": {"translation": False},
+    "cylindrical": {"rotation": True, "translation": False},
+    "planar": {"x": False, "y": False, "rotation": True},
+    "universal": {"first": True, "second": True},
+}
+#: quantities of the whole mechanism that need loads, or flexible bodies
+_OF_LOADS, _OF_MODES = ("load_work", "load_loss"), ("modal_damping_loss",)
+
+
+def owners(scene: Scene) -> dict[str, dict[str, bool]]:
+    """Names by `quantity.OWNERS`, and whether what they do is about an axis, so that forces are torques."""
+    forces, contacts, moving = (
+        scene.forces(),
+        scene.contacts(),
+        _still(name for name, body in scene.body.items() if not isinstance(body, Ground)),
+    )
+    stops = {f"{name}.{end}": _turns(scene, stop) for name, stop in scene.stop.items() for end in stop.ends}
+    controllers = {name: load for name, load in forces.items() if isinstance(load, (Pid, SampledPid))}
+    modes = {name: body.modes.count for name, body in scene.flexible().items()}
+    return {
+        "body": moving,
+        "frame": _still(_frames(scene)),
+        "joint": _still(scene.joint),
+        "coordinate": _coordinates(scene),
+        "drive": dict(_drives(scene)),
+        "controller": {name: _turns(scene, load) for name, load in controllers.items()},
+        "gear": {name: _named(scene, gear.second) for name, gear in scene.gear.items()},
+        "load": {name: _measures_angle(scene, load) for name, load in forces.items()},
+        "bushing": _still(name for name, load in forces.items() if isinstance(load, Bushing)),
+        "contact": _still(contacts) | stops,
+        "rubbing": _still(scene.rubbing()),
+        "worn": _still(scene.worn()),
+        "mode": _still(f"{n}.{k}" for n, c in modes.items() if isinstance(c, int) for k in range(1, c + 1)),
+        "section": _still(scene.output.stress or ()),
+        "": _still(_of_all(scene)),
+    }
+
+
+def _still(names: Any) -> dict[str, bool]:
+    return dict.fromkeys(names, False)
+
+
+def _of_all(scene: Scene) -> Iterator[str]:
+    for key, kind in KINDS.items():
+        if kind.owner == "" and kind.variable:
+            if (key not in _OF_LOADS or scene.forces()) and (key not in _OF_MODES or scene.flexible()):
+                yield key
+
+
+def _frames(scene: Scene) -> Iterator[str]:
+    """Frames of bodies; of those that recipes describe, the ones that the scene names."""
+    for name, body in scene.body.items():
+        yield from (f"{name}.{frame}" for frame in getattr(body, "frames", {}))
+    for part in (*scene.joint.values(), *scene.load.values(), *scene.drive.values()):
+        yield from getattr(part, "between", ())
+        yield from (part.frame,) if hasattr(part, "frame") else ()
+
+
+def _coordinates(scene: Scene) -> dict[str, bool]:
+    return {
+        name if len(known) == 1 else f"{name}.{coordinate}": turns
+        for name, joint in scene.joint.items()
+        for known in [COORDINATES.get(joint.type, {})]
+        for coordinate, turns in known.items()
+    }
+
+
+def _drives(scene: Scene) -> Iterator[tuple[str, bool]]:
+    for name, drive in scene.drive.items():
+        if isinstance(drive, PathDrive):
+            yield from ((f"{name}.{part}", part.startswith("rotation")) for part, _ in drive.components())
+        else:
+            yield name, _turns(scene, drive)
+
+
+def _turns(scene: Scene, part: Any) -> bool:
+    """Whether the coordinate of a part with `joint` and `coordinate` is an angle."""
+    joint = scene.joint.get(part.joint)
+    known = COORDINATES.get(joint.type, {}) if joint is not None else {}
+    return known.get(part.coordinate or next(iter(known), ""), False)
+
+
+def _named(scene: Scene, text: str) -> bool:
+    """The same of ``A`` or ``A.rotation``."""
+    known = _coordinates(scene)
+    return known.get(text, known.get(text.partition(".")[0], False))
+
+
+def _measures_angle(scene: Scene, load: Any) -> bool:
+    if getattr(load, "measured", None):
+        return _named(scene, load.measured)
+    return hasattr(load, "joint") and _turns(scene, load)

@@ -1,0 +1,439 @@
+"""Quantities by name: the one grammar of `watch`, `keep`, `[accuracy]` and sections.
+
+A quantity is ``<owner>.<word>``, as ``platform.position`` or ``A1.peak_force``; ``slider.position.x`` is a component, and
+``kinetic`` belongs to the whole mechanism. The words are the names of the run's variables over time, as
+``slider.acceleration`` or ``hinge.joint_velocity``; the kind of part in front may be left out (``hinge.velocity``), and
+means the first of `OWNERS` that has such a part. ``force(A1)`` is another way to write ``A1.force``.
+Expressions combine quantities and numbers with units by ``+ - * /``, parentheses and ``norm(...)``, the magnitude:
+``force(A1) - force(A2)``. How runs hold quantities is known to `pipeline.core.quantities`, which needs NumPy; a command
+that finds everything fresh does not.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+from flexclear.pipeline.core import units
+from flexclear.pipeline.core.artifacts.run_schema import RUN
+from flexclear.pipeline.core.registry import suggestion
+
+#: dimension of a run -> what its entries are; a word that several have means the first. Sections are named by bodies
+OWNERS = {
+    "body": "body",
+    "frame": "frame, `body.frame`",
+    "joint": "joint",
+    "coordinate": "joint, or `joint.coordinate` where it has several",
+    "drive": "drive",
+    "controller": "controller",
+    "gear": "gear",
+    "load": "load",
+    "bushing": "bushing",
+    "contact": "joint with clearance, or end of a stop",
+    "rubbing": "joint with friction",
+    "worn": "joint with wear",
+    "mode": "mode, `body.number`",
+    "section": "body whose stresses are recorded",
+    "": "the whole mechanism",
+}
+#: front of a variable's name that says the kind of part
+_FRONTS = ("frame_", "joint_", "drive_", "controller_", "gear_", "load_", "bushing_", "contact_", "wear_")
+#: variables whose quantity has another name
+_RENAMED = {"quaternion": "orientation", "joint_force": "force", "joint_moment": "moment", "contact_impulse": "impulse"}
+#: what says how well the equations are posed, and no quantity
+_INDICATORS = ("mobility", "rank", "condition")
+#: what contacts have once per run or event, not over time
+OF_CONTACTS = ("peak_force", "impulse", "impact_times")
+#: owners that a scene without clearance does not have
+OF_CLEARANCE = ("contact", "worn")
+EXPRESSION = "expression"
+COMPONENTS = ("x", "y", "z")
+
+
+class Kind(NamedTuple):
+    """What owns such a quantity (dimension of the run), its variable, SI units of what slides and turns, the dimension
+    of its components or none, and what it means."""
+
+    owner: str
+    variable: str
+    units: tuple[str, str]
+    dim: str
+    meaning: str
+
+
+def _unit(text: str) -> str:
+    """A unit of the contract as scenes write it: ``m s-2`` as ``m/s^2``."""
+    over, under = [], []
+    for name, power in re.findall(r"([A-Za-z]+|1)(-?\d*)", text):
+        (under if power.startswith("-") else over).append(
+            f"{name}^{p}" if (p := power.lstrip("-")) not in "1" else name
+        )
+    return " ".join(over) + (f"/{' '.join(under)}" if under else "")
+
+
+def _kinds() -> dict[str, Kind]:
+    known = {}
+    for name, variable in RUN.items():
+        owner = variable.dims[1] if len(variable.dims) > 1 else ""
+        dim = variable.dims[2] if len(variable.dims) > 2 else ""
+        if variable.dims[:1] == ("time",) and owner in OWNERS and name not in _INDICATORS:
+            both = (_unit(variable.units), _unit(variable.turning or variable.units))
+            known[_RENAMED.get(name, name)] = Kind(owner, name, both, dim, variable.long_name)
+    known["orientation"] = known["orientation"]._replace(units=("rad", "rad"))
+    known["peak_force"] = Kind("contact", "event_peak_force", ("N", "N m"), "", "largest normal force of the contact")
+    known["impact_times"] = Kind("contact", "event_time", ("s", "s"), "", "times of closings faster than 1e-4 m/s")
+    return dict(sorted(known.items(), key=lambda item: list(OWNERS).index(item[1].owner)))
+
+
+#: by their full words
+KINDS = _kinds() | {EXPRESSION: Kind("", "", ("", ""), "", "")}
+
+
+def _words() -> dict[str, list[str]]:
+    words: dict[str, list[str]] = {}
+    for key, kind in KINDS.items():
+        front = next((front for front in _FRONTS if kind.variable.startswith(front)), "")
+        every = {key, kind.variable.removeprefix(front)} | ({kind.variable} if key not in OF_CONTACTS[::2] else set())
+        for word in every - {EXPRESSION, ""}:
+            words.setdefault(word, []).append(key)
+    return words
+
+
+#: word -> the kinds that it may mean
+WORDS = _words()
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """A quantity of one part, of the whole mechanism, or an expression of several.
+
+    owner: name of the part, else empty.  kind: one of `KINDS`.  component: of a vector, or empty for all of it.  turns:
+    whether it is about an axis.  text: as written, where that is not ``<owner>.<kind>``.  steps: of an expression, in
+    postfix order: quantities, numbers with their SI units, and operators.
+    """
+
+    owner: str
+    kind: str
+    component: str = ""
+    turns: bool = False
+    text: str = ""
+    steps: tuple[Quantity | tuple[float, str] | str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """As the scene writes it."""
+        return self.text or f"{self.owner}.{self.kind}"
+
+    @property
+    def unit(self) -> str:
+        """SI unit of its values and errors; an expression's as one of its terms has it, where one does: J or N m."""
+        if not self.steps:
+            return KINDS[self.kind].units[self.turns]
+        measured = self._measured()[0]
+        return next((t.unit for t in self.terms() if units.measured(t.unit) == measured), units.si(measured))
+
+    @property
+    def dim(self) -> str:
+        """Dimension of its components: axis, quat, or none."""
+        return self._measured()[1] if self.steps else "" if self.component else KINDS[self.kind].dim
+
+    @property
+    def over_time(self) -> bool:
+        """Whether it has a value at every time."""
+        return self.kind not in OF_CONTACTS
+
+    @property
+    def of_place(self) -> bool:
+        """Whether it says where something is, so that its size is its largest change from the start."""
+        return self.over_time and self.unit in ("m", "rad")
+
+    def terms(self) -> list[Quantity]:
+        """The quantities of an expression; the quantity itself where it is none."""
+        return [step for step in self.steps if isinstance(step, Quantity)] if self.steps else [self]
+
+    def is_there(self, owners: Mapping[str, Collection[str]]) -> bool:
+        """Whether a scene has it; owners as of `parse`."""
+        return all((term.owner or term.kind) in owners.get(KINDS[term.kind].owner, ()) for term in self.terms())
+
+    def written(self) -> list[Any]:
+        """As JSON, for `read`."""
+        steps = [step.written() if isinstance(step, Quantity) else step for step in self.steps]
+        return [self.owner, self.kind, self.component, self.turns, self.text, steps]
+
+    @classmethod
+    def read(cls, data: Sequence[Any]) -> Quantity:
+        """The quantity that `written` gave."""
+        *fields, steps = data
+        return cls(*fields, tuple(_step(step) for step in steps))
+
+    def _measured(self) -> tuple[units.Exponents, str]:
+        """Exponents of the unit, and the dimension of the components; ValueError where the parts do not go together."""
+        stack: list[tuple[units.Exponents, str]] = []
+        for step in self.steps:
+            if isinstance(step, Quantity):
+                stack.append((units.measured(step.unit), step.dim))
+            elif isinstance(step, tuple):
+                stack.append((units.measured(step[1]), ""))
+            elif step == "norm":
+                stack.append((stack.pop()[0], ""))
+            elif step != "minus":
+                (b, second), (a, first) = stack.pop(), stack.pop()
+                stack.append(_combined(step, (a, first), (b, second)))
+        return stack[-1]
+
+
+def _step(step: Any) -> Any:
+    if isinstance(step, str):
+        return step
+    return Quantity.read(step) if len(step) > 2 else tuple(step)
+
+
+def _combined(
+    operator: str, left: tuple[units.Exponents, str], right: tuple[units.Exponents, str]
+) -> tuple[units.Exponents, str]:
+    (a, first), (b, second) = left, right
+    if operator in "+-":
+        if a != b:
+            raise ValueError(f"{units.si(a)} and {units.si(b)} are not added or subtracted; numbers need their unit")
+        if first != second:
+            raise ValueError("a vector and a number are not added or subtracted; take a component, or norm(...)")
+        return a, first
+    if second and (first or operator == "/"):
+        raise ValueError("one of two vectors that are multiplied, or a divisor, must be a component, or norm(...)")
+    sign = 1.0 if operator == "*" else -1.0
+    kg, m, s, rad = (x + sign * y for x, y in zip(a, b, strict=True))
+    return (kg, m, s, rad), first or second
+
+
+_CALL = re.compile(r"(?<![\w.-])(?!norm\b)(\w+)\(\s*([\w.-]+)\s*\)")
+_PLAIN = re.compile(r"\w[\w.-]*")
+_TOKEN = re.compile(
+    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?![\w.])(?:\s*(?P<unit>"
+    + "|".join(re.escape(u) for u in sorted(units.UNITS, key=len, reverse=True))
+    + r")(?![\w.^]))?|(?P<name>[^\W\d][\w-]*(?:\.[\w-]+)*)|(?P<operator>[-+*/()]))\s*"
+)
+
+
+def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
+    """The quantity called `text`.
+
+    owners: names of the scene's parts by `OWNERS`; of a mapping, whether each is about an axis (`owners.owners`).
+    Raises ValueError that names what could have been meant.
+    """
+    plain = _CALL.sub(r"\2.\1", text.strip())
+    if _PLAIN.fullmatch(plain):
+        quantity = _term(plain, owners)
+    else:
+        quantity = Quantity("", EXPRESSION, steps=tuple(_Reader(plain, owners).whole()))
+        if not quantity.terms():
+            raise ValueError(f"'{text}' is a number, and no quantity")
+        _ = quantity.dim
+    return quantity if quantity.name == text else replace(quantity, text=text)
+
+
+def _term(name: str, owners: Mapping[str, Collection[str]]) -> Quantity:
+    head, _, component = name.rpartition(".")
+    whole = head if component in COMPONENTS and head.rpartition(".")[2] in WORDS else name
+    owner, _, word = whole.rpartition(".")
+    for key in WORDS.get(word, ()):
+        kind, known = KINDS[key], owners.get(KINDS[key].owner, ())
+        part = owner if kind.owner else key
+        if part not in known or bool(owner) != bool(kind.owner):
+            continue
+        if whole != name and kind.dim != "axis":
+            raise ValueError(f"'{whole}' has no component '{component}': it is no vector")
+        turns = isinstance(known, Mapping) and bool(known[part])
+        return Quantity(owner, key, component if whole != name else "", turns, "" if owner else word)
+    raise ValueError(f"there is no quantity '{name}' in this scene ({_nearest(owner, word, whole, owners)})")
+
+
+def _nearest(owner: str, word: str, name: str, owners: Mapping[str, Collection[str]]) -> str:
+    """The name that is meant, among those of the same part or with the same word where there are any."""
+    every = {
+        f"{part}.{w}" if KINDS[key].owner else w: (part, w)
+        for w, keys in WORDS.items()
+        for key in keys
+        for part in owners.get(KINDS[key].owner, ())
+        if KINDS[key].owner or part == key
+    }
+    mine = [text for text, (o, _) in every.items() if o == owner and owner]
+    same = [text for text, (_, w) in every.items() if w == word]
+    return suggestion(name, mine or same or list(every))
+
+
+class _Reader:
+    """Reads an expression into postfix order."""
+
+    def __init__(self, text: str, owners: Mapping[str, Collection[str]]) -> None:
+        self.text, self.owners, self.place = text, owners, 0
+        self.token = self._next()
+
+    def whole(self) -> list[Any]:
+        steps = self._sum()
+        if self.token is not None:
+            raise self._misread()
+        return steps
+
+    def _misread(self) -> ValueError:
+        return ValueError(
+            f"'{self.text}' is no quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or an expression of "
+            "them with + - * /, parentheses, norm(...) and numbers with units, spaces around + and -"
+        )
+
+    def _next(self) -> re.Match[str] | None:
+        if self.place == len(self.text):
+            return None
+        match = _TOKEN.match(self.text, self.place)
+        if match is None:
+            raise self._misread()
+        self.place = match.end()
+        return match
+
+    def _take(self, *operators: str) -> str:
+        """The operator that is next, where it is one of these; or nothing."""
+        if self.token is None or self.token["operator"] not in operators:
+            return ""
+        taken: str = self.token["operator"]
+        self.token = self._next()
+        return taken
+
+    def _sum(self) -> list[Any]:
+        steps = self._product()
+        while operator := self._take("+", "-"):
+            steps += [*self._product(), operator]
+        return steps
+
+    def _product(self) -> list[Any]:
+        steps = self._one()
+        while operator := self._take("*", "/"):
+            steps += [*self._one(), operator]
+        return steps
+
+    def _one(self) -> list[Any]:
+        if self._take("-"):
+            return [*self._one(), "minus"]
+        if self._take("("):
+            steps = self._sum()
+            if not self._take(")"):
+                raise self._misread()
+            return steps
+        token = self.token
+        if token is None or token["operator"]:
+            raise self._misread()
+        self.token = self._next()
+        if token["number"]:
+            written = token["unit"]
+            factor, unit = (units.UNITS[written][0], units.si(units.measured(written))) if written else (1.0, "1")
+            return [(factor * float(token["number"]), unit)]
+        if token["name"] == "norm" and self._take("("):
+            steps = self._sum()
+            if not self._take(")"):
+                raise self._misread()
+            return [*steps, "norm"]
+        term = _term(token["name"], self.owners)
+        if not term.over_time or term.dim == "quat":
+            raise ValueError(f"'{token['name']}' cannot be part of an expression: it is no number or vector over time")
+        return [term]
+
+
+def usual(joints: Mapping[str, Collection[str]], contacts: Collection[str]) -> list[Quantity]:
+    """What is asked of a scene that names nothing: motion of the body with most joints, a reaction, the contacts.
+
+    joints: the bodies that each joint connects, in the scene's order; contacts: those with clearance.
+    """
+    bodies = [body for pair in joints.values() for body in pair]
+    if not bodies:
+        return []
+    central = max(dict.fromkeys(bodies), key=bodies.count)
+    chosen = [Quantity(central, kind) for kind in ("position", "orientation", "velocity")]
+    ideal = [name for name, pair in joints.items() if central in pair and name not in contacts]
+    chosen += [Quantity(name, "force") for name in ideal[:1]]
+    return chosen + [Quantity(name, kind) for name in contacts for kind in OF_CONTACTS]
+
+
+#: reduction -> what it says of a series
+SERIES = {
+    "largest": "largest magnitude over the run",
+    "rms": "root of the mean square magnitude over the time",
+    "mean": "mean over the time",
+    "final": "value at the end",
+    "series": "values at the regular output times",
+    "sections": "values once in each period of the laws",
+}
+#: the same of what contacts do
+CONTACT_REDUCTIONS = {
+    "peak_force": {"largest": "largest normal force of the contact"},
+    "impulse": {"final": "impulse of the normal force over the run"},
+    "impact_times": {
+        "count": "impacts with an approach above 1e-4 m/s",
+        "first": "time of the first of them",
+        "last": "time of the last of them",
+    },
+}
+_REDUCTIONS = (*SERIES, "count", "first", "last")
+#: reductions that need the quantity at all output times, and those whose value has no direction
+THROUGHOUT, MAGNITUDES = ("largest", "rms", "mean", "series"), ("largest", "rms")
+
+
+@dataclass(frozen=True, slots=True)
+class Recorded:
+    """A quantity and the reduction of it that is recorded, as ``platform.velocity.largest``."""
+
+    quantity: Quantity
+    reduction: str
+
+    @property
+    def name(self) -> str:
+        """As a sweep writes it in full."""
+        return f"{self.quantity.name}.{self.reduction}"
+
+    @property
+    def meaning(self) -> str:
+        """In words."""
+        return f"{self.quantity.name}: {reductions(self.quantity)[self.reduction]}"
+
+    @property
+    def unit(self) -> str:
+        """SI unit of the recorded number."""
+        return "1" if self.reduction == "count" or self.quantity.kind == "orientation" else self.quantity.unit
+
+    @property
+    def dims(self) -> tuple[str, ...]:
+        """Dimensions of its value at one point."""
+        time = {"series": ("time",), "sections": ("section",)}.get(self.reduction, ())
+        inner = "" if self.reduction in MAGNITUDES else self.quantity.dim
+        return (*time, inner) if inner else time
+
+    @property
+    def throughout(self) -> bool:
+        """Whether it needs the regular output times."""
+        return self.quantity.over_time and self.reduction in THROUGHOUT
+
+
+def reductions(quantity: Quantity) -> dict[str, str]:
+    """The reductions that a quantity has, and what they say."""
+    if quantity.kind == "orientation":
+        # a mean of quaternions is no rotation, and their magnitude is one
+        return {name: SERIES[name] for name in ("final", "series", "sections")}
+    return CONTACT_REDUCTIONS.get(quantity.kind, SERIES)
+
+
+def parse_recorded(text: str, owners: Mapping[str, Collection[str]]) -> Recorded:
+    """What is called `text`; the reduction may be left out where a quantity has one only.
+
+    owners: as of `parse`.  Raises ValueError that names what could have been meant.
+    """
+    head, _, last = text.rpartition(".")
+    quantity = parse(head if last in _REDUCTIONS else text, owners)
+    known = list(reductions(quantity))
+    if quantity.steps and not head.endswith(")"):
+        raise ValueError(f"what of '{text}' is kept? write ({text if last not in _REDUCTIONS else head}).largest")
+    if last in known:
+        return Recorded(quantity, last)
+    if last in _REDUCTIONS:
+        raise ValueError(f"'{quantity.name}' has no '{last}' ({suggestion(last, known)})")
+    if len(known) > 1:
+        raise ValueError(f"what of '{text}' is kept? write {' or '.join(f'{text}.{name}' for name in known)}")
+    return Recorded(quantity, known[0])
