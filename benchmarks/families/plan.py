@@ -67,10 +67,9 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
             decided, planning = _planned(params, inputs)
     except FlexclearError as error:
         return {**told, "verdict": REFUSED, "reason": str(error)}
-    from flexclear.pipeline.dynamics.model.driving import unit_of
     from flexclear.pipeline.post.plan import dataset
 
-    planned = plan.of(scene, dataset(decided, scene.title, {q.name: unit_of(scene, q) for q in scene.requested()}))
+    planned = plan.of(scene, dataset(decided, scene.title, {q.name: q.unit for q in scene.requested()}))
     full = edited(scene, {"accuracy": None})
     chosen = [parse(name, scene.owners()) for name in made.told["wanted"]]
     one, full_cpu = _run(full, inputs, chosen)

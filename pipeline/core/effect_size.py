@@ -14,7 +14,7 @@ motions.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +75,7 @@ def with_members(scene: Scene) -> Scene:
     return changed
 
 
-def recorded(owners: Mapping[str, Sequence[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
+def recorded(owners: Mapping[str, Collection[str]], chosen: Sequence[Quantity]) -> list[Recorded]:
     """Recorded values of a run to compare it by; quantities that its scene does not have are left out.
 
     owners: of the scene, by what they are.

@@ -12,9 +12,9 @@ import numpy as np
 
 from flexclear.pipeline.core.algebra import rotation_between
 from flexclear.pipeline.core.artifacts.coordinates import ROTATION
-from flexclear.pipeline.core.artifacts.run_schema import RUN
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.quantity import COMPONENTS, KINDS, Quantity, parse
+from flexclear.pipeline.core.scene.run_schema import RUN
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -234,7 +234,7 @@ def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
 
 def test_the_numbers_of_event_kinds_are_part_of_the_key() -> None:
     """Kernels have them compiled in, and datasets hold them: code of another numbering must not be taken."""
-    assert "flexclear.pipeline.core.artifacts.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))
+    assert "flexclear.pipeline.core.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))
 
 
 def digest(scene: Scene) -> str:

@@ -17,7 +17,6 @@ from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
-from flexclear.pipeline.dynamics.model.driving import unit_of
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.stages import s4_simulate
@@ -247,5 +246,5 @@ def test_forces_along_angles_have_the_unit_of_torques_before_anything_is_run() -
         "way.upper.peak_force",
         "slider.velocity",
     )
-    units = [unit_of(scene, parse(name, scene.owners())) for name in names]
+    units = [parse(name, scene.owners()).unit for name in names]
     assert units == ["N m", "N m", "N m s", "N", "m/s"]

@@ -14,8 +14,8 @@ import numpy as np
 from flexclear.pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
 from flexclear.pipeline.core.artifacts.coordinates import AXES, COORDINATES, QUATERNION, turning, with_names
 from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays, of
-from flexclear.pipeline.core.artifacts.run_schema import RUN
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.run_schema import RUN
 from flexclear.pipeline.core.variable import Schema, Variable
 from flexclear.pipeline.core.version import DISTRIBUTION, version
 

@@ -1,17 +1,14 @@
-"""Which parts of a scene own quantities: by the dimension of a run that has them, and whether they are about an axis."""
+"""Which parts of a scene own quantities, by the dimension of a run that has them; a scene is whatever has its parts."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.loads import Bushing, Pid, SampledPid
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.quantity import KINDS
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.scene.schema import Scene
 
 #: joint type -> its coordinates by name, and whether each is an angle, as the classes of the joints have them
 COORDINATES: Mapping[str, Mapping[str, bool]] = {
@@ -25,7 +22,7 @@ COORDINATES: Mapping[str, Mapping[str, bool]] = {
 _OF_LOADS, _OF_MODES = ("load_work", "load_loss"), ("modal_damping_loss",)
 
 
-def owners(scene: Scene) -> dict[str, dict[str, bool]]:
+def owners(scene: Any) -> dict[str, dict[str, bool]]:
     """Names by `quantity.OWNERS`, and whether what they do is about an axis, so that forces are torques."""
     forces, contacts, moving = (
         scene.forces(),
@@ -58,14 +55,14 @@ def _still(names: Any) -> dict[str, bool]:
     return dict.fromkeys(names, False)
 
 
-def _of_all(scene: Scene) -> Iterator[str]:
+def _of_all(scene: Any) -> Iterator[str]:
     for key, kind in KINDS.items():
-        if kind.owner == "" and kind.variable:
-            if (key not in _OF_LOADS or scene.forces()) and (key not in _OF_MODES or scene.flexible()):
-                yield key
+        possible = (key not in _OF_LOADS or scene.forces()) and (key not in _OF_MODES or scene.flexible())
+        if kind.owner == "" and kind.variable and possible:
+            yield key
 
 
-def _frames(scene: Scene) -> Iterator[str]:
+def _frames(scene: Any) -> Iterator[str]:
     """Frames of bodies; of those that recipes describe, the ones that the scene names."""
     for name, body in scene.body.items():
         yield from (f"{name}.{frame}" for frame in getattr(body, "frames", {}))
@@ -74,7 +71,7 @@ def _frames(scene: Scene) -> Iterator[str]:
         yield from (part.frame,) if hasattr(part, "frame") else ()
 
 
-def _coordinates(scene: Scene) -> dict[str, bool]:
+def _coordinates(scene: Any) -> dict[str, bool]:
     return {
         name if len(known) == 1 else f"{name}.{coordinate}": turns
         for name, joint in scene.joint.items()
@@ -83,7 +80,7 @@ def _coordinates(scene: Scene) -> dict[str, bool]:
     }
 
 
-def _drives(scene: Scene) -> Iterator[tuple[str, bool]]:
+def _drives(scene: Any) -> Iterator[tuple[str, bool]]:
     for name, drive in scene.drive.items():
         if isinstance(drive, PathDrive):
             yield from ((f"{name}.{part}", part.startswith("rotation")) for part, _ in drive.components())
@@ -91,20 +88,20 @@ def _drives(scene: Scene) -> Iterator[tuple[str, bool]]:
             yield name, _turns(scene, drive)
 
 
-def _turns(scene: Scene, part: Any) -> bool:
+def _turns(scene: Any, part: Any) -> bool:
     """Whether the coordinate of a part with `joint` and `coordinate` is an angle."""
     joint = scene.joint.get(part.joint)
     known = COORDINATES.get(joint.type, {}) if joint is not None else {}
     return known.get(part.coordinate or next(iter(known), ""), False)
 
 
-def _named(scene: Scene, text: str) -> bool:
+def _named(scene: Any, text: str) -> bool:
     """The same of ``A`` or ``A.rotation``."""
     known = _coordinates(scene)
     return known.get(text, known.get(text.partition(".")[0], False))
 
 
-def _measures_angle(scene: Scene, load: Any) -> bool:
+def _measures_angle(scene: Any, load: Any) -> bool:
     if getattr(load, "measured", None):
         return _named(scene, load.measured)
     return hasattr(load, "joint") and _turns(scene, load)

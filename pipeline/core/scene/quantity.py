@@ -1,7 +1,7 @@
 """Quantities by name: the one grammar of `watch`, `keep`, `[accuracy]` and sections.
 
-A quantity is ``<owner>.<word>``, as ``platform.position`` or ``A1.peak_force``; ``slider.position.x`` is a component, and
-``kinetic`` belongs to the whole mechanism. The words are the names of the run's variables over time, as
+A quantity is ``<owner>.<word>``, as ``platform.position`` or ``A1.peak_force``; ``slider.position.x`` is a component,
+and ``kinetic`` belongs to the whole mechanism. The words are the names of the run's variables over time, as
 ``slider.acceleration`` or ``hinge.joint_velocity``; the kind of part in front may be left out (``hinge.velocity``), and
 means the first of `OWNERS` that has such a part. ``force(A1)`` is another way to write ``A1.force``.
 Expressions combine quantities and numbers with units by ``+ - * /``, parentheses and ``norm(...)``, the magnitude:
@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from flexclear.pipeline.core import units
-from flexclear.pipeline.core.artifacts.run_schema import RUN
 from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.run_schema import RUN
 
 #: dimension of a run -> what its entries are; a word that several have means the first. Sections are named by bodies
 OWNERS = {
@@ -65,7 +65,7 @@ class Kind(NamedTuple):
 
 def _unit(text: str) -> str:
     """A unit of the contract as scenes write it: ``m s-2`` as ``m/s^2``."""
-    over, under = [], []
+    over, under = list[str](), list[str]()
     for name, power in re.findall(r"([A-Za-z]+|1)(-?\d*)", text):
         (under if power.startswith("-") else over).append(
             f"{name}^{p}" if (p := power.lstrip("-")) not in "1" else name
@@ -166,7 +166,7 @@ class Quantity:
     def read(cls, data: Sequence[Any]) -> Quantity:
         """The quantity that `written` gave."""
         *fields, steps = data
-        return cls(*fields, tuple(_step(step) for step in steps))
+        return cls(*fields, steps=tuple(_step(step) for step in steps))
 
     def _measured(self) -> tuple[units.Exponents, str]:
         """Exponents of the unit, and the dimension of the components; ValueError where the parts do not go together."""

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.coordinates import motion
-from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled
 from flexclear.pipeline.core.artifacts.schema import RUN, conformed
 from flexclear.pipeline.core.citations import cited
+from flexclear.pipeline.core.event_kinds import EVENT_KINDS
 from flexclear.pipeline.core.quantities import PERTURBATION
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.output import VARIABLES
@@ -96,9 +96,9 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity]) -> Label
 
 #: beginnings of the variables that the ledger makes
 _LEDGER = (
-    ("kinetic", "potential", "elastic", "dissipated", "drive_work", "energy_error", "constraint_error", "load_work")
-    + ("load_loss", "joint_friction_loss", "modal_damping_loss", "contact_elastic", "contact_damping_loss")
-    + ("contact_impulse", "contact_friction_loss")
+    *("kinetic", "potential", "elastic", "dissipated", "drive_work", "energy_error", "constraint_error", "load_work"),
+    *("load_loss", "joint_friction_loss", "modal_damping_loss", "contact_elastic", "contact_damping_loss"),
+    *("contact_impulse", "contact_friction_loss"),
 )
 
 
@@ -106,7 +106,7 @@ def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], C
     """What makes the variables of this scene but those of bodies, frames and joints, by how their names begin."""
     model, seen = motions.model, motions.seen
     yield ("modal_",), lambda: _modes(motions)
-    yield ("drive_force", "drive_position"), lambda: _drives(model, seen)
+    yield ("drive_force", "drive_position"), lambda: _drives(scene, model, seen)
     yield ("joint_position", "joint_velocity", "joint_acceleration"), lambda: _joint_coordinates(model, seen)
     if model.loads:
         yield ("load_",), lambda: _loads(model, seen)
@@ -305,13 +305,13 @@ def _modes(motions: Motions) -> Part:
     }
 
 
-def _drives(model: Model, seen: Observed) -> Part:
+def _drives(scene: Scene, model: Model, seen: Observed) -> Part:
     names = list(model.drives)
     if not names:
         return {}, {}
     force, position = model.drive_signs * seen.drive_force, model.drive_signs * seen.positions[:, model.nq :]
     turning = {coordinate.name: coordinate.dimension == "angle" for coordinate in prescribed(model.scene)}
-    sharing = [name for name in model.scene.forces() if name not in run.scene.load]
+    sharing = [name for name in model.scene.forces() if name not in scene.load]
     if sharing:  # actuators beyond the freedoms, which the engine has as loads
         from flexclear.pipeline.dynamics.record.loads import along_coordinates, turning_loads
 

@@ -12,9 +12,9 @@ from threading import Lock
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.artifacts.schema import ENSEMBLE, conform
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.event_kinds import CLOSING
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.quantities import IMPACT
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene

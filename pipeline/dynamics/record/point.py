@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.artifacts.event_kinds import CLOSING
 from flexclear.pipeline.core.artifacts.points import Point, Values
 from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.event_kinds import CLOSING
 from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.quantities import IMPACT, of_impacts, reduced, regular_times
 from flexclear.pipeline.core.scene.load import with_numbers
@@ -103,7 +103,7 @@ class Runner:
         engine.straight.requested = engine.straight.exact = True
         engine.straight.place = lane
         if in_sections(self.recorded):
-            values, count = _sections(engine, self.recorded, alive)
+            values, count = _sections(scene, engine, self.recorded, alive)
             return values, {}, count
         rows, count = list[Values](), 0
         for start in self._starts(engine):
@@ -176,9 +176,8 @@ def _kept(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[R
     return values
 
 
-def _sections(engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> tuple[Values, int]:
+def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> tuple[Values, int]:
     """Recorded values, once in each period, after the transient, and the evaluations that all periods took."""
-    scene = engine.model.scene
     requested, period = scene.sections or Sections(), section_period(scene)
     start, parts = consistent_start(engine), stretches(engine, period, requested.phase)
     require_periodic(parts, start)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.artifacts.event_kinds import EVENT_KINDS
+from flexclear.pipeline.core.event_kinds import EVENT_KINDS
 from flexclear.pipeline.core.scene.output import VARIABLES
 from flexclear.pipeline.core.variable import Schema, Variable
 
