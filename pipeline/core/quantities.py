@@ -13,7 +13,7 @@ import numpy as np
 from flexclear.pipeline.core.algebra import rotation_between
 from flexclear.pipeline.core.artifacts.coordinates import ROTATION
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.scene.quantity import COMPONENTS, KINDS, Quantity, parse
+from flexclear.pipeline.core.scene.quantity import COMPONENTS, KINDS, Quantity, as_written, parse
 from flexclear.pipeline.core.scene.run_schema import RUN
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ def unit(run: xr.Dataset, quantity: Quantity) -> str:
     kind = KINDS[quantity.kind]
     name = PUSHES.get(quantity.kind, kind.variable)
     if f"{name}_units" in run.coords:
-        return str(run[f"{name}_units"].sel({kind.owner: quantity.owner}).values)
+        return as_written(str(run[f"{name}_units"].sel({kind.owner: quantity.owner}).values))
     turns = (
         kind.units[0] != kind.units[1] and name in run and run[name].attrs.get("units") == RUN[kind.variable].turning
     )

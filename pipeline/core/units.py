@@ -190,6 +190,8 @@ def _product(text: str) -> tuple[float, Exponents] | None:
 
 def udunits(text: str) -> str:
     """A unit as UDUNITS reads it, ``N m-1 s-1`` for ``N/m s``; empty for broken powers, which it has not."""
+    if text == "1":
+        return text
     factors = []
     for k, side in enumerate(_plain(text).split("/")):
         for part in side.split():

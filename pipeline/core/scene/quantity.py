@@ -63,7 +63,7 @@ class Kind(NamedTuple):
     meaning: str
 
 
-def _unit(text: str) -> str:
+def as_written(text: str) -> str:
     """A unit of the contract as scenes write it: ``m s-2`` as ``m/s^2``."""
     over, under = list[str](), list[str]()
     for name, power in re.findall(r"([A-Za-z]+|1)(-?\d*)", text):
@@ -79,7 +79,7 @@ def _kinds() -> dict[str, Kind]:
         owner = variable.dims[1] if len(variable.dims) > 1 else ""
         dim = variable.dims[2] if len(variable.dims) > 2 else ""
         if variable.dims[:1] == ("time",) and owner in OWNERS and name not in _INDICATORS:
-            both = (_unit(variable.units), _unit(variable.turning or variable.units))
+            both = (as_written(variable.units), as_written(variable.turning or variable.units))
             known[_RENAMED.get(name, name)] = Kind(owner, name, both, dim, variable.long_name)
     known["orientation"] = known["orientation"]._replace(units=("rad", "rad"))
     known["peak_force"] = Kind("contact", "event_peak_force", ("N", "N m"), "", "largest normal force of the contact")
@@ -165,8 +165,8 @@ class Quantity:
     @classmethod
     def read(cls, data: Sequence[Any]) -> Quantity:
         """The quantity that `written` gave."""
-        *fields, steps = data
-        return cls(*fields, steps=tuple(_step(step) for step in steps))
+        owner, kind, component, turns, text, steps = data
+        return cls(owner, kind, component, turns, text, tuple(_step(step) for step in steps))
 
     def _measured(self) -> tuple[units.Exponents, str]:
         """Exponents of the unit, and the dimension of the components; ValueError where the parts do not go together."""
@@ -250,7 +250,7 @@ def _term(name: str, owners: Mapping[str, Collection[str]]) -> Quantity:
 
 
 def _nearest(owner: str, word: str, name: str, owners: Mapping[str, Collection[str]]) -> str:
-    """The name that is meant, among those of the same part or with the same word where there are any."""
+    """The name that is meant, among those with the same word or of the same part where there are any."""
     every = {
         f"{part}.{w}" if KINDS[key].owner else w: (part, w)
         for w, keys in WORDS.items()
@@ -260,7 +260,7 @@ def _nearest(owner: str, word: str, name: str, owners: Mapping[str, Collection[s
     }
     mine = [text for text, (o, _) in every.items() if o == owner and owner]
     same = [text for text, (_, w) in every.items() if w == word]
-    return suggestion(name, mine or same or list(every))
+    return suggestion(name, same or mine or list(every))
 
 
 class _Reader:

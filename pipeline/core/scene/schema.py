@@ -133,8 +133,8 @@ class Accuracy(Part):
 class View(Part):
     """What is examined; no effect on the motion.
 
-    watch: quantities that comparisons, error tables and films show, as ``platform.position`` or ``A1.force - A2.force``.
-    Default: those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts.
+    watch: quantities that comparisons, tables and films show, as ``platform.position`` or ``A1.force - A2.force``;
+    default: those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts.
     direction: from which pictures and films look at the mechanism, a vector from it to the eye; default: of a planar
     mechanism its normal, else from above and in front.
     """
@@ -248,7 +248,7 @@ class Scene(Part):
                 one = parse(name, known)
                 written = self.accuracy.quantities[name].unit if self.accuracy and where == "accuracy." else None
                 if written is not None and measured(written) != measured(one.unit):
-                    raise ValueError(f"its accuracy is in {written}, but it is in {one.unit}")
+                    raise ValueError(f"its accuracy is given in {written}, but the quantity is in {one.unit}")
             except ValueError as error:
                 raise ValueError(f"{where}{name}: {error}") from None
 
