@@ -8,13 +8,14 @@ from collections.abc import Callable
 from functools import partial
 
 from benchmarks.page import DOCS
-from benchmarks.site import datasets, index, keys, python
+from benchmarks.site import datasets, index, keys, python, quantities
 
 #: page below docs/ -> what makes its text
 PAGES: dict[str, Callable[[], str]] = {
     "index.md": index.text,
     "reference/python.md": python.text,
     "datasets.md": datasets.text,
+    "reference/quantities.md": quantities.text,
     **{f"reference/{kind}.md": partial(keys.page, kind) for kind in keys.HEADS},
 }
 

@@ -110,7 +110,7 @@ def test_a_point_is_what_the_reductions_of_a_run_are(root: Path):
 def test_sections_of_a_point_are_those_of_the_repeated_motion(root: Path):
     """What `flexclear sections` finds without a neighbour is what a point keeps, to the last bit."""
     path, count = root / "scenes/checks/driven_pendulum.toml", {"sections.transient": 2, "sections.periods": 20}
-    keep = ["bob.position.sections", "bob.angular_velocity.sections"]
+    keep = ["bob.position.sections", "bob.angular_velocity.sections", "norm(bob.velocity).sections", "kinetic.sections"]
     vary = {"load.torque.force.amplitude": [0.9, 1.5]}
     found = pipeline.sweep(path, vary, keep, set=count, workers=1)
     asked = {"load.torque.force.amplitude": 1.5, "sections.exponent_periods": 20, **count}
@@ -119,6 +119,9 @@ def test_sections_of_a_point_are_those_of_the_repeated_motion(root: Path):
     assert here["bob.position.sections"].dims == ("section", "axis")
     assert np.array_equal(here["bob.position.sections"].values, whole["position"].sel(body="bob").values)
     assert np.array_equal(here["bob.angular_velocity.sections"], whole["angular_velocity"].sel(body="bob"))
+    speed = np.linalg.norm(whole["velocity"].sel(body="bob").values, axis=1)
+    assert here["norm(bob.velocity).sections"].values == pytest.approx(speed, rel=1e-14)
+    assert here["kinetic.sections"].dims == ("section",)
     assert (found["evaluations"] > 0).all()
 
 

@@ -121,7 +121,7 @@ class Sweep(Part):
     scene: a scene file, or the name of one below scenes/.  set: changes of the scene that hold at all points.
     vary: parameters by name; the name is a path in the scene unless `places` says which ones.
     combine: every value with every other (grid), or the first values, the second ones and so on (list).
-    keep: what is recorded of each point, see `pipeline.core.scene.quantity`.
+    keep: what is recorded of each point, as ``slider.velocity.largest``.
     members: starts of each point that differ by a hair (`[ensemble]` of the scene); mean and deviation are recorded.
     error: run each point at a hundredth of its tolerance as well, and keep the differences.
     title: what it is, in a line.  description: more words.  sample: points spread over all parameters, instead of a
