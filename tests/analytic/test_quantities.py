@@ -233,7 +233,7 @@ def test_expressions_balance() -> None:
         ("slider.positon", "did you mean 'slider.position'"),
         ("kinetc", "did you mean 'kinetic'"),
         ("guide.height", "no quantity"),
-        ("slider.position.w", "did you mean 'slider.position'"),
+        ("slider.position.w", "no component 'w'"),
         ("kinetic.x", "no component"),
         ("motor.drive_force.x", "no component 'x'"),
         ("slider.position + slider.velocity", "m and m/s are not added"),

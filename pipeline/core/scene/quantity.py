@@ -235,32 +235,35 @@ def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
 
 def _term(name: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     head, _, component = name.rpartition(".")
-    whole = head if component in COMPONENTS and head.rpartition(".")[2] in WORDS else name
+    whole = head if len(component) == 1 and head.rpartition(".")[2] in WORDS else name
     owner, _, word = whole.rpartition(".")
     for key in WORDS.get(word, ()):
         kind, known = KINDS[key], owners.get(KINDS[key].owner, ())
         part = owner if kind.owner else key
         if part not in known or bool(owner) != bool(kind.owner):
             continue
-        if whole != name and kind.dim != "axis":
-            raise ValueError(f"'{whole}' has no component '{component}': it is no vector")
+        if whole != name and (kind.dim != "axis" or component not in COMPONENTS):
+            raise ValueError(f"'{whole}' has no component '{component}'; vectors have x, y and z")
         turns = isinstance(known, Mapping) and bool(known[part])
         return Quantity(owner, key, component if whole != name else "", turns, "" if owner else word)
-    raise ValueError(f"there is no quantity '{name}' in this scene ({_nearest(owner, word, whole, owners)})")
+    raise ValueError(f"there is no quantity '{name}' in this scene ({_nearest(owner, word, owners)})")
 
 
-def _nearest(owner: str, word: str, name: str, owners: Mapping[str, Collection[str]]) -> str:
-    """The name that is meant, among those with the same word or of the same part where there are any."""
-    every = {
-        f"{part}.{w}" if KINDS[key].owner else w: (part, w)
+def _nearest(owner: str, word: str, owners: Mapping[str, Collection[str]]) -> str:
+    """The name that is meant: another owner of the same word, where there is one, else another word of the owner."""
+    every = [
+        (part if KINDS[key].owner else "", w)
         for w, keys in WORDS.items()
         for key in keys
         for part in owners.get(KINDS[key].owner, ())
         if KINDS[key].owner or part == key
-    }
-    mine = [text for text, (o, _) in every.items() if o == owner and owner]
-    same = [text for text, (_, w) in every.items() if w == word]
-    return suggestion(name, same or mine or list(every))
+    ]
+    same = {o: f"{o}.{w}" for o, w in every if w == word and o}
+    pieces = same if owner and same else {w: f"{o}.{w}".lstrip(".") for o, w in every if o == owner}
+    near = suggestion(owner if pieces is same else word, list(pieces)) if pieces else ""
+    if "did you mean" in near:
+        return re.sub("'(.+?)'", lambda match: f"'{pieces[match[1]]}'", near, count=1)
+    return suggestion("", list(pieces.values()) or [f"{o}.{w}".lstrip(".") for o, w in every])
 
 
 class _Reader:
