@@ -177,9 +177,9 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
 def quantity(run: xr.Dataset, name: str) -> xr.DataArray:
     """A quantity of a run over time, in SI units with the attribute `units`.
 
-    name: ``slider.acceleration``, a component, ``slider.position.x``, or an expression, ``force(A1) - force(A2)``; vectors
-    have the dimension `axis`, x y z of the world.  What contacts have per event (`peak_force`, `impact_times`, `impulse`)
-    has no time.  Raises InputError for what the run lacks, with the nearest name.
+    name: ``slider.acceleration``, a component, ``slider.position.x``, or an expression, ``force(A1) - force(A2)``.
+    Vectors have the dimension `axis`, x y z of the world.  Quantities that contacts have per event (`peak_force`,
+    `impact_times`, `impulse`) have no time.  Raises InputError for what the run lacks, with the nearest name.
     """
     from flexclear.pipeline.core.quantities import evaluate
 

@@ -7,8 +7,8 @@ from flexclear.pipeline.core.scene.quantity import CONTACT_REDUCTIONS, KINDS, OW
 
 HEAD = """# Quantities
 
-What a run holds over time has a name. The same name is watched (`[view] watch`), compared, planned, filmed, asked for in
-`[accuracy]`, kept by sweeps (`keep`, with a reduction behind it, also once in each period) and read from a run:
+What a run holds over time has a name. The same name is watched (`[view] watch`), compared, planned, filmed,
+asked for in `[accuracy]`, recorded by sweeps (`keep`, with a reduction behind it, also once in each period) and read from a run:
 
 ```python
 import flexclear as fc
@@ -19,13 +19,15 @@ fc.quantity(run, "force(pin) - force(main)")
 ```
 
 - `<owner>.<word>` as in `slider.position`; `slider.position.x` is a component along x, y or z of the world.
-- Where a part is a body and a joint at the same time, the word means the first of the owners below that has it; the
-  second word of the table says which one is meant: `guide.joint_position`. `force(A1)` is another way to write `A1.force`.
+- Where a part is a body and a joint at the same time, the word means the first of the owners below that has it.
+  The second word of the table says which one is meant: `guide.joint_position`.
+- `force(A1)` is another way to write `A1.force`.
 - What belongs to the whole mechanism has no owner: `kinetic`.
-- Expressions have `+ - * /`, parentheses, numbers with units and `norm(...)`, the magnitude, with spaces around + and -:
-  `slider.position.x - 10 mm`, `norm(slider.velocity) * 2 kg`. Units are checked. As keys of `[accuracy]` they are quoted.
-- A relative accuracy counts from the largest change since the start of lengths and angles, of all others from the largest
-  magnitude. An absolute one has the unit of the quantity.
+- Expressions have `+ - * /`, parentheses, numbers with units and `norm(...)`, the magnitude, with spaces around + and
+  -: `slider.position.x - 10 mm`, `norm(slider.velocity) * 2 kg`. Units are checked.
+  As keys of `[accuracy]` they are quoted.
+- A relative accuracy refers to the largest change since the start (lengths and angles) or to the largest magnitude (all
+  others). An absolute one has the unit of the quantity.
 
 This page is written from the schema of runs (`python -m benchmarks.site`).
 
