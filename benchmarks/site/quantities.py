@@ -8,7 +8,8 @@ from flexclear.pipeline.core.scene.quantity import CONTACT_REDUCTIONS, KINDS, OW
 HEAD = """# Quantities
 
 What a run holds over time has a name. The same name is watched (`[view] watch`), compared, planned, filmed,
-asked for in `[accuracy]`, recorded by sweeps (`keep`, with a reduction behind it, also once in each period) and read from a run:
+asked for in `[accuracy]` and read from a run. Sweeps record it with a reduction behind it (`keep`), also once in each
+period:
 
 ```python
 import flexclear as fc
