@@ -52,6 +52,8 @@ TABLES: dict[str, list[Any]] = {"h": [], "f": [], "w": []}
 #: indices in the header of h by the names that kernels use (`fields`): of sizes, and of stretches of w
 SIZES: dict[str, int] = {}
 STRETCHES: dict[str, int] = {}
+#: single floats of w by the names that kernels use: the index of their stretch in the header, and their offset there
+FLOATS: dict[str, tuple[int, int]] = {}
 #: rows of tables and layouts as NumPy has them, by the class of what declares them
 _ROWS: dict[type, np.dtype[Any]] = {}
 
@@ -67,6 +69,18 @@ def _named(kind: dict[str, int], declared: str) -> list[int]:
     places = _places(len(names))
     kind.update(zip(names, places, strict=True))
     return places
+
+
+def _numbered(declared: str) -> dict[str, int]:
+    """Index of each name."""
+    return {name: index for index, name in enumerate(declared.split())}
+
+
+def _floats(stretch: int, declared: str) -> range:
+    """Offsets of named floats in a stretch of w."""
+    names = _numbered(declared)
+    FLOATS.update({name: (stretch, offset) for name, offset in names.items()})
+    return range(len(names))
 
 
 def _fields(declared: str) -> dict[str, tuple[int, ...]]:
@@ -282,7 +296,8 @@ INDEPENDENCE, COLLOCATION = _named(STRETCHES, "independence collocation")
 COLLOCATION_ROWS = 13
 #: smallest pivot of J M^-1 J^T as fraction of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
-LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)
+LAST_PIVOT, WANTED_PIVOT = _floats(PIVOT, "last_pivot wanted_pivot")
+PIVOT_SIZE = 2
 #: what a contact does now; bent: what the bristles store
 TOUCH = work("gap rate normal_force friction_power damping_power stored bent slip force:3 offset:3 point:3")
 LAW = work("value rate second_rate")
@@ -339,22 +354,38 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
 # what the last first step with a contact closed could have been, whether the next accepted step is the first one of a
 # segment
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
-SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, FRACTION, LEFT, BLIND_STEPS = range(13, 22)
-REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(22, 27)
+# fmt: off
+(
+    TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST,
+    SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, FRACTION, LEFT, BLIND_STEPS,
+    REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST,
+) = _floats(
+    CONTROL,
+    "time step end rtol span length drift last_norm most_growth fixed parameter rate_drift steepest "
+    "sigma past_time pass_time reach most_reach collocated fraction left blind_steps "
+    "rejected_step rejected_norm touched_step first",
+)
+# fmt: on
+N_CONTROLS = FIRST + 1
 
 # Integers in n -------------------------------------------------------------------------------------------------------
 # report of the last evaluation; where the laws' active pieces and the contacts' modes start in n; where the state
 # being evaluated starts in w; whether the last evaluation left no more than the steps read; then the stepper's own
+_INTEGERS = _numbered(
+    "evaluation active mode state abridged status evaluations steps rejected next_output n_recorded n_events budget "
+    "cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps"
+)
 # fmt: off
 (
     EVALUATION, ACTIVE, MODE, STATE, ABRIDGED,
     STATUS, EVALUATIONS, STEPS, REJECTED, NEXT_OUTPUT, N_RECORDED, N_EVENTS, BUDGET, CAP, FRESH, IMMEDIATE,
-    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, INTEGERS,
-) = range(22)
+    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS,
+) = _INTEGERS.values()
 # fmt: on
-#: what an evaluation reads and reports there, by the names that kernels use (`fields`)
-REPORTS = {"evaluation": EVALUATION, "state": STATE, "abridged": ABRIDGED}
+INTEGERS = len(_INTEGERS)
+#: stretches of n by the names that kernels use (`fields`), and the other integers there
+LISTS = {"active": ACTIVE, "mode": MODE}
+REPORTS = {name: index for name, index in _INTEGERS.items() if name not in LISTS}
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
 NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER, SINGULAR_AHEAD = range(8, 14)
@@ -363,6 +394,9 @@ NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER, SINGULAR_AHE
 NAMED: dict[str, Any] = {
     name.lower(): value for name, value in list(globals().items()) if type(value).__name__ == "Table"
 }
+#: where stretches of w, and tables, begin
+INDICES = {f"at_{name}": index for name, index in STRETCHES.items()}
+INDICES |= {f"at_{name}": table.place for name, table in NAMED.items()}
 _ARRAYS = {table.place: array for array, tables in TABLES.items() for table in tables}
 ARRAYS = {name: _ARRAYS[table.place] for name, table in NAMED.items()}
 #: shapes of fields that are tuples, and how many numbers these have

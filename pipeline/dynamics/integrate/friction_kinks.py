@@ -39,9 +39,9 @@ NONE = (2.0, -1, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 class Kinks(NamedTuple):
     """Kernels of a family of kinks.
 
-    start(h, w), end(h, w): note what is watched at the start of a segment and at the end of a step, where it has just
-    been evaluated; accept(h, w): that end is the start of the next one.
-    first(h, f, w, n) -> (share, place, level, near, a, b, fa, fb): the kink that a step passes first, at about this
+    start(d), end(d): note what is watched at the start of a segment and at the end of a step, where it has just
+    been evaluated; accept(d): that end is the start of the next one.
+    first(d) -> (share, place, level, near, a, b, fa, fb): the kink that a step passes first, at about this
     share of it: where w[place] passes the level between the shares a and b, at which it is off by fa and fb (only known
     at the ends of the step); how near to the level is there; or NONE.
     """
@@ -53,9 +53,9 @@ class Kinks(NamedTuple):
 
 
 @kernel
-def nearness(h, w, size):
+def nearness(d, size):
     """How far from a kink counts as there, in what it is measured by, of this size."""
-    return NEAR * np.sqrt(w[h[m.CONTROL] + m.RTOL]) * size
+    return NEAR * np.sqrt(d.rtol) * size
 
 
 @kernel
@@ -71,18 +71,18 @@ def sooner(one, other):
 
 
 @kernel
-def first_of_contacts(h, f, w, n):
+def first_of_contacts(d):
     """The kink that a closed contact passes first (`Kinks.first`)."""
     found = NONE
-    for c in range(h[m.N_CONTACTS]):
-        if n[n[m.MODE] + c] != 1:
+    for c in range(d.n_contacts):
+        if d.mode[c] != 1:
             continue
-        o, kinks = m.WATCH.row(h, c), m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.kinks
+        watch = d.watch[c]
         for k in range(SPEEDS):
-            level = f[kinks + k]
-            first, second, near = w[o + m.WATCH.slip0] - level, w[o + m.WATCH.slip1] - level, nearness(h, w, level)
+            level = d.contact_numbers[c].kinks[k]
+            first, second, near = watch.slip0 - level, watch.slip1 - level, nearness(d, level)
             if level > 0.0 and passes(first, second, near) and first / (first - second) < found[0]:
-                share, place = first / (first - second), m.TOUCH.row(h, c) + m.TOUCH.slip
+                share, place = first / (first - second), d.at_touch + m.TOUCH.size * c + m.TOUCH.slip
                 found = (share, place, level, near, 0.0, 1.0, first, second)
     return found
 
@@ -97,23 +97,23 @@ def _beside(one: Kinks, other: Kinks) -> Kinks:
     accept_one, accept_other, first_one, first_other = one.accept, other.accept, one.first, other.first
 
     @kernel
-    def start(h, w):
-        start_one(h, w)
-        start_other(h, w)
+    def start(d):
+        start_one(d)
+        start_other(d)
 
     @kernel
-    def end(h, w):
-        end_one(h, w)
-        end_other(h, w)
+    def end(d):
+        end_one(d)
+        end_other(d)
 
     @kernel
-    def accept(h, w):
-        accept_one(h, w)
-        accept_other(h, w)
+    def accept(d):
+        accept_one(d)
+        accept_other(d)
 
     @kernel
-    def first(h, f, w, n):
-        return sooner(first_one(h, f, w, n), first_other(h, f, w, n))
+    def first(d):
+        return sooner(first_one(d), first_other(d))
 
     return Kinks(start, end, accept, first)
 
@@ -124,13 +124,13 @@ def together(kinks: tuple[Kinks, ...]) -> Kinks | None:
 
 
 @kernel
-def no_kinks(h, f, w, n, step, before, ready):
+def no_kinks(d, step, before, ready):
     """Steps end nowhere because of friction."""
     return 0.0
 
 
 def make_end_on_kink(evaluate_at: Callable, extend: Callable, repeat: Callable, kinks: Kinks | None) -> Callable:
-    """The kernel end_on_kink(h, f, w, n, step, before, ready): length of the step that ends on a kink instead.
+    """The kernel end_on_kink(d, step, before, ready): length of the step that ends on a kink instead.
 
     0 without one before a share of the step; -1 when the step cannot be made again. ready: the dense output.
     evaluate_at, repeat: of `within_step`.
@@ -140,22 +140,22 @@ def make_end_on_kink(evaluate_at: Callable, extend: Callable, repeat: Callable, 
     first_kink, locate_level = kinks.first, make_locate_level(evaluate_at)
 
     @kernel
-    def value_at(h, f, w, n, step, theta, place, level):
+    def value_at(d, step, theta, place, level):
         """How far beyond the level w[place] is at a share of the step."""
-        evaluate_at(h, f, w, n, step, theta)
-        return w[place] - level
+        evaluate_at(d, step, theta)
+        return d.w[place] - level
 
     @kernel
-    def land(h, f, w, n, step, theta, place, level, near, before, off_before):
+    def land(d, step, theta, place, level, near, before, off_before):
         """Make the step end on the level, from a first guess: its length; -1 when it cannot be made.
 
         before, off_before: another share of the step, and how far beyond the level it is.
         """
         length, before = theta * step, before * step
         for k in range(MOST_REPEATS):
-            if not repeat(h, f, w, n, length):
+            if not repeat(d, length):
                 return -1.0
-            off = w[place] - level
+            off = d.w[place] - level
             if abs(off) <= near or k == MOST_REPEATS - 1 or off == off_before:
                 return length
             better = length - off * (length - before) / (off - off_before)
@@ -165,24 +165,24 @@ def make_end_on_kink(evaluate_at: Callable, extend: Callable, repeat: Callable, 
         return length
 
     @kernel
-    def end_on_kink(h, f, w, n, step, before, ready):
-        share, place, level, near, a, b, fa, fb = first_kink(h, f, w, n)
+    def end_on_kink(d, step, before, ready):
+        share, place, level, near, a, b, fa, fb = first_kink(d)
         if not share < before:
             return 0.0
         if not ready:
-            extend(h, f, w, n, step)
+            extend(d, step)
         if a > 0.0:
-            fa = value_at(h, f, w, n, step, a, place, level)
+            fa = value_at(d, step, a, place, level)
         if b < 1.0:
-            fb = value_at(h, f, w, n, step, b, place, level)
+            fb = value_at(d, step, b, place, level)
         if fa * fb >= 0.0:  # the way to it is bent
             return 0.0
-        theta = locate_level(h, f, w, n, step, place, level, near, a, b, fa, fb)
-        if not theta < before or theta * step <= SHORTEST * max(abs(w[h[m.CONTROL] + m.TIME]), step):
+        theta = locate_level(d, step, place, level, near, a, b, fa, fb)
+        if not theta < before or theta * step <= SHORTEST * max(abs(d.time), step):
             return 0.0
-        length = land(h, f, w, n, step, theta, place, level, near, a, fa)
+        length = land(d, step, theta, place, level, near, a, fa)
         if length < 0.0:
-            return 0.0 if repeat(h, f, w, n, step) else -1.0
+            return 0.0 if repeat(d, step) else -1.0
         return length
 
     return end_on_kink
@@ -198,18 +198,18 @@ def kinks_alone(*families: Kinks) -> tuple[Callable, Callable, Callable]:
         end_on_kink = make_end_on_kink(evaluate_at, extend, repeat, kinks)
 
         @kernel
-        def resolve_events(h, f, w, n, step, t_new, rows, events):
-            end(h, w)
-            length = end_on_kink(h, f, w, n, step, 1.0, False)
+        def resolve_events(d, step, t_new, rows, events):
+            end(d)
+            length = end_on_kink(d, step, 1.0, False)
             if length < 0.0:
-                n[m.STATUS] = m.LOST_CLOSURE
+                d.status = m.LOST_CLOSURE
                 return -1, False, t_new, step
             if length == 0.0:
-                accept(h, w)
+                accept(d)
                 return 0, False, t_new, step
-            end(h, w)
-            accept(h, w)
-            return 0, False, w[h[m.CONTROL] + m.TIME] + length, length
+            end(d)
+            accept(d)
+            return 0, False, d.time + length, length
 
         return resolve_events
 

@@ -29,39 +29,45 @@ REVERSES = 1e-6
 
 
 @kernel
-def at_start(h, e):
+def now(d, e):
+    """Where w holds what bends the friction of bearing e."""
+    return d.at_bends + m.BENDS.size * e
+
+
+@kernel
+def at_start(d, e):
     """Row of BENDS of bearing e at the start of the step."""
-    return m.BENDS.row(h, h[m.N_BEARINGS] + e)
+    return now(d, d.n_bearings + e)
 
 
 @kernel
-def at_end(h, e):
+def at_end(d, e):
     """The same at its end."""
-    return m.BENDS.row(h, 2 * h[m.N_BEARINGS] + e)
+    return now(d, 2 * d.n_bearings + e)
 
 
 @kernel
-def _copy(h, w, source, target):
-    for k in range(m.BENDS.size * h[m.N_BEARINGS]):
-        w[target + k] = w[source + k]
+def _copy(d, source, target):
+    for k in range(m.BENDS.size * d.n_bearings):
+        d.w[target + k] = d.w[source + k]
 
 
 @kernel
-def watch_start(h, w):
+def watch_start(d):
     """Note what bends the friction of all bearings where a segment starts, which has just been evaluated."""
-    _copy(h, w, m.BENDS.row(h, 0), at_start(h, 0))
+    _copy(d, d.at_bends, at_start(d, 0))
 
 
 @kernel
-def watch_end(h, w):
+def watch_end(d):
     """The same at the end of a step."""
-    _copy(h, w, m.BENDS.row(h, 0), at_end(h, 0))
+    _copy(d, d.at_bends, at_end(d, 0))
 
 
 @kernel
-def end_becomes_start(h, w):
+def end_becomes_start(d):
     """The end of an accepted step is the start of the next."""
-    _copy(h, w, at_end(h, 0), at_start(h, 0))
+    _copy(d, at_end(d, 0), at_start(d, 0))
 
 
 @kernel
@@ -78,8 +84,8 @@ def closest(w, a, b, size):
     """Share of the straight way between two vectors in w where it is closest to zero, its distance, and its length."""
     way, along, distance = 0.0, 0.0, 0.0
     for k in range(size):
-        d = w[b + k] - w[a + k]
-        way, along = way + d * d, along - d * w[a + k]
+        change = w[b + k] - w[a + k]
+        way, along = way + change * change, along - change * w[a + k]
     share = along / way if way > 0.0 else 0.0
     for k in range(size):
         there = w[a + k] + share * (w[b + k] - w[a + k])
@@ -88,14 +94,14 @@ def closest(w, a, b, size):
 
 
 @kernel
-def speed_passed(h, f, w, e, level):
+def speed_passed(d, e, level):
     """The kink of bearing e at a sliding speed (`Kinks.first`)."""
-    a, b, near = at_start(h, e) + m.BENDS.sliding, at_end(h, e) + m.BENDS.sliding, nearness(h, w, level)
-    place = m.BEARING.row(h, e) + m.BEARING.slip
-    first, second = magnitude(w, a, 3) - level, magnitude(w, b, 3) - level
+    a, b, near = at_start(d, e) + m.BENDS.sliding, at_end(d, e) + m.BENDS.sliding, nearness(d, level)
+    place = d.at_bearing + m.BEARING.size * e + m.BEARING.slip
+    first, second = magnitude(d.w, a, 3) - level, magnitude(d.w, b, 3) - level
     if passes(first, second, near):
         return first / (first - second), place, level, near, 0.0, 1.0, first, second
-    share, distance, _ = closest(w, a, b, 3)
+    share, distance, _ = closest(d.w, a, b, 3)
     inside = distance - level
     if not (0.0 < share < 1.0 and inside < -near and min(first, second) > -near):
         return NONE
@@ -108,37 +114,37 @@ def speed_passed(h, f, w, e, level):
 
 
 @kernel
-def reversal(h, w, e, field, size, near):
+def reversal(d, e, field, size, near):
     """The kink of bearing e where a vector of BENDS reverses (`Kinks.first`)."""
-    now, a, b = m.BENDS.row(h, e) + field, at_start(h, e) + field, at_end(h, e) + field
-    share, distance, way = closest(w, a, b, size)
-    apart = min(magnitude(w, a, size), magnitude(w, b, size)) > near
+    current, a, b = now(d, e) + field, at_start(d, e) + field, at_end(d, e) + field
+    share, distance, way = closest(d.w, a, b, size)
+    apart = min(magnitude(d.w, a, size), magnitude(d.w, b, size)) > near
     if not (0.0 < share < 1.0 and distance <= REVERSES * way and apart):
         return NONE
     k = 0
     for i in range(1, size):
-        if abs(w[b + i] - w[a + i]) > abs(w[b + k] - w[a + k]):
+        if abs(d.w[b + i] - d.w[a + i]) > abs(d.w[b + k] - d.w[a + k]):
             k = i
-    return share, now + k, 0.0, near, 0.0, 1.0, w[a + k], w[b + k]
+    return share, current + k, 0.0, near, 0.0, 1.0, d.w[a + k], d.w[b + k]
 
 
 @kernel
-def first_of_bearings(h, f, w, n):
+def first_of_bearings(d):
     """The kink that a bearing passes first (`Kinks.first`)."""
     found = NONE
-    for e in range(h[m.N_BEARINGS]):
-        numbers, load = m.BEARING_NUMBERS.row(h, e), nearness(h, w, w[m.BEARING.row(h, e) + m.BEARING.load])
+    for e in range(d.n_bearings):
+        numbers, load = d.bearing_numbers[e], nearness(d, d.bearing[e].load)
         for k in range(SPEEDS):
-            level = f[numbers + m.BEARING_NUMBERS.kinks + k]
+            level = numbers.kinks[k]
             if level > 0.0:
-                found = sooner(found, speed_passed(h, f, w, e, level))
-        turning = f[numbers + m.BEARING_NUMBERS.turning_kink]
+                found = sooner(found, speed_passed(d, e, level))
+        turning = numbers.turning_kink
         if turning > 0.0:
-            found = sooner(found, reversal(h, w, e, m.BENDS.sliding, 3, nearness(h, w, turning)))
-        found = sooner(found, reversal(h, w, e, m.BENDS.along, 1, load))
-        found = sooner(found, reversal(h, w, e, m.BENDS.about, 1, load))
-        found = sooner(found, reversal(h, w, e, m.BENDS.one_end, 2, load))
-        found = sooner(found, reversal(h, w, e, m.BENDS.other_end, 2, load))
+            found = sooner(found, reversal(d, e, m.BENDS.sliding, 3, nearness(d, turning)))
+        found = sooner(found, reversal(d, e, m.BENDS.along, 1, load))
+        found = sooner(found, reversal(d, e, m.BENDS.about, 1, load))
+        found = sooner(found, reversal(d, e, m.BENDS.one_end, 2, load))
+        found = sooner(found, reversal(d, e, m.BENDS.other_end, 2, load))
     return found
 
 

@@ -11,51 +11,47 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel
-def _copy(h, w, source, target):
-    for k in range(h[m.N_LOADS]):
-        o = m.LOAD_SPEEDS.row(h, k)
-        w[o + target] = w[o + source]
-
-
-@kernel
-def note_start(h, w):
+def note_start(d):
     """Note the speeds along which loads bend where a segment starts, which has just been evaluated."""
-    _copy(h, w, m.LOAD_SPEEDS.now, m.LOAD_SPEEDS.start)
+    for k in range(d.n_loads):
+        d.load_speeds[k].start = d.load_speeds[k].now
 
 
 @kernel
-def note_end(h, w):
+def note_end(d):
     """The same at the end of a step."""
-    _copy(h, w, m.LOAD_SPEEDS.now, m.LOAD_SPEEDS.end)
+    for k in range(d.n_loads):
+        d.load_speeds[k].end = d.load_speeds[k].now
 
 
 @kernel
-def end_is_start(h, w):
+def end_is_start(d):
     """The end of an accepted step is the start of the next."""
-    _copy(h, w, m.LOAD_SPEEDS.end, m.LOAD_SPEEDS.start)
+    for k in range(d.n_loads):
+        d.load_speeds[k].start = d.load_speeds[k].end
 
 
 @kernel
-def speed_passed(w, o, level, near):
-    """The kink of a load at a speed (`Kinks.first`); o: its row of LOAD_SPEEDS."""
-    first, second = w[o + m.LOAD_SPEEDS.start] - level, w[o + m.LOAD_SPEEDS.end] - level
+def speed_passed(d, k, level, near):
+    """The kink of load k at a speed (`Kinks.first`)."""
+    first, second = d.load_speeds[k].start - level, d.load_speeds[k].end - level
     if not passes(first, second, near):
         return NONE
-    return first / (first - second), o + m.LOAD_SPEEDS.now, level, near, 0.0, 1.0, first, second
+    now = d.at_load_speeds + m.LOAD_SPEEDS.size * k + m.LOAD_SPEEDS.now
+    return first / (first - second), now, level, near, 0.0, 1.0, first, second
 
 
 @kernel
-def first_of_loads(h, f, w, n):
+def first_of_loads(d):
     """The kink that a load passes first (`Kinks.first`)."""
     found = NONE
-    for k in range(h[m.N_LOADS]):
-        o, kinks = m.LOAD_SPEEDS.row(h, k), m.LOAD_KINKS.row(h, k)
+    for k in range(d.n_loads):
         for i in range(SPEEDS):
-            level = f[kinks + i]
+            level = d.load_kinks[k].speeds[i]
             if level > 0.0:
-                near = nearness(h, w, level)
-                found = sooner(found, speed_passed(w, o, level, near))
-                found = sooner(found, speed_passed(w, o, -level, near))
+                near = nearness(d, level)
+                found = sooner(found, speed_passed(d, k, level, near))
+                found = sooner(found, speed_passed(d, k, -level, near))
     return found
 
 
