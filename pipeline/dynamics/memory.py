@@ -159,13 +159,13 @@ class Room:
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
     MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES, N_RUBBING, N_BEARINGS, RUBBING_SLOT,
-    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES, N_COMPONENTS,
+    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS,
 ) = _named(
     SIZES,
     "n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger n_pairs "
     "n_known_pairs n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
     "n_loads n_internal load_slot n_couplings n_surfaces n_rubbing n_bearings rubbing_slot n_worn wear_slot n_bodies "
-    "n_frames n_components",
+    "n_frames n_components n_guards",
 )
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
@@ -229,6 +229,9 @@ RUBBING_ENTRIES = wiring("coordinate column sign")  # what moves the joint; pres
 REACTION_TERMS = wiring("coordinate column")  # free coordinates whose acceleration the joint of a link feels
 REACTION_LOOPS = wiring("closure sign part")  # closures that act beyond it
 WORN = wiring("contact")  # contacts whose wear is counted
+#: on what steps end: the vector of `components` numbers from `offset` on in the table of w that has this index in
+#: the header.  contact: that must be closed, or -1; bearing: by whose load it is measured, or -1
+GUARDS = wiring("table offset components contact bearing")
 BODIES, FRAMES = wiring("link"), wiring("link")  # moving bodies and named frames: what is recorded, which no step reads
 GROUPS = wiring("group")  # error group of each state variable
 BOOKS = wiring("work loss load")  # of each independent mechanism: places in the ledger (`DRIVE_WORK`, ...)
@@ -244,18 +247,18 @@ BASIS_VALUES = numbers("value")
 INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port and moving shape r: translation shape (3r), rotation shape (3r)
-#: radius: of the inner surface; kinks: sliding speeds at which the friction law bends, or 0; shape: what else its kind
-#: of surfaces has; length: size of the mechanism that it belongs to
-CONTACT_NUMBERS = numbers("clearance radius floor stick_speed kinks:2 normal_law:4 friction_law:6 shape:2 length")
+#: radius: of the inner surface; shape: what else its kind of surfaces has; length: size of the mechanism that it
+#: belongs to
+CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6 shape:2 length")
 #: radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per force
-#: along the axis and per moment about it; preload: normal force that is always there; kinks: as of CONTACT_NUMBERS;
-#: turning_kink: size of sliding speeds of a law that bends where sliding reverses, or 0
-BEARING_NUMBERS = numbers("radius lever axial torsion preload law:6 kinks:2 turning_kink")
+#: along the axis and per moment about it; preload: normal force that is always there
+BEARING_NUMBERS = numbers("radius lever axial torsion preload law:6")
 COUPLING_NUMBERS = numbers("ratio offset")  # second coordinate = ratio * first + offset
 PIECES = numbers("start coefficients:8")
 HARMONICS = numbers("amplitude frequency phase")  # angular frequency
 LOAD_NUMBERS = numbers("value")  # see `loads`
-LOAD_KINKS = numbers("speeds:2")  # of each load, along its joint coordinate, at which its friction bends, or 0
+#: of each guard. level: length of what it watches, 0: that it reverses; scale: what counts as close is measured by
+GUARD_NUMBERS = numbers("level scale")
 GRAVITY = numbers("acceleration:3")
 #: per error group. magnitude: below it is resolved absolutely, natural: the same by the size of all that there is;
 #: share: factor of its tolerance by which no independent mechanism is resolved less well than alone
@@ -304,13 +307,13 @@ LAW = work("value rate second_rate")
 #: what a load does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
 #: energy, power that it brings in, power that it loses
 LOAD = work("force:3 moment:3 value rate stored power loss")
-#: speeds along the coordinates of loads whose friction bends: now, at the start of the step and at its end
-LOAD_SPEEDS = work("now start end")
+#: speeds along the coordinates of loads whose friction bends
+LOAD_SPEEDS = work("now")
 #: what a bearing does now; unit: wrench of its friction on the joint's second body per normal force, about the kernels'
 #: origin; loss: what it takes per normal force [m/s]
 BEARING = work("load slip loss unit_moment:3 unit_force:3")
 #: what bends the friction of a bearing where it reverses: sliding velocity, force along the axis, moment about it and
-#: forces at both ends as they press; now, in further rows at the start of the step, and at its end
+#: forces at both ends as they press
 BENDS = work("sliding:3 along about one_end:2 other_end:2")
 #: reactions of the joints with friction: without it, then per normal force of each bearing; moment about the second
 #: frame's origin, force
@@ -329,6 +332,7 @@ MAGNITUDE, CORRECTION, LATCHED = _named(STRETCHES, "magnitude correction latched
 WATCH = work(
     "gap0 rate0 force0 slip0 trend0 gap1 rate1 force1 slip1 trend1 event_row mode0 latched0 slip_rate0 slip_rate1"
 )
+GUARDED = work("start:3 end:3")  # what guards watch, at the start and at the end of the step
 (CONTROL,) = _named(STRETCHES, "control")
 HEADER = next(_place)
 

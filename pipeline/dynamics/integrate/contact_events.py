@@ -13,7 +13,6 @@ from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
-from flexclear.pipeline.dynamics.integrate.friction_kinks import Kinks, make_end_on_kink, together
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.mode_changes import (
     NEVER,
@@ -25,7 +24,7 @@ from flexclear.pipeline.dynamics.integrate.mode_changes import (
     zero_gap,
 )
 from flexclear.pipeline.dynamics.integrate.recording import add_event
-from flexclear.pipeline.dynamics.integrate.stepper import AGAIN, RESTART, watch_nothing
+from flexclear.pipeline.dynamics.integrate.stepper import AGAIN, NO_GUARDS, RESTART
 from flexclear.pipeline.dynamics.integrate.within_step import make_evaluate_at, make_repeat
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -139,7 +138,7 @@ def make_resolve_events(
     project: Callable,
     method: Any,
     regimes: Callable,
-    kinks: Kinks | None,
+    guards: tuple[Callable, ...],
 ) -> Callable:
     """The kernel resolve_events(d, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
     last = method.last
@@ -166,8 +165,8 @@ def make_resolve_events(
             step += off
         return step, abs(off) <= CLOSE * step
 
-    end_on_kink = make_end_on_kink(evaluate_at, extend, repeat, kinks)
-    end, accept = (kinks.end, kinks.accept) if kinks else (watch_nothing, watch_nothing)
+    _, note_end, accept, make_end_on_guard = guards
+    end_on_guard = make_end_on_guard(evaluate_at, extend, repeat)
 
     @kernel
     def first_change(d, step):
@@ -204,15 +203,15 @@ def make_resolve_events(
         t = d.time
         for shortened in range(MOST_SHORTENED + 1):
             watch_end(d)
-            end(d)
+            note_end(d)
             which, first, ready = first_change(d, step)
-            length = end_on_kink(d, step, first if which >= 0 else 1.0, ready)
+            length = end_on_guard(d, step, first if which >= 0 else 1.0, ready)
             if length < 0.0:
                 return try_again(d, max(which, 0)), ready, t_new, step
             if length > 0.0:
                 d.immediate = 0
                 watch_end(d)
-                end(d)
+                note_end(d)
                 accept(d)
                 extend(d, length)
                 return 0, follow_contacts(d, length, True, rows, events), t + length, length
@@ -246,21 +245,20 @@ def make_resolve_events(
     return resolve_events
 
 
-def located(regimes: Callable, *families: Kinks) -> tuple[Callable, Callable, Callable]:
+def located(regimes: Callable, guards: tuple[Callable, ...] = NO_GUARDS) -> tuple[Callable, Callable, Callable]:
     """What the stepper calls at the start of a segment, the maker of what it calls after each step, and `any_closed`.
 
     regimes: whether contacts have regimes of sticking (`contact_phases.regimes` or `contact_phases.no_regimes`).
-    families: of the kinks of friction on which steps end.
+    guards: on which steps end as well (`guards.AMONG_CONTACTS`).
     """
-    kinks = together(families)
-    start_kinks = kinks.start if kinks else watch_nothing
+    note_start = guards[0]
 
     @kernel
     def start(d):
         watch_start(d)
-        start_kinks(d)
+        note_start(d)
 
     def make(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
-        return make_resolve_events(evaluate, attempt, extend, project, method, regimes, kinks)
+        return make_resolve_events(evaluate, attempt, extend, project, method, regimes, guards)
 
     return start, make, any_closed

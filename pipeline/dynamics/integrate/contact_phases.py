@@ -14,7 +14,7 @@ from typing import Any
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.recording import add_event, snapshot
-from flexclear.pipeline.dynamics.integrate.within_step import make_locate_level, make_maximum
+from flexclear.pipeline.dynamics.integrate.within_step import make_locate, make_maximum
 from flexclear.pipeline.dynamics.kernels import kernel
 
 #: share of the step over which trends at its end are measured; a force's peak nearer to the end than this is
@@ -104,7 +104,15 @@ def make_follow_contacts(
     has_regimes: `regimes` or `no_regimes`.
     """
     last, spare, interpolate = method.last, method.slopes - 1, method.interpolate
-    locate_level, maximum = make_locate_level(evaluate_at), make_maximum(evaluate_at)
+    maximum = make_maximum(evaluate_at)
+
+    @kernel
+    def value_at(d, step, theta, index):
+        """What w holds at an index, at a fraction of the step."""
+        evaluate_at(d, step, theta)
+        return d.w[index]
+
+    locate = make_locate(value_at)
 
     @kernel
     def measure_trends(d, step):
@@ -166,7 +174,7 @@ def make_follow_contacts(
         """The deepest point of this compression, as an event."""
         watch, now = d.watch[c], d.touch[c]
         rate = touch_at(d, c, m.TOUCH.rate)
-        theta = locate_level(d, step, rate, 0.0, 0.0, 0.0, 1.0, watch.rate0, watch.rate1)
+        theta = locate(d, step, rate, 0.0, 0.0, 0.0, 1.0, watch.rate0, watch.rate1)
         event = events[add_event(d, events, c, m.COMPRESSION, d.time + theta * step)]
         event[m.EVENT.speed], event[m.EVENT.peak_depth] = 0.0, -now.gap
         event[m.EVENT.peak_force] = now.normal_force
@@ -179,7 +187,7 @@ def make_follow_contacts(
     def record_passage(d, step, c, a, b, fa, fb, rows, events):
         """Sticking begins or ends between the shares a and b of the step, as an event."""
         slip = touch_at(d, c, m.TOUCH.slip)
-        theta = locate_level(d, step, slip, stick_speed(d, c), 0.0, a, b, fa, fb)
+        theta = locate(d, step, slip, stick_speed(d, c), 0.0, a, b, fa, fb)
         kind = m.STICKING if fb < 0.0 else m.SLIPPING
         add_event(d, events, c, kind, d.time + theta * step)
         record_here(d, step, theta, rows)

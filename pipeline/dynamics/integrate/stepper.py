@@ -53,13 +53,23 @@ def plan(d, step, following):
 
 @kernel
 def watch_nothing(d):
-    """Nothing is noted, of contacts or of friction."""
+    """Do nothing: neither contacts nor guards are there."""
 
 
 @kernel
 def none_closed(d):
     """No contact to be closed."""
     return False
+
+
+def make_end_nowhere(evaluate_at: Callable, extend: Callable, repeat: Callable) -> Callable:
+    """The kernel end_on_guard of scenes without guards (`guards.make_end_on_guard`)."""
+
+    @kernel
+    def end_on_guard(d, step, before, ready):
+        return 0.0
+
+    return end_on_guard
 
 
 def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
@@ -72,7 +82,9 @@ def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, proj
     return resolve_events
 
 
-#: `events` of scenes without contacts
+#: `guards.AMONG_CONTACTS` of scenes without guards
+NO_GUARDS = (watch_nothing, watch_nothing, watch_nothing, make_end_nowhere)
+#: `events` of scenes without contacts and guards
 NO_CONTACTS = (watch_nothing, make_no_events, none_closed)
 
 

@@ -50,14 +50,17 @@ def make_repeat(evaluate: Callable, attempt: Callable, project: Callable, method
     return repeat
 
 
-def make_locate_level(evaluate_at: Callable) -> Callable:
-    """The kernel locate_level(d, step, place, level, enough, a, b, fa, fb) -> share of the step."""
+def make_locate(value_at: Callable) -> Callable:
+    """The kernel locate(d, step, which, level, enough, a, b, fa, fb) -> fraction of the step.
+
+    value_at(d, step, theta, which): evaluates the dense output at a fraction of the step, and gives a value there.
+    """
 
     @kernel
-    def locate_level(d, step, place, level, enough, a, b, fa, fb):
-        """Share of the step in (a, b) where w[place] = level, fa and fb from it at the ends (Illinois rule).
+    def locate(d, step, which, level, enough, a, b, fa, fb):
+        """Fraction of the step in (a, b) where a value reaches a level, off by fa and fb at the ends (Illinois rule).
 
-        It is also found where w[place] is no further from the level than `enough`.
+        A value no further from the level than `enough` has reached it.
         """
         side, theta = 0, b
         for _ in range(MOST_LOOKS):
@@ -65,8 +68,7 @@ def make_locate_level(evaluate_at: Callable) -> Callable:
             theta = (a * fb - b * fa) / (fb - fa)
             if not a < theta < b:
                 theta = 0.5 * (a + b)
-            evaluate_at(d, step, theta)
-            value = d.w[place] - level
+            value = value_at(d, step, theta, which) - level
             if abs(value) <= enough or abs(theta - before) <= NEAR:
                 return theta
             if (value > 0.0) == (fb > 0.0):
@@ -77,7 +79,7 @@ def make_locate_level(evaluate_at: Callable) -> Callable:
                 fb, side = (0.5 * fb, -1) if side == -1 else (fb, -1)
         return theta
 
-    return locate_level
+    return locate
 
 
 def make_maximum(evaluate_at: Callable) -> Callable:
