@@ -28,7 +28,7 @@ from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub
 
 #: how close to its level a guard ends a step, as a fraction of the guard's size over the root of the tolerance: what a
 #: step errs that ends so far beyond falls with the square of it
-NEAR = 0.1
+CLOSE = 0.1
 #: a vector reverses that passes zero within this fraction of its way: in a plane mechanism that is rounding
 REVERSES = 1e-6
 MOST_REPEATS = 3
@@ -84,10 +84,10 @@ def beyond(d, g):
 
 
 @kernel
-def nearness(d, g):
+def closeness(d, g):
     """Return how far from its level guard g counts as there."""
     numbers, bearing = d.guard_numbers[g], d.guards[g].bearing
-    return NEAR * np.sqrt(d.rtol) * (d.bearing[bearing].load if bearing >= 0 else numbers.scale)
+    return CLOSE * np.sqrt(d.rtol) * (d.bearing[bearing].load if bearing >= 0 else numbers.scale)
 
 
 @kernel
@@ -106,22 +106,22 @@ def passage(d, g):
     It is off by fa and fb there, which only is known at the ends of the step.  NONE where it does not pass, or where an
     end of the step lies on the level.
     """
-    at, level, near = d.guarded[g], d.guard_numbers[g].level, nearness(d, g)
+    at, level, close = d.guarded[g], d.guard_numbers[g].level, closeness(d, g)
     theta, there = closest(at.start, at.end)
     inside, within, first, second = length(there), 0.0 < theta < 1.0, length(at.start), length(at.end)
     if level == 0.0:
         way = length(sub(at.end, at.start))
-        if not (within and inside <= REVERSES * way and min(first, second) > near):
+        if not (within and inside <= REVERSES * way and min(first, second) > close):
             return NONE
         return theta, g, 0.0, 1.0, -first, second
     first, second, inside = first - level, second - level, inside - level
-    if first * second < 0.0 and min(abs(first), abs(second)) > near:
+    if first * second < 0.0 and min(abs(first), abs(second)) > close:
         return first / (first - second), g, 0.0, 1.0, first, second
-    if not (within and inside < -near and min(first, second) > -near):
+    if not (within and inside < -close and min(first, second) > -close):
         return NONE
-    if first > near:
+    if first > close:
         return theta * first / (first - inside), g, 0.0, theta, first, inside
-    if second > near:
+    if second > close:
         return 1.0 - (1.0 - theta) * second / (second - inside), g, theta, 1.0, inside, second
     return NONE
 
@@ -129,13 +129,13 @@ def passage(d, g):
 @kernel
 def first_passed(d):
     """Return the passage of the guard that a step passes first, or NONE; open contacts have no guards."""
-    found = NONE
+    first = NONE
     for g in range(d.n_guards):
         contact = d.guards[g].contact
         if contact < 0 or d.mode[contact] == 1:
             passed = passage(d, g)
-            found = passed if passed[0] < found[0] else found
-    return found
+            first = passed if passed[0] < first[0] else first
+    return first
 
 
 def make_end_on_guard(evaluate_at: Callable, extend: Callable, repeat: Callable) -> Callable:
@@ -154,7 +154,7 @@ def make_end_on_guard(evaluate_at: Callable, extend: Callable, repeat: Callable)
     locate = make_locate(beyond_at)
 
     @kernel
-    def land(d, step, theta, g, near, before, off_before):
+    def land(d, step, theta, g, close, before, off_before):
         """Make the step end on the level, from a first guess: its length; -1 when it cannot be made.
 
         before, off_before: another fraction of the step, and how far beyond the level it is.
@@ -164,7 +164,7 @@ def make_end_on_guard(evaluate_at: Callable, extend: Callable, repeat: Callable)
             if not repeat(d, size):
                 return -1.0
             off = beyond(d, g)
-            if abs(off) <= near or k == MOST_REPEATS - 1 or off == off_before:
+            if abs(off) <= close or k == MOST_REPEATS - 1 or off == off_before:
                 return size
             better = size - off * (size - before) / (off - off_before)
             if not 0.0 < better < step:
@@ -185,11 +185,11 @@ def make_end_on_guard(evaluate_at: Callable, extend: Callable, repeat: Callable)
             fb = beyond_at(d, step, b, g)
         if fa * fb >= 0.0:  # the way to it is bent
             return 0.0
-        near = nearness(d, g)
-        theta = locate(d, step, g, 0.0, near, a, b, fa, fb)
+        close = closeness(d, g)
+        theta = locate(d, step, g, 0.0, close, a, b, fa, fb)
         if not theta < before or theta * step <= SHORTEST * max(abs(d.time), step):
             return 0.0
-        size = land(d, step, theta, g, near, a, fa)
+        size = land(d, step, theta, g, close, a, fa)
         if size < 0.0:
             return 0.0 if repeat(d, step) else -1.0
         return size
