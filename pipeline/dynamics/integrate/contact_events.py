@@ -16,7 +16,6 @@ from flexclear.pipeline.dynamics.integrate.contact_phases import make_follow_con
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.mode_changes import (
     NEVER,
-    clearance,
     cubic_tells,
     ends_tell,
     make_locate_change,
@@ -111,7 +110,7 @@ def try_again(d, c):
 def stepped_over(d, c):
     """Whether contact c, about to change its mode where a step starts, has begun long before."""
     gap, length = d.touch[c].gap, d.contact_numbers[c].length
-    deep = DEEP * clearance(d, c) + ERRORS * d.rtol * length
+    deep = DEEP * d.contact_numbers[c].clearance + ERRORS * d.rtol * length
     return gap < -deep and d.mode[c] == 0
 
 

@@ -48,12 +48,6 @@ def touch_at(d, c, field):
     return d.at_touch + m.TOUCH.size * c + field
 
 
-@kernel
-def record_here(d, step, theta, rows):
-    """A row of the motion at a share of the step whose dense output is in Y_STAGE."""
-    snapshot(d, rows, d.time + theta * step, d.at_y_stage)
-
-
 # Regimes of friction -------------------------------------------------------------------------------------------------
 @kernel
 def no_regimes(d, c):
@@ -64,13 +58,7 @@ def no_regimes(d, c):
 @kernel
 def regimes(d, c):
     """Whether contact c has a sliding speed below which its law sticks."""
-    return stick_speed(d, c) > 0.0
-
-
-@kernel
-def stick_speed(d, c):
-    """Sliding speed below which the law of contact c sticks; 0 for laws without that."""
-    return d.contact_numbers[c].stick_speed
+    return d.contact_numbers[c].stick_speed > 0.0
 
 
 @kernel
@@ -156,7 +144,7 @@ def make_follow_contacts(
         """Whether contact c passes, or may pass and return, the speed below which it sticks."""
         if not has_regimes(d, c):
             return False
-        watch, level = d.watch[c], stick_speed(d, c)
+        watch, level = d.watch[c], d.contact_numbers[c].stick_speed
         return passes_level(watch, level) or may_touch_level(watch, level, step)
 
     @kernel
@@ -167,7 +155,7 @@ def make_follow_contacts(
         if peak > event[m.EVENT.peak_force]:
             event[m.EVENT.peak_force] = peak
             interpolate(d, where, d.at_y_stage)
-            record_here(d, step, where, rows)
+            snapshot(d, rows, d.time + where * step, d.at_y_stage)
 
     @kernel
     def record_compression(d, step, c, rows, events):
@@ -181,21 +169,21 @@ def make_follow_contacts(
         begun = events[int(watch.event_row)]
         begun[m.EVENT.peak_depth] = max(begun[m.EVENT.peak_depth], -now.gap)
         begun[m.EVENT.peak_force] = max(begun[m.EVENT.peak_force], now.normal_force)
-        record_here(d, step, theta, rows)
+        snapshot(d, rows, d.time + theta * step, d.at_y_stage)
 
     @kernel
     def record_passage(d, step, c, a, b, fa, fb, rows, events):
         """Sticking begins or ends between the shares a and b of the step, as an event."""
         slip = touch_at(d, c, m.TOUCH.slip)
-        theta = locate(d, step, slip, stick_speed(d, c), 0.0, a, b, fa, fb)
+        theta = locate(d, step, slip, d.contact_numbers[c].stick_speed, 0.0, a, b, fa, fb)
         kind = m.STICKING if fb < 0.0 else m.SLIPPING
         add_event(d, events, c, kind, d.time + theta * step)
-        record_here(d, step, theta, rows)
+        snapshot(d, rows, d.time + theta * step, d.at_y_stage)
 
     @kernel
     def record_regimes(d, step, c, rows, events):
         """One passage between the regimes, or there and back, as events."""
-        watch, level = d.watch[c], stick_speed(d, c)
+        watch, level = d.watch[c], d.contact_numbers[c].stick_speed
         first, second = watch.slip0 - level, watch.slip1 - level
         if first * second < 0.0:
             record_passage(d, step, c, 0.0, 1.0, first, second, rows, events)

@@ -43,15 +43,9 @@ def side(d, c):
 
 
 @kernel
-def clearance(d, c):
-    """Clearance of contact c."""
-    return d.contact_numbers[c].clearance
-
-
-@kernel
 def zero_gap(d, c):
     """Size [m] below which the gap of contact c is zero."""
-    return ZERO_GAP * clearance(d, c) + ROUNDING * d.length
+    return ZERO_GAP * d.contact_numbers[c].clearance + ROUNDING * d.length
 
 
 @kernel
@@ -178,7 +172,7 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
     @kernel
     def search(d, step, c):
         """First mode change in the step, stretch by stretch: 0 at once, NEVER not at all."""
-        zero, room = zero_gap(d, c), clearance(d, c)
+        zero, room = zero_gap(d, c), d.contact_numbers[c].clearance
         d0, r0 = distance_at(d, step, 0.0, c)
         p0 = d.touch[c].offset
         d1, r1 = distance_at(d, step, WIDEST, c)
