@@ -117,11 +117,10 @@ def passage(d, g):
     first, second, inside = first - level, second - level, inside - level
     if first * second < 0.0 and min(abs(first), abs(second)) > close:
         return first / (first - second), g, 0.0, 1.0, first, second
-    if not (within and inside < -close and min(first, second) > -close):
-        return NONE
-    if first > close:
+    dips = within and inside < -close
+    if dips and first > close:
         return theta * first / (first - inside), g, 0.0, theta, first, inside
-    if second > close:
+    if dips and second > close:
         return 1.0 - (1.0 - theta) * second / (second - inside), g, theta, 1.0, inside, second
     return NONE
 
