@@ -86,6 +86,30 @@ def test_guards_of_an_open_contact_rest() -> None:
     assert passed((0.3, 0.0, 0.0), (0.05, 0.0, 0.0), contact=0) is not None
 
 
+@pytest.mark.parametrize("components", [1, 2, 3])
+def test_what_is_watched_is_noted_as_a_vector_that_ends_with_zeros(components: int) -> None:
+    note_start, note_end, accept = guards.note_start, guards.note_end, guards.accept
+
+    @njit
+    def noted(h, f, w, n, before, after):
+        d = data(h, f, w, n)
+        w[20:23] = before
+        note_start(d)
+        w[20:23] = after
+        note_end(d)
+        first = d.guarded[0].start, d.guarded[0].end
+        accept(d)
+        return first, d.guarded[0].start
+
+    h, w = np.zeros(m.HEADER + m.GUARDS.size, np.int64), np.zeros(60)
+    h[m.N_GUARDS], h[m.GUARDS.place], h[m.GUARDED.place], h[m.TOUCH.place] = 1, m.HEADER, 0, 17
+    h[m.HEADER :] = m.TOUCH.place, 3, components, -1, -1
+    before, after = np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0])
+    (start, end), later = noted(h, np.zeros(2), w, np.zeros(m.INTEGERS, np.int64), before, after)
+    kept = np.arange(3) < components
+    assert np.array_equal([start, end, later], [before * kept, after * kept, after * kept])
+
+
 def table(scene: Scene) -> tuple[np.ndarray, np.ndarray, Any]:
     """Rows of GUARDS and of GUARD_NUMBERS, and the arrays."""
     arrays = tabulate(build(scene, {})).arrays
