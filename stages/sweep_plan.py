@@ -18,7 +18,6 @@ from flexclear.pipeline.core.scene.load import edited, with_numbers
 from flexclear.pipeline.core.scene.quantity import Recorded, parse_recorded
 from flexclear.pipeline.core.scene.schema import Sections
 from flexclear.pipeline.core.workflow.task import Task, facts, key
-from flexclear.pipeline.core.workflow.workers import without_main
 from flexclear.stages import s4_simulate
 from flexclear.stages.graph import Graph
 from flexclear.stages.sweep_engine import Job
@@ -275,8 +274,7 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
     points = requested.design.points()
     groups = _groups(requested.scene, points)
     graphs = {text: Graph(edited(requested.scene, first), shown=False) for text, first in groups.items()}
-    with without_main():
-        outcome = workplace.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
+    outcome = workplace.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
     check(outcome)
     modules = _modules(requested)
     families = {}
