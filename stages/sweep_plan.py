@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.store import FAMILY
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.machine import instruction_set
 from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.limits import check_members
 from flexclear.pipeline.core.scene.load import edited, with_numbers
@@ -60,12 +61,14 @@ class Family:
         """Stage of its batches in the store, and a name there that no batch has."""
         return f"sweep/{self.key}", FAMILY
 
-    def keep(self, points: Mapping[str, Point], store: Store, recorded: Sequence[Recorded]) -> None:
-        """Store finished points as one artifact."""
+    def keep(self, points: Mapping[str, Point], store: Store, recorded: Sequence[Recorded], here: bool = True) -> None:
+        """Store finished points as one artifact. here: whether this machine computed them."""
         from flexclear.pipeline.core.artifacts.points import batch
 
         name = hashlib.sha256("".join(sorted(points)).encode()).hexdigest()[:32]
-        store.put(self.folder[0], name, {"nc": batch(points, recorded)}, self.facts)
+        store.put(
+            self.folder[0], name, {"nc": batch(points, recorded)}, self.facts, instruction_set() if here else None
+        )
 
     def find(self, store: Store, recorded: Sequence[Recorded]) -> dict[str, Point]:
         """All points of the family that are stored and sound, with their values of the `recorded` quantities."""

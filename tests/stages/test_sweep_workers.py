@@ -61,13 +61,16 @@ def test_a_killed_sweep_goes_on_with_what_it_has_not(root: Path, tmp_path: Path,
     assert asked == []
 
 
-def test_an_interrupted_sweep_leaves_what_is_finished_and_says_so(root: Path, tmp_path: Path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_sweep_leaves_what_is_finished_and_says_so(root: Path, tmp_path: Path, number: signal.Signals):
+    """SIGTERM too, as of a cluster's scheduler: it used to end the command with leaked semaphores of its workers."""
     results = tmp_path / "results"
     process = flexclear("sweep", str(pendulum(tmp_path, 20_000)), "--workers=2", cwd=root, results=results)
     begun(process, results)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130, err
+    assert "leaked" not in err
     with xr.open_dataset(results / "sweeps" / "lengths" / "sweep.nc") as left:
         assert left.attrs["complete"] == 0
         done = left["status"].values == 0
