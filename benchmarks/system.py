@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 
@@ -44,6 +46,16 @@ def limit_files(size: int) -> Callable[[], None]:
     """What lets a process write no file longer than so many bytes."""
     resource = _resource()
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+
+
+def children(process: int) -> list[int]:
+    """Numbers of the processes that a process has started and that still run (Linux); none elsewhere."""
+    tasks = Path(f"/proc/{process}/task").glob("*/children")
+    numbers: list[int] = []
+    for task in tasks:
+        with suppress(OSError):
+            numbers += map(int, task.read_text().split())
+    return numbers
 
 
 def ended_by(exit_code: int) -> str:
