@@ -9,7 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 from typing import Any
 
@@ -260,7 +260,7 @@ def _threads(client: Any, where: str) -> int:
 
     Raises InputError where there are none, or they run other sources, ResourceError where one keeps silent.
     """
-    end = now() + PATIENCE
+    end = inf
     while True:
         threads = sum(client.nthreads().values())
         if not threads:
@@ -274,6 +274,7 @@ def _threads(client: Any, where: str) -> int:
         failed = {worker: error for worker, error in digests.items() if isinstance(error, Exception)}
         if not failed:
             break
+        end = min(end, now() + PATIENCE)  # from the first failure on: the check itself may have waited for a worker
         if now() > end:
             worker, error = next(iter(failed.items()))
             raise ResourceError(f"{where}: worker {worker} does not answer ({error}); is its memory full?")
