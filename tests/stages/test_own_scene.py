@@ -16,7 +16,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.json_schema import scene_schema
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.scene.plausibility import oddities
+from flexclear.pipeline.core.scene.plausibility import implausible
 from flexclear.stages import run
 from flexclear.stages.__main__ import main
 from flexclear.stages.as_json import as_json
@@ -157,7 +157,7 @@ def test_the_schema_accepts_what_the_loader_accepts(path: Path, validators):
     table = tomllib.loads(path.read_text())
     recipe = "shape" in table
     if not recipe:
-        assert oddities(load_scene(path)) == []
+        assert implausible(load_scene(path)) == []
     assert list(validators[recipe].iter_errors(table)) == []
 
 

@@ -175,7 +175,7 @@ def far_apart(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequenc
         if gap > WORST_GUESS * mechanism.length:
             return InputError(
                 f"[joint.{joint.name}.between]",
-                f"'{a}' and '{b}' start {gap:.3g} m apart, where a {joint.edge.kind} joint lets them be together "
+                f"'{a}' and '{b}' start {gap:.3g} m apart, where a {joint.edge.kind} joint holds them together "
                 f"(more than {WORST_GUESS:.0%} of the mechanism's size, {mechanism.length:.3g} m)",
                 "correct the poses of the bodies, or the frames",
             )
