@@ -25,6 +25,8 @@ MISTAKES = (InputError, ResourceError)
 LARGEST_FILE, LARGEST_MESH = 20 << 20, 150_000
 #: extents of a mesh from a file beyond which its unit of length is doubted [m]
 SMALLEST, LARGEST = 1e-3, 10.0
+#: parts that a mechanism does not need in order to fit together
+ACTING = ("[load.", "[gear.", "[stop.")
 #: unused frames that are listed
 LISTED = 3
 
@@ -72,7 +74,7 @@ def scene(whole: Scene) -> Findings:
         return seen
     rigid = {name: body.rigid for name, body in bodies.items()}
     if seen.attempt(partial(_assembled, whole, rigid, seen), partial(_in_file, whole)):
-        seen.notes += _free_motions(whole, rigid)
+        _free_motions(whole, rigid, seen)
     return seen
 
 
@@ -190,8 +192,11 @@ def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
     return build(placed(whole), {name: rigid[name] for name in whole.flexible()})
 
 
-def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset]) -> Iterator[str]:
-    """Free motions besides the drives, with rigid bodies and loose joints closed; nothing where these do not fit."""
+def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) -> None:
+    """Note the free motions besides the drives, with rigid bodies and loose joints closed, where these fit.
+
+    Loads, gears and stops are read for it: what is wrong with them is an error of the scene itself.
+    """
     from flexclear.pipeline.core.scene.ideal import ideal, loose
     from flexclear.pipeline.dynamics.model.mobility import analyse
     from flexclear.pipeline.dynamics.model.model import tabulate
@@ -200,7 +205,9 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset]) -> Iterator[str]:
     try:
         mechanism = _mechanism(ideal(whole) if simplified else whole, rigid)
         free = analyse(tabulate(mechanism)).mobility
-    except InputError:  # only as flexible bodies or with clearance it moves
+    except InputError as error:  # others: only as flexible bodies or with clearance it moves
+        if error.place.startswith(ACTING):
+            seen.errors.append(_in_file(whole, error))
         return
     closed = " with loose joints closed" if loose(whole) else ""
-    yield f"free motions besides the drives{closed}: {free}"
+    seen.notes.append(f"free motions besides the drives{closed}: {free}")

@@ -52,8 +52,9 @@ def _inertias(scene: Scene) -> Iterator[InputError]:
         extent = own or whole
         gyration = sqrt(max(body.inertia[k][k] for k in range(3)) / body.mass)
         if extent > 0.0 and gyration > FAR * extent:
-            size = f"a body whose frames lie within {own:.3g} m" if own else f"a body of a scene of {whole:.3g} m"
-            yield warning(scene, f"body.{name}.inertia", f"a radius of gyration of {gyration:.3g} m for {size}", UNITS)
+            size = f"the body's frames lie within {own:.3g} m" if own else f"the whole scene is {whole:.3g} m large"
+            text = f"mass and inertia give a radius of gyration of {gyration:.3g} m, but {size}"
+            yield warning(scene, f"body.{name}.inertia", text, UNITS)
 
 
 def _points(body: Any, pose: Any) -> list[tuple[float, float, float]]:
@@ -78,8 +79,8 @@ def _masses(scene: Scene) -> Iterator[InputError]:
         if DENSE < density < inf or (heavy and DENSE_AND_HEAVY < density < inf):
             trace = sum(body.inertia[k][k] for k in range(3))
             text = (
-                f"{body.mass:g} kg with a radius of gyration of {1e3 * sqrt(trace / 2.0 / body.mass):.3g} mm are at "
-                f"least {density:.1g} kg/m^3; steel has 7850"
+                f"a body of {body.mass:g} kg with a radius of gyration of {1e3 * sqrt(trace / 2.0 / body.mass):.3g} mm "
+                f"has a density of at least {density:.1g} kg/m^3 (steel: 7850)"
             )
             yield warning(scene, f"body.{name}.mass", text, f"correct mass or inertia; {UNITS}")
 
@@ -155,7 +156,8 @@ def _angles_of(law: Any) -> list[Any]:
 def _gains(scene: Scene) -> Iterator[InputError]:
     for name, key in negative_gains(scene):
         value = getattr(scene.load[name], key)
-        text = f"the gain {value} is negative: the controller pushes away from its reference"
+        gain = value if isinstance(value, str) else f"{value:g}"
+        text = f"the gain {gain} is negative: the controller pushes away from its reference"
         yield warning(scene, f"load.{name}.{key}", text, "write a positive gain, or turn the joint's axis")
 
 
