@@ -160,18 +160,25 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) -> No
     """
     from flexclear.pipeline.dynamics.model.mobility import analyse
     from flexclear.pipeline.dynamics.model.model import tabulate
-    from flexclear.pipeline.dynamics.model.plausibility import forgotten, refuse_missed, unused_frames
+    from flexclear.pipeline.dynamics.model.plausibility import (
+        forgotten,
+        refuse_missed,
+        refuse_overlap,
+        unused_frames,
+    )
 
     mechanism = _mechanism(whole, rigid)
     if mechanism.all_rigid:
         model = tabulate(mechanism)
         mechanism = model.mechanism
         analyse(model)
+        refuse_missed(mechanism)
+        refuse_overlap(mechanism)
     else:
         from flexclear.pipeline.dynamics.model.assembly import assembled
 
         mechanism = assembled(mechanism)
-    refuse_missed(mechanism)
+        refuse_missed(mechanism)
     for body, text, remedy in forgotten(mechanism):
         seen.warnings.append(_in_file(whole, InputError(f"[body.{body}]", text, remedy)))
     unused = unused_frames(mechanism)

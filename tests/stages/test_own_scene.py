@@ -346,3 +346,69 @@ def test_results_lie_below_the_folder_from_which_a_command_is_called(
     assert results_root() == tmp_path / "results"
     monkeypatch.chdir(root / "docs")
     assert results_root().resolve() == (root / "results").resolve()
+
+
+TWO_BODIES = """
+title = "Two bodies that a joint was to connect"
+time = { end = "10 ms" }
+[body.a]
+type = "rigid"
+mass = "1 kg"
+inertia = [1e-3, 1e-3, 1e-3]
+pose = {}
+frames.end = { position = ["0.1 m", 0, 0] }
+[body.b]
+type = "rigid"
+mass = "1 kg"
+inertia = [1e-3, 1e-3, 1e-3]
+pose = { position = ["0.2 m", 0, 0] }
+frames.start = { position = ["-0.1 m", 0, 0] }
+"""
+MISSING = "nothing uses the frames 'a.end' and 'b.start', which start at the same point: is a joint missing?"
+
+
+def test_check_and_run_warn_of_a_forgotten_joint(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "two.toml").write_text(TWO_BODIES)
+    assert main(["check", "two.toml"]) == 0
+    said = capsys.readouterr()
+    assert MISSING in said.err
+    assert "free motions besides the drives: 12" in said.out
+    assert main(["run", "two.toml", "--json"]) == 0
+    said = capsys.readouterr()
+    assert MISSING in said.err
+    assert MISSING in json.loads(said.out)["two"]["warnings"][0]
+    assert main(["check", "two.toml", "--set", "body.b.frames.start.position=[0, 0, 0]"]) == 0
+    assert MISSING not in capsys.readouterr().err
+
+
+ROLLING = """
+title = "A ball on a plane"
+time = { end = "10 ms" }
+[body.ground]
+type = "ground"
+frames.plane = {}
+[body.ball]
+type = "rigid"
+mass = "1 kg"
+inertia = [4e-4, 4e-4, 4e-4]
+pose = { position = [0, 0, "29 mm"] }
+frames.centre = {}
+[joint.floor]
+type = "ball-on-plane"
+between = ["ground.plane", "ball.centre"]
+ball_radius = "32 mm"
+normal = { law = "flores", restitution = 0.3, stiffness = 1e9 }
+"""
+
+
+def test_a_ball_that_starts_in_its_plane_is_refused_with_its_depth(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    (tmp_path / "ball.toml").write_text(ROLLING)
+    assert main(["check", str(tmp_path / "ball.toml")]) == 2
+    said = capsys.readouterr().err
+    assert "the ball starts 3 mm deep in the plane" in said
+    assert "hint: move a body, lower the plane, or declare" in said
+    assert "clearance" not in said

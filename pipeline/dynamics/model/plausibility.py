@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.model.stops import STOP
+from flexclear.pipeline.dynamics.model.stops import STOP, End
 
 #: surfaces whose inner part is a pin or a ball within a hollow one
 ROUND = ("clearance-revolute", "clearance-spherical")
-#: frames that are closer than this fraction of the mechanism's size are at one point
+#: frames that are closer than this fraction of the mechanism's size are at one point; surfaces that are less deep in
+#: each other than this fraction of their clearance or radius may only touch
 SAME = 1e-3
 
 
@@ -48,6 +50,47 @@ def refuse_missed(mechanism: Mechanism) -> None:
             f"('{joint.between[0]}'), where the clearance allows {length(joint.clearance)}",
             "correct poses or frames; a bare number is in metres: 50 is 50 m",
         )
+
+
+def refuse_overlap(mechanism: Mechanism) -> None:
+    """InputError for a ball or pin of a rigid mechanism that starts within its hollow's or plane's material.
+
+    What rounding of poses may explain is left to the run, which closes the loops exactly.
+    """
+    scene = mechanism.scene
+    if scene.start is not None and scene.start.at is not None:
+        return
+    for contact, away, _ in offsets(mechanism):
+        depth = float(np.linalg.norm(away)) - contact.joint.clearance
+        if depth > SAME * contact.joint.clearance:
+            refuse_depth(scene, contact, depth)
+    for contact in mechanism.contacts:
+        if contact.joint.type == "ball-on-plane":
+            plane, ball = (mechanism.links[s.link].start.of(s.place) for s in (contact.outer, contact.inner))
+            depth = contact.joint.radius - float((ball.p - plane.p) @ plane.R[:, 2])
+            if depth > SAME * contact.joint.radius:
+                refuse_depth(scene, contact, depth)
+
+
+def refuse_depth(scene: Scene, contact: Contact, depth: float) -> None:
+    """InputError for surfaces that start so deep in each other [m or rad], unless the scene says how that began."""
+    joint = contact.joint
+    if joint.initial_approach_speed is not None:
+        return
+    problem, remedy = f"its surfaces start {length(depth)} deep in each other", "enlarge the clearance"
+    problem += f" (clearance {length(joint.clearance)})"
+    if joint.type == "ball-on-plane":
+        problem, remedy = f"the ball starts {length(depth)} deep in the plane", "lower the plane"
+    elif isinstance(joint, End):
+        unit = "rad" if joint.coordinate.turning else "m"
+        problem, remedy = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}", "move the end"
+    elif contact.name in loose(scene):
+        remedy = "begin where the joint would be without clearance ([start] at = 'ideal'), " + remedy
+    raise InputError(
+        f"[{contact.place}]",
+        problem,
+        f"move a body, {remedy}, or declare the speed at which this contact began as initial_approach_speed",
+    )
 
 
 def length(metres: float) -> str:
