@@ -191,7 +191,7 @@ def _shaft(run: xr.Dataset, scene: Scene) -> str:
     wound = speed - np.polyval(np.polyfit(time, speed, 1), time)
     crossings = np.flatnonzero(np.diff(np.sign(wound)) > 0)
     period = (time[crossings[-1]] - time[crossings[0]]) / (len(crossings) - 1)
-    return f"It winds up and down at {1.0 / period:.0f} Hz while it speeds up to {speed[-1]:.0f} rad/s."
+    return f"It winds up and down at {1.0 / period:.0f} Hz while it speeds up to {abs(speed[-1]):.0f} rad/s."
 
 
 def _driven_yoke(run: xr.Dataset, scene: Scene) -> str:
@@ -205,7 +205,7 @@ def _rolling(run: xr.Dataset, scene: Scene) -> str:
     moved = run["position"].sel(body="ball").isel(time=-1) - run["position"].sel(body="ball").isel(time=0)
     turned = float(run["angular_velocity"].sel(body="ball", axis="y")[-1]) * scene.joint["floor"].radius
     slip = 1.0 - turned / float(np.linalg.norm(run["velocity"].sel(body="ball").values[-1]))
-    return f"It gets {float(np.linalg.norm(moved)):.2f} m far and slips by {100 * abs(slip):.1f} %."
+    return f"It gets {float(np.linalg.norm(moved)):.2f} m far; it slips by {100 * abs(slip):.2g} %."
 
 
 def _controllers(run: xr.Dataset, scene: Scene) -> str:
