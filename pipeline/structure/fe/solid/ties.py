@@ -32,7 +32,7 @@ def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
         regions = _regions(geometry)
         if on.region not in regions:
             hint = suggestion(on.region, regions) if regions else "the mesh names none; choose by plane or cylinder"
-            raise InputError(f"{where}.region", f"no region is called '{on.region}'", hint)
+            raise InputError(f"{where[:-1]}.region]", f"no region is called '{on.region}'", hint)
         nodes = regions[on.region]
     else:
         nodes = _on_surface(geometry, on)
