@@ -169,9 +169,9 @@ def constrained(d, b):
     forward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, b)
     for k in range(d.at_multiplier, d.at_multiplier + d.n_kept_rows):
         d.w[k] = 0.0
-    take_spread(d.h, d.w, b)
-    solve(d.h, d.w)
-    add_spread(d.h, d.w, b, 1.0)
+    take_spread(d, b)
+    solve(d)
+    add_spread(d, b, 1.0)
     backward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, b)
 
 
@@ -204,7 +204,7 @@ def respond(d, b):
     constrained(d, b)
     d.w[b + nv] += drive_power(d, b, d.at_u)
     d.w[b + nv + 1] += drive_power(d, b, d.at_du)
-    to_modes(d.h, d.f, d.w, b)
+    to_modes(d, b)
 
 
 @kernel
@@ -221,7 +221,7 @@ def responses(d, o):
             d.w[root(d, o, e)] = np.sqrt(max(d.f[stiffness + j], 0.0))
             b = response(d, o, e) + nq
             d.w[b + c0 + j] = d.w[root(d, o, e)]
-            to_interface(d.h, d.f, d.w, b)
+            to_interface(d, b)
             respond(d, b)
             e += 1
     for i in range(e):

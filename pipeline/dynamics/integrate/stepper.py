@@ -164,8 +164,8 @@ def make_advance(
         if not (finite(d, slope) and finite(d, d.at_y_new)):
             d.evaluation = m.NOT_FINITE
             return False
-        d.drift = max(d.drift, largest(d.w, d.at_residual, d.n_closure_rows))
-        d.rate_drift = max(d.rate_drift, largest(d.w, d.at_residual_rate, d.n_closure_rows))
+        d.drift = max(d.drift, largest(d.residual, d.n_closure_rows))
+        d.rate_drift = max(d.rate_drift, largest(d.residual_rate, d.n_closure_rows))
         used = project(d.h, d.f, d.w, d.n, t_new, d.at_y_new, slope, tolerance)
         note(d)
         if used > 0:
@@ -202,7 +202,7 @@ def make_advance(
             d.y[k] = d.y_new[k]
             d.w[slope + k] = d.w[final + k]
         d.time = t_new
-        keep_scales(d.h, d.w)
+        keep_scales(d)
 
     @kernel
     def set_off(d):

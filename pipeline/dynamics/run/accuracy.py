@@ -250,10 +250,11 @@ def _first(scene: Scene) -> float:
 
 
 def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float) -> float:
+    """The next tolerance, which two digits describe."""
     if enough is not None and too_loose < math.inf:
-        return math.sqrt(enough.rtol * too_loose)
+        return float(f"{math.sqrt(enough.rtol * too_loose):.1e}")
     change = float(np.clip(AIM / max(fraction, 1e-300), 1e-3, 1e3))
-    return float(np.clip(rtol * change, TIGHTEST, LOOSEST))
+    return float(f"{np.clip(rtol * change, TIGHTEST, LOOSEST):.1e}")
 
 
 def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:
