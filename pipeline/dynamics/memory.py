@@ -265,6 +265,14 @@ SUBSPACE = work("angular:3 linear:3")
 OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")
 COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
+#: of each link, about its origin, which arm leads to from its parent's: what it offers to its parent, inertia as
+#: (turning mixed; mixed^T moving) of twists to wrenches; a wrench; an acceleration; mass, first and polar moment about
+#: the kernels' origin of all beyond (`equations.articulated`)
+ARTICULATED = work(
+    "turning:6 mixed:3x3 moving:6 moment:3 force:3 angular:3 linear:3 arm:3 mass centre:3 polar"
+)
+#: of each coordinate: its column about its link's origin, and the factor's K
+LOCAL, GAIN = work("angular:3 linear:3"), work("moment:3 force:3")
 #: MODAL: P (9n), V (9n), forces on the modes (n), and their spin (3n) as eigenmodes and in the interface basis
 BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _named(
     STRETCHES, "bias modal_bias modal scratch mass force residual residual_rate gamma"

@@ -35,11 +35,11 @@ def spatial(w, o, mass, c, J):
 
 
 @kernel
-def inertia(h, f, w, i):
-    """Spatial inertia of link i (OWN) and the wrench on it (moment about the origin, force).
+def wrench(h, f, w, i):
+    """Store the wrench on link i (moment about the kernels' origin, force); return the link's mass and inertia.
 
-    The wrench is what the accelerations now in its frame need, gravity being an acceleration of
-    the ground.
+    The wrench is what the accelerations now in its frame need, gravity being an acceleration of the ground.  Returns
+    mass, centre relative to the link's origin, and inertia about the centre, world axes.
     """
     frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
     R = at9(w, frame + m.FRAME.axes)
@@ -48,13 +48,28 @@ def inertia(h, f, w, i):
     c = add(at(w, frame + m.FRAME.origin), arm)
     mass = f[numbers + m.LINK_NUMBERS.mass]
     J = congruence(R, at6(f, numbers + m.LINK_NUMBERS.inertia))
-    spatial(w, m.OWN.row(h, i), mass, c, J)
     a = add(at(w, frame + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
     force = scale(mass, a)
     moment = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega)))
     o = m.WRENCH.row(h, i)
     put(w, o, add(moment, cross(c, force)))
     put(w, o + 3, force)
+    return mass, arm, J
+
+
+@kernel
+def inertia(h, f, w, i):
+    """Spatial inertia of link i about the kernels' origin (OWN), and the wrench on it."""
+    mass, arm, J = wrench(h, f, w, i)
+    c = add(at(w, m.LINK_FRAMES.row(h, i) + m.FRAME.origin), arm)
+    spatial(w, m.OWN.row(h, i), mass, c, J)
+
+
+@kernel
+def inertia_about_itself(h, f, w, i):
+    """The same about the link's origin: far from the kernels', inertia about that has lost digits."""
+    mass, arm, J = wrench(h, f, w, i)
+    spatial(w, m.OWN.row(h, i), mass, arm, J)
 
 
 @kernel

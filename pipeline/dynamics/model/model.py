@@ -116,7 +116,7 @@ def filled(
     contact_ledger = contacting.ledger_size(mechanism)
     gravity = loading.gravity(mechanism.scene)
     ledger = loading.LEDGER if mechanism.scene.forces() else 0
-    parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
+    parts = _parts(numbering, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
     contacts = contacting.fill(numbering, parts, normals, touching, gauges)
     coupling_tables = tables(coupled, numbering, gauges, [link.start for link in mechanism.links])
     wear_ledger = m.WEAR_LEDGER.size * len(mechanism.scene.worn())
@@ -206,6 +206,8 @@ def _symmetric(J: np.ndarray) -> list[float]:
     return [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
 
 
+#: free coordinates on the longest way to the ground up to which the mass matrix is factored as a matrix
+SHALLOW = 8
 #: tables that follow from links, joints, frames and flexible bodies alone
 WIRED = (
     *(
@@ -234,12 +236,13 @@ def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
         m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
         m.SITE_NUMBERS: [_pose_row(s.place) for s in numbering.sites],
         **flexible_bodies.fill(numbering, [book.loss for book in books]),
-        **wiring.mass_entries(numbering),
+        **wiring.mass_entries(numbering, parts.articulated),
     }
 
 
-def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Parts:
+def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Parts:
     """The kinds of parts that there are."""
+    mechanism = numbering.mechanism
     contacts = [contact.joint for contact in mechanism.contacts]
     return Parts(
         joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
@@ -256,7 +259,19 @@ def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool,
         joint_frictions=joint_frictions(mechanism.scene),
         wear=bool(mechanism.scene.worn()),
         load_kinks=load_kinks(mechanism.scene),
+        articulated=articulated(numbering),
     )
+
+
+def articulated(numbering: Numbering) -> bool:
+    """Whether the tree is so deep that articulated inertias take fewer operations than the mass matrix does."""
+    mechanism = numbering.mechanism
+    if mechanism.closures or mechanism.scene.gear or not mechanism.all_rigid or joint_frictions(mechanism.scene):
+        return False
+    depths = [0] * len(mechanism.links)
+    for i, link in enumerate(mechanism.links[1:], start=1):
+        depths[i] = depths[link.branch.parent] + sum(c < numbering.nv for c in numbering.coordinates[i])
+    return max(depths) > SHALLOW
 
 
 #: tables of joints with friction, where there are none

@@ -15,12 +15,14 @@ from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 
-def mass_entries(numbering: Numbering) -> dict[Any, Any]:
-    """The tables PAIRS, KNOWN_PAIRS and ENVELOPE.
+def mass_entries(numbering: Numbering, articulated: bool) -> dict[Any, Any]:
+    """The tables PAIRS, KNOWN_PAIRS and ENVELOPE; articulated inertias store a number per coordinate instead.
 
     A coordinate's momentum (that of all it moves) times the column of a coordinate nearer to the
     ground is their entry of the mass matrix.
     """
+    if articulated:
+        return {m.PAIRS: [], m.KNOWN_PAIRS: [], m.ENVELOPE: [(k, 0) for k in range(numbering.nv)]}
     products: list[tuple[int, int, int, int]] = []  # momentum, column, their coordinates
     for i in range(1, len(numbering.mechanism.links)):
         own, above = numbering.coordinates[i], numbering.route(i - 1)
