@@ -5,6 +5,7 @@ from __future__ import annotations
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
+    ZERO,
     accumulate,
     add,
     at,
@@ -35,41 +36,45 @@ def spatial(w, o, mass, c, J):
 
 
 @kernel
-def wrench(h, f, w, i):
-    """Store the wrench on link i (moment about the kernels' origin, force); return the link's mass and inertia.
+def demand(h, f, w, i):
+    """Return mass of link i, its centre from its origin, inertia about the centre, and the moment there and force.
 
-    The wrench is what the accelerations now in its frame need, gravity being an acceleration of the ground.  Returns
-    mass, centre relative to the link's origin, and inertia about the centre, world axes.
+    World axes.  Moment and force are what the accelerations now in its frame need, gravity being an acceleration of the
+    ground.
     """
     frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
     R = at9(w, frame + m.FRAME.axes)
     omega, alpha = at(w, frame + m.FRAME.omega), at(w, frame + m.FRAME.alpha)
     arm = turn(R, at(f, numbers + m.LINK_NUMBERS.com))
-    c = add(at(w, frame + m.FRAME.origin), arm)
     mass = f[numbers + m.LINK_NUMBERS.mass]
     J = congruence(R, at6(f, numbers + m.LINK_NUMBERS.inertia))
     a = add(at(w, frame + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
-    force = scale(mass, a)
-    moment = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega)))
-    o = m.WRENCH.row(h, i)
-    put(w, o, add(moment, cross(c, force)))
-    put(w, o + 3, force)
-    return mass, arm, J
+    return mass, arm, J, add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega))), scale(mass, a)
 
 
 @kernel
 def inertia(h, f, w, i):
-    """Spatial inertia of link i about the kernels' origin (OWN), and the wrench on it."""
-    mass, arm, J = wrench(h, f, w, i)
-    c = add(at(w, m.LINK_FRAMES.row(h, i) + m.FRAME.origin), arm)
+    """Spatial inertia of link i and the wrench on it, about the kernels' origin (OWN, WRENCH)."""
+    mass, arm, J, moment, force = demand(h, f, w, i)
+    c, o = add(at(w, m.LINK_FRAMES.row(h, i) + m.FRAME.origin), arm), m.WRENCH.row(h, i)
     spatial(w, m.OWN.row(h, i), mass, c, J)
+    put(w, o, add(moment, cross(c, force)))
+    put(w, o + 3, force)
 
 
 @kernel
 def inertia_about_itself(h, f, w, i):
-    """The same about the link's origin: far from the kernels', inertia about that has lost digits."""
-    mass, arm, J = wrench(h, f, w, i)
+    """The same about the link's origin (OWN, ARTICULATED): far from the kernels' origin both lose digits there.
+
+    The wrench about the kernels' origin is then that of all else that acts on the link.
+    """
+    mass, arm, J, moment, force = demand(h, f, w, i)
+    o, body = m.WRENCH.row(h, i), m.ARTICULATED.row(h, i)
     spatial(w, m.OWN.row(h, i), mass, arm, J)
+    put(w, body + m.ARTICULATED.own_moment, add(moment, cross(arm, force)))
+    put(w, body + m.ARTICULATED.own_force, force)
+    put(w, o, ZERO)
+    put(w, o + 3, ZERO)
 
 
 @kernel

@@ -102,7 +102,8 @@ def begin(d, i):
     put6(body.turning, 0, inertia)
     body.mixed = skewed(moment)
     put6(body.moving, 0, (mass, mass, mass, 0.0, 0.0, 0.0))
-    body.moment, body.force = sub(wrench.moment, cross(p, wrench.force)), wrench.force
+    body.moment = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
+    body.force = add(body.own_force, wrench.force)
     body.mass, body.centre = mass, add(moment, scale(mass, p))
     body.polar = 0.5 * (inertia[0] + inertia[1] + inertia[2]) + 2.0 * dot(p, moment) + mass * dot(p, p)
 
@@ -231,8 +232,8 @@ def drive_forces(d):
         own, wrench, p = d.own[i], d.wrench[i], d.link_frames[i].origin
         moment = add(turn_symmetric(at6(own.inertia, 0), angular), cross(own.moment, linear))
         force = add(scale(own.mass, linear), cross(angular, own.moment))
-        body.moment = add(moment, sub(wrench.moment, cross(p, wrench.force)))
-        body.force = add(force, wrench.force)
+        body.moment = add(add(moment, body.own_moment), sub(wrench.moment, cross(p, wrench.force)))
+        body.force = add(add(force, body.own_force), wrench.force)
     for i in range(d.n_links - 1, 0, -1):
         link, body = d.links[i], d.articulated[i]
         if link.c0 >= d.nv:
