@@ -138,7 +138,7 @@ def _observe(parts: Parts) -> str:
     if parts.harmonics:
         given["harmonics"] = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate")
     if parts.couplings:
-        given["couplings"] = _closures(imports, parts)
+        given["couplings"] = _import(imports, f"{DYNAMICS}.equations", "couplings")
     if parts.joint_frictions and parts.closures:
         given["friction"] = _import(imports, f"{DYNAMICS}.equations.joint_friction", "take_off_closures")
     maker = _import(imports, f"{DYNAMICS}.equations.observation", "make_observation")
@@ -222,7 +222,7 @@ def _joint_friction(imports: Imports, parts: Parts) -> str:
     laws = [listed(FRICTION_LAWS, law, where="parts")[0] for law in parts.joint_frictions]
     tractions = "".join(f"{_import(imports, FRICTION_LAWS, law)}.traction, " for law in laws)
     maker, drives = (_import(imports, module, name) for name in ("make_joint_friction", "load_drives"))
-    return f"({maker}(({tractions}), {parts.closures}), {drives})"
+    return f"({maker}(({tractions}), {parts.closures}, {_tree(imports, parts)}), {drives})"
 
 
 def _tree(imports: Imports, parts: Parts) -> str:
@@ -231,8 +231,12 @@ def _tree(imports: Imports, parts: Parts) -> str:
 
 
 def _closures(imports: Imports, parts: Parts) -> str:
-    """The module of the closures: with couplings, or of joints alone."""
-    return _import(imports, f"{DYNAMICS}.equations", "couplings" if parts.couplings else "closures")
+    """The kernels of the closures: with couplings, or of joints alone."""
+    if parts.couplings:
+        maker = _import(imports, f"{DYNAMICS}.equations.couplings", "make_coupled_closing")
+    else:
+        maker = _import(imports, f"{DYNAMICS}.equations.closures", "make_closing")
+    return f"{maker}({_tree(imports, parts)})"
 
 
 def _projection(imports: Imports, parts: Parts) -> str:

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
@@ -27,9 +28,12 @@ from flexclear.pipeline.dynamics.vectors import (
     add,
     add6,
     add9,
+    at,
     at6,
     cross,
     dot,
+    product,
+    put,
     put6,
     scale,
     sub,
@@ -42,6 +46,7 @@ from flexclear.pipeline.dynamics.vectors import (
 #: rounding leaves a few times 1e-16 of it
 MASSLESS_PIVOT = 1e-14
 
+NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 #: what gives `forces` the inertia of a rigid link: about its own origin
 rigid_inertia = rigid.inertia_about_itself
 
@@ -213,10 +218,41 @@ def backward(d, b):
 
 
 @kernel
-def drive_forces(d):
-    """Forces that the prescribed coordinates need: what their joints transmit at the accelerations in DU."""
-    if d.n_drives == 0:
-        return
+def spread(d, c):
+    """L^-1 J^T of closure c, laid out like J^T: along the way of its two sides to the ground."""
+    closure = d.closures[c]
+    for t in range(closure.threes):
+        start = closure.jacobian0 + 3 * t * closure.n_support
+        for e in range(closure.path0, closure.path0 + closure.n_path):
+            none = d.transmitted[d.paths[e].link]
+            none.moments, none.forces = NONE, NONE
+        for e in range(closure.path0, closure.path0 + closure.n_path):
+            path = d.paths[e]
+            link, moments, forces = (
+                d.links[path.link],
+                d.transmitted[path.link].moments,
+                d.transmitted[path.link].forces,
+            )
+            if path.slot >= 0:
+                for k in range(link.n_speeds):
+                    local, gain, place = d.local[link.c0 + k], d.gain[link.c0 + k], start + 3 * (path.slot + k)
+                    against = add(turn_back(moments, local.angular), turn_back(forces, local.linear))
+                    values = scale(d.mass[link.c0 + k], sub(at(d.jacobian, place), against))
+                    put(d.spread, place, values)
+                    moments = add9(moments, outer(1.0, gain.moment, values))
+                    forces = add9(forces, outer(1.0, gain.force, values))
+            if link.parent > 0:
+                above, lever = d.transmitted[link.parent], product(skewed(d.articulated[path.link].arm), forces)
+                above.moments = add9(above.moments, add9(moments, lever))
+                above.forces = add9(above.forces, forces)
+
+
+@kernel
+def transmit(d, b, biased):
+    """What each link needs through its joint, about its origin, for accelerations in w from index b.
+
+    biased: 1.0 with the forces that act and what the present motion needs, 0.0 for the accelerations alone.
+    """
     for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
         angular, linear = ZERO, ZERO
@@ -226,24 +262,43 @@ def drive_forces(d):
         if link.c0 < d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
                 local = d.local[k]
-                angular = add(angular, scale(d.du[k], local.angular))
-                linear = add(linear, scale(d.du[k], local.linear))
+                angular = add(angular, scale(d.w[b + k], local.angular))
+                linear = add(linear, scale(d.w[b + k], local.linear))
         body.angular, body.linear = angular, linear
         own, wrench, p = d.own[i], d.wrench[i], d.link_frames[i].origin
         moment = add(turn_symmetric(at6(own.inertia, 0), angular), cross(own.moment, linear))
         force = add(scale(own.mass, linear), cross(angular, own.moment))
-        body.moment = add(add(moment, body.own_moment), sub(wrench.moment, cross(p, wrench.force)))
-        body.force = add(add(force, body.own_force), wrench.force)
+        needed = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
+        body.moment = add(moment, scale(biased, needed))
+        body.force = add(force, scale(biased, add(body.own_force, wrench.force)))
     for i in range(d.n_links - 1, 0, -1):
+        link, body = d.links[i], d.articulated[i]
+        if link.parent > 0:
+            above = d.articulated[link.parent]
+            above.moment = add(above.moment, add(body.moment, cross(body.arm, body.force)))
+            above.force = add(above.force, body.force)
+
+
+@kernel
+def demand(d, j, b, biased):
+    """What the links beyond joint j with friction need through it, about the kernels' origin; after `transmit`."""
+    i = d.rubbing[j].link
+    moment, force = d.articulated[i].moment, d.articulated[i].force
+    return add(moment, cross(d.link_frames[i].origin, force)), force
+
+
+@kernel
+def drive_forces(d):
+    """Forces that the prescribed coordinates need: what their joints transmit at the accelerations in DU."""
+    if d.n_drives == 0:
+        return
+    transmit(d, d.h[m.DU], 1.0)
+    for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
         if link.c0 >= d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
                 local = d.local[k]
                 d.drive_force[k - d.nv] = dot(local.angular, body.moment) + dot(local.linear, body.force)
-        if link.parent > 0:
-            above = d.articulated[link.parent]
-            above.moment = add(above.moment, add(body.moment, cross(body.arm, body.force)))
-            above.force = add(above.force, body.force)
 
 
 def make_eliminate(flexible: Any = None) -> Callable:

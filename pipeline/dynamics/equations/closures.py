@@ -14,8 +14,12 @@ rows of a closure come first among its rows, the residuals of all are known (`as
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.envelope import backward, base, factor, forward
+from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, accumulate, add, at, at9, axis, cross, dot, dot6, put, scale, sub
 
@@ -102,23 +106,6 @@ def jacobian(h, w, c):
 
 
 @kernel
-def spread(h, w, c):
-    """L^-1 J^T of closure c, laid out like J^T."""
-    size, support = m.CLOSURES.n_support(h, c), m.CLOSURES.support0(h, c)
-    for t in range(m.CLOSURES.threes(h, c)):
-        J, S = three(h, m.JACOBIAN, c, t), three(h, m.SPREAD, c, t)
-        for a in range(size):
-            i = m.SUPPORT.coordinate(h, support + a)
-            first, row, value = m.ENVELOPE.first(h, i), base(h, h[m.ENVELOPE.place], h[m.MASS], i), at(w, J + 3 * a)
-            for b in range(a - 1, -1, -1):
-                k = m.SUPPORT.coordinate(h, support + b)
-                if k < first:
-                    break  # in increasing order
-                value = sub(value, scale(w[row + k], at(w, S + 3 * b)))
-            put(w, S + 3 * a, scale(w[row + i], value))
-
-
-@kernel
 def put_couplings(h, w, row, column, values, count):
     """The first `count` of three entries of J M^-1 J^T."""
     put_some(w, base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], row) + column, values, count)
@@ -151,10 +138,8 @@ def couple(h, w, p):
 
 
 @kernel
-def complete(h, w, n):
-    """The factor of J M^-1 J^T, of Jacobians that are there; needs the factor of M."""
-    for c in range(h[m.N_CLOSURES]):
-        spread(h, w, c)
+def couple_all(h, w, n):
+    """The factor of J M^-1 J^T, from L^-1 J^T."""
     for k in range(h[m.SCHUR], h[m.SCHUR] + h[m.SCHUR_SIZE]):
         w[k] = 0.0
     for p in range(h[m.N_CLOSURE_PAIRS]):
@@ -237,14 +222,11 @@ def finish(h, w):
 
 
 @kernel
-def close(h, f, w, n):
-    """Rows, Jacobians and multipliers of all closures; see `finish`."""
+def locate(h, f, w):
+    """Rows and Jacobians of all closures."""
     for c in range(h[m.N_CLOSURES]):
         rows(h, w, c)
         jacobian(h, w, c)
-    complete(h, w, n)
-    if n[m.EVALUATION] == m.OK:
-        finish(h, w)
 
 
 @kernel
@@ -266,15 +248,50 @@ def known_forces(h, w):
         take_share(h, w, e, m.ROWS.row(h, m.CLOSURES.row0(h, m.KNOWN_ENTRIES.closure(h, e))))
 
 
-@kernel
-def correction(h, w, residual, step):
-    """The least correction of the coordinates, in the metric of M, that undoes a residual.
+class Closing(NamedTuple):
+    """Kernels of all closures.
 
-    step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both places in w, with the factors of `complete`.
+    close(h, f, w, n): rows, Jacobians and multipliers, see `finish`.  complete(h, f, w, n): the factor of J M^-1 J^T,
+    of Jacobians that are there; needs the factor of M.  correction(h, f, w, n, residual, step): step <-
+    -M^-1 J^T (J M^-1 J^T)^-1 residual, both indices in w, with the factors of `complete`: the least correction of the
+    coordinates, in the metric of M, that undoes a residual.  known_forces(h, w): takes the closures' fraction out of
+    the forces that the drives must supply.
     """
-    gather_rows(h, w, residual)
-    solve(h, w)
-    for k in range(h[m.NV]):
-        w[step + k] = 0.0
-    add_spread(h, w, step, -1.0)
-    backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], step)
+
+    close: Callable
+    complete: Callable
+    correction: Callable
+    known_forces: Callable
+
+
+def make_closing(tree: Any, locate: Callable = locate, known_forces: Callable = known_forces) -> Closing:
+    """Return the kernels of all closures.
+
+    tree: what factors the mass matrix, the module `articulated` or `composite`.  locate: fills rows and Jacobians.
+    """
+    spread, backward = tree.spread, tree.backward
+
+    @kernel
+    def complete(h, f, w, n):
+        d = data(h, f, w, n)
+        for c in range(d.n_closures):
+            spread(d, c)
+        couple_all(h, w, n)
+
+    @kernel
+    def close(h, f, w, n):
+        locate(h, f, w)
+        complete(h, f, w, n)
+        if n[m.EVALUATION] == m.OK:
+            finish(h, w)
+
+    @kernel
+    def correction(h, f, w, n, residual, step):
+        gather_rows(h, w, residual)
+        solve(h, w)
+        for k in range(h[m.NV]):
+            w[step + k] = 0.0
+        add_spread(h, w, step, -1.0)
+        backward(data(h, f, w, n), step)
+
+    return Closing(close, complete, correction, known_forces)

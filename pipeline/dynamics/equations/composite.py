@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.bodies.rigid import carry
 from flexclear.pipeline.dynamics.equations import envelope
 from flexclear.pipeline.dynamics.equations.kinematics import no_arm, no_column
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import add, dot
+from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at6, cross, dot, put, scale, sub, turn_symmetric
 
 #: pivots of M below this fraction of their diagonal mean a coordinate that moves no mass
 MASSLESS_PIVOT = 1e-15
@@ -82,6 +82,48 @@ def forward(d, b):
 def backward(d, b):
     """L^-T applied to the vector in w from index b."""
     envelope.backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, b)
+
+
+@kernel
+def spread(d, c):
+    """L^-1 J^T of closure c, laid out like J^T."""
+    closure = d.closures[c]
+    for t in range(closure.threes):
+        start = closure.jacobian0 + 3 * t * closure.n_support
+        for a in range(closure.n_support):
+            i = d.support[closure.support0 + a].coordinate
+            first, row, value = d.envelope[i].first, d.envelope[i].origin, at(d.jacobian, start + 3 * a)
+            for b in range(a - 1, -1, -1):
+                k = d.support[closure.support0 + b].coordinate
+                if k < first:
+                    break  # in increasing order
+                value = sub(value, scale(d.mass[row + k], at(d.spread, start + 3 * b)))
+            put(d.spread, start + 3 * a, scale(d.mass[row + i], value))
+
+
+@kernel
+def transmit(d, b, biased):
+    """`demand` has all that it needs: momenta, and wrenches that have been passed to the ground."""
+
+
+@kernel
+def demand(d, j, b, biased):
+    """What the links beyond joint j with friction need through it for accelerations in w from index b.
+
+    biased: 1.0 with the forces that act and what the present motion needs, 0.0 for the accelerations alone.
+    """
+    joint, moment, force, angular, linear = d.rubbing[j], ZERO, ZERO, ZERO, ZERO
+    for k in range(joint.momentum0, joint.momentum0 + joint.n_momenta):
+        momentum, size = d.momenta[d.reaction_terms[k].column], d.w[b + d.reaction_terms[k].coordinate]
+        moment, force = add(moment, scale(size, momentum.angular)), add(force, scale(size, momentum.linear))
+    for k in range(joint.column0, joint.column0 + joint.n_columns):
+        column, size = d.columns[d.reaction_terms[k].column], d.w[b + d.reaction_terms[k].coordinate]
+        angular, linear = add(angular, scale(size, column.angular)), add(linear, scale(size, column.linear))
+    tree, wrench = d.inertia[joint.link], d.wrench[joint.link]
+    turned = add(turn_symmetric(at6(tree.inertia, 0), angular), cross(tree.moment, linear))
+    moved = add(scale(tree.mass, linear), cross(angular, tree.moment))
+    moment, force = add(moment, turned), add(force, moved)
+    return add(moment, scale(biased, wrench.moment)), add(force, scale(biased, wrench.force))
 
 
 @kernel

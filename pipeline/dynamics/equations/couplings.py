@@ -8,14 +8,13 @@ A coupling is one row whose wrench on the second joint is that of a unit force a
 
 from __future__ import annotations
 
+from typing import Any
+
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations import closures
-from flexclear.pipeline.dynamics.equations.closures import complete, finish
 from flexclear.pipeline.dynamics.gauge import bias, counted
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import accumulate, at, dot6, put, scale
-
-correction = closures.correction
 
 
 @kernel
@@ -57,8 +56,8 @@ def jacobian(h, w, c):
 
 
 @kernel
-def close(h, f, w, n):
-    """See `closures.close`."""
+def locate(h, f, w):
+    """Rows and Jacobians of all closures."""
     for c in range(h[m.N_CLOSURES]):
         if m.CLOSURES.coupling(h, c) < 0:
             closures.rows(h, w, c)
@@ -66,9 +65,6 @@ def close(h, f, w, n):
         else:
             row(h, f, w, c)
             jacobian(h, w, c)
-    complete(h, w, n)
-    if n[m.EVALUATION] == m.OK:
-        finish(h, w)
 
 
 @kernel
@@ -95,3 +91,8 @@ def take_off_first_joints(h, w):
             for half in range(0, 6, 3):
                 accumulate(w, b + half, scale(-size, at(w, o + half)))
                 accumulate(w, a + half, scale(size, at(w, o + half)))
+
+
+def make_coupled_closing(tree: Any) -> closures.Closing:
+    """Return the kernels of all closures, couplings among them; see `closures.make_closing`."""
+    return closures.make_closing(tree, locate, known_forces)

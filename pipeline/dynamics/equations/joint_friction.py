@@ -28,13 +28,14 @@ reactions); Leine, Brogliato & Nijmeijer (2002), European Journal of Mechanics A
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import choose
 from flexclear.pipeline.dynamics.equations.closures import respond
-from flexclear.pipeline.dynamics.equations.envelope import backward, forward
+from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.joints.bearings import BALL, PIN, SLIDER
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
@@ -42,7 +43,6 @@ from flexclear.pipeline.dynamics.vectors import (
     accumulate,
     add,
     at,
-    at6,
     at9,
     axis,
     cross,
@@ -53,7 +53,6 @@ from flexclear.pipeline.dynamics.vectors import (
     sub,
     turn,
     turn_back,
-    turn_symmetric,
 )
 
 #: Newton's iterations for the loads; the change of a load, as share of the largest, at which they end, and below which
@@ -119,20 +118,16 @@ def make_unit_wrench(traction: Callable) -> Callable:
 
 
 @kernel
-def tree_response(h, w):
-    """Accelerations in FORCE from the generalised forces there; no loop is closed."""
-    forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
-    backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
+def no_loops(h, w):
+    """No loop is closed."""
 
 
 @kernel
-def closed_response(h, w):
-    """Accelerations in FORCE from the generalised forces there, and their multipliers; loops stay closed."""
-    forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
+def keep_closed(h, w):
+    """Let loops stay closed: complete FORCE, which holds L^-1 f, by multipliers."""
     for k in range(h[m.N_KEPT_ROWS]):
         w[h[m.MULTIPLIER] + k] = 0.0
     respond(h, w)
-    backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
 
 
 @kernel
@@ -160,61 +155,43 @@ def closure_wrench(h, w, c, part):
     return moment, force
 
 
-@kernel
-def demand(h, w, j, acceleration):
-    """What the links beyond joint j need through it for accelerations of the free coordinates (place in w)."""
-    moment, force, angular, linear = ZERO, ZERO, ZERO, ZERO
-    first = m.RUBBING.momentum0(h, j)
-    for k in range(first, first + m.RUBBING.n_momenta(h, j)):
-        o = m.MOMENTA.row(h, m.REACTION_TERMS.column(h, k))
-        size = w[acceleration + m.REACTION_TERMS.coordinate(h, k)]
-        moment, force = add(moment, scale(size, at(w, o))), add(force, scale(size, at(w, o + 3)))
-    first = m.RUBBING.column0(h, j)
-    for k in range(first, first + m.RUBBING.n_columns(h, j)):
-        o = m.COLUMNS.row(h, m.REACTION_TERMS.column(h, k))
-        size = w[acceleration + m.REACTION_TERMS.coordinate(h, k)]
-        angular, linear = add(angular, scale(size, at(w, o))), add(linear, scale(size, at(w, o + 3)))
-    tree = m.INERTIA.row(h, m.RUBBING.link(h, j))
-    centre = at(w, tree + m.INERTIA.moment)
-    turned = add(turn_symmetric(at6(w, tree + m.INERTIA.inertia), angular), cross(centre, linear))
-    moved = add(scale(w[tree + m.INERTIA.mass], linear), cross(angular, centre))
-    return add(moment, turned), add(force, moved)
+def make_reaction(demand: Callable) -> Callable:
+    """The kernel reaction(d, j, acceleration, bearing) that writes the reaction of joint j to REACTIONS.
 
-
-@kernel
-def reaction(h, w, j, acceleration, bearing):
-    """Write the reaction of joint j at these accelerations and the present multipliers to REACTIONS.
-
-    bearing: -1 for all but friction, else the friction alone of that bearing, of unit normal force.
+    At the accelerations in w from index `acceleration` and the present multipliers.  bearing: -1 for all but friction,
+    else the friction alone of that bearing, of unit normal force.  demand: of what factors the mass matrix.
     """
-    closure, link = m.RUBBING.closure(h, j), m.RUBBING.link(h, j)
-    rubbed = m.RUBBING.closure(h, m.BEARINGS.joint(h, bearing)) if bearing >= 0 else -1
-    if closure >= 0:
-        moment, force = closure_wrench(h, w, closure, 0)
-        if rubbed == closure:
-            o = m.BEARING.row(h, bearing)
-            moment = add(moment, at(w, o + m.BEARING.unit_moment))
-            force = add(force, at(w, o + m.BEARING.unit_force))
-    else:
-        moment, force = demand(h, w, j, acceleration)
-        if bearing < 0:
-            o = m.WRENCH.row(h, link)
-            moment, force = add(moment, at(w, o)), add(force, at(w, o + 3))
-        first = m.RUBBING.loop0(h, j)
-        for k in range(first, first + m.RUBBING.n_loops(h, j)):
-            c, part = m.REACTION_LOOPS.closure(h, k), m.REACTION_LOOPS.part(h, k)
-            sign, (around, along) = -1.0 * m.REACTION_LOOPS.sign(h, k), closure_wrench(h, w, c, part)
-            if rubbed == c and part == 0:
+
+    @kernel
+    def reaction(d, j, acceleration, bearing):
+        h, w = d.h, d.w
+        closure = m.RUBBING.closure(h, j)
+        rubbed = m.RUBBING.closure(h, m.BEARINGS.joint(h, bearing)) if bearing >= 0 else -1
+        if closure >= 0:
+            moment, force = closure_wrench(h, w, closure, 0)
+            if rubbed == closure:
                 o = m.BEARING.row(h, bearing)
-                around = add(around, at(w, o + m.BEARING.unit_moment))
-                along = add(along, at(w, o + m.BEARING.unit_force))
-            moment, force = add(moment, scale(sign, around)), add(force, scale(sign, along))
-        if m.RUBBING.reversed(h, j):
-            moment, force = scale(-1.0, moment), scale(-1.0, force)
-    middle = at(w, m.SITE_FRAMES.row(h, m.RUBBING.site_b(h, j)) + m.FRAME.origin)
-    o = m.REACTIONS.row(h, j * (1 + h[m.N_BEARINGS]) + 1 + bearing)
-    put(w, o, sub(moment, cross(middle, force)))
-    put(w, o + 3, force)
+                moment = add(moment, at(w, o + m.BEARING.unit_moment))
+                force = add(force, at(w, o + m.BEARING.unit_force))
+        else:
+            moment, force = demand(d, j, acceleration, 1.0 if bearing < 0 else 0.0)
+            first = m.RUBBING.loop0(h, j)
+            for k in range(first, first + m.RUBBING.n_loops(h, j)):
+                c, part = m.REACTION_LOOPS.closure(h, k), m.REACTION_LOOPS.part(h, k)
+                sign, (around, along) = -1.0 * m.REACTION_LOOPS.sign(h, k), closure_wrench(h, w, c, part)
+                if rubbed == c and part == 0:
+                    o = m.BEARING.row(h, bearing)
+                    around = add(around, at(w, o + m.BEARING.unit_moment))
+                    along = add(along, at(w, o + m.BEARING.unit_force))
+                moment, force = add(moment, scale(sign, around)), add(force, scale(sign, along))
+            if m.RUBBING.reversed(h, j):
+                moment, force = scale(-1.0, moment), scale(-1.0, force)
+        middle = at(w, m.SITE_FRAMES.row(h, m.RUBBING.site_b(h, j)) + m.FRAME.origin)
+        o = m.REACTIONS.row(h, j * (1 + h[m.N_BEARINGS]) + 1 + bearing)
+        put(w, o, sub(moment, cross(middle, force)))
+        put(w, o + 3, force)
+
+    return reaction
 
 
 @kernel
@@ -353,29 +330,39 @@ def find_loads(h, f, w):
     return found
 
 
-def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callable:
+def make_joint_friction(tractions: tuple[Callable, ...], closed: bool, tree: Any) -> Callable:
     """The kernel joint_friction(h, f, w, n): accelerations, multipliers and ledger, completed by friction in joints.
 
     To be called when accelerations and multipliers are there, before the drives' forces are.  tractions: kernels of the
-    laws present (`contact.friction`).  closed: whether there are closures.
+    laws present (`contact.friction`).  closed: whether there are closures.  tree: what factors the mass matrix, the
+    module `equations.articulated` or `equations.composite`.
     """
-    unit_wrench = make_unit_wrench(choose(tractions))
-    respond = closed_response if closed else tree_response
+    unit_wrench, forward, backward = make_unit_wrench(choose(tractions)), tree.forward, tree.backward
+    close, transmit, reaction = keep_closed if closed else no_loops, tree.transmit, make_reaction(tree.demand)
 
     @kernel
-    def influences(h, w):
+    def respond(d):
+        """Accelerations in FORCE from the generalised forces there, and their multipliers."""
+        forward(d, d.h[m.FORCE])
+        close(d.h, d.w)
+        backward(d, d.h[m.FORCE])
+
+    @kernel
+    def influences(h, f, w, n):
         """Reactions of all joints: of the present accelerations, then of the friction of each bearing alone."""
+        transmit(data(h, f, w, n), h[m.DU], 1.0)
         for j in range(h[m.N_RUBBING]):
-            reaction(h, w, j, h[m.DU], -1)
+            reaction(data(h, f, w, n), j, h[m.DU], -1)
         for k in range(h[m.N_KEPT_ROWS]):
             w[h[m.SMOOTH_MULTIPLIER] + k] = w[h[m.MULTIPLIER] + k]
         for e in range(h[m.N_BEARINGS]):
             for k in range(h[m.NV]):
                 w[h[m.FORCE] + k] = 0.0
             load_coordinates(h, w, e, 1.0)
-            respond(h, w)
+            respond(data(h, f, w, n))
+            transmit(data(h, f, w, n), h[m.FORCE], 0.0)
             for j in range(h[m.N_RUBBING]):
-                reaction(h, w, j, h[m.FORCE], e)
+                reaction(data(h, f, w, n), j, h[m.FORCE], e)
 
     @kernel
     def joint_friction(h, f, w, n):
@@ -383,7 +370,7 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callab
             return
         for e in range(h[m.N_BEARINGS]):
             unit_wrench(h, f, w, n, e)
-        influences(h, w)
+        influences(h, f, w, n)
         if not find_loads(h, f, w):
             n[m.EVALUATION] = m.JAMMED
             return
@@ -394,7 +381,7 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callab
             load_coordinates(h, w, e, size)
             slot = h[m.LEDGER_RATE] + h[m.RUBBING_SLOT] + m.BEARINGS.joint(h, e)
             w[slot] += size * w[m.BEARING.row(h, e) + m.BEARING.loss]
-        respond(h, w)
+        respond(data(h, f, w, n))
         for k in range(h[m.NV]):
             w[h[m.DU] + k] += w[h[m.FORCE] + k]
         for k in range(h[m.N_KEPT_ROWS]):

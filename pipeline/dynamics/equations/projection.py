@@ -80,8 +80,9 @@ def no_modes(h, f, w, b):
 def make_stiffen(closures: Any) -> Callable:
     """The kernel stiffen(h, f, w, n): the factors of an evaluation, with the modal stiffness beside the mass.
 
-    closures: the module of that name.
+    closures: kernels of all closures.
     """
+    complete = closures.complete
 
     @kernel
     def stiffen(h, f, w, n):
@@ -96,7 +97,7 @@ def make_stiffen(closures: Any) -> Callable:
                 for j in range(0 if i >= held > 0 else i, i + 1):
                     w[row + j] += SLOWLY**2 * f[stiffness + modes * i + j]
         factor(h, rows, w, matrix, size, 0.0)
-        closures.complete(h, w, n)
+        complete(h, f, w, n)
 
     return stiffen
 
@@ -110,7 +111,7 @@ def make_projection(
 ) -> Callable:
     """The kernel project(h, f, w, n, t, y, dy, tolerance).
 
-    evaluate: the right-hand side.  joints: modules of the joint types.  closures: the module of that name.
+    evaluate: the right-hand side.  joints: modules of the joint types.  closures: kernels of all closures.
     stiffen, to_modes: of `make_stiffen` and of `bodies.interface`, where bodies are flexible.
     """
     position_rates, correction = make_position_rates(joints), closures.correction
@@ -144,11 +145,11 @@ def make_projection(
             stiffen(h, f, w, n)
             if n[m.EVALUATION] != m.OK:
                 return -1
-            correction(h, w, h[m.RESIDUAL_RATE], step)
+            correction(h, f, w, n, h[m.RESIDUAL_RATE], step)
             to_modes(h, f, w, step)
             for k in range(h[m.NV]):
                 w[y + h[m.NQ] + k] += w[step + k]
-            correction(h, w, h[m.RESIDUAL], step)
+            correction(h, f, w, n, h[m.RESIDUAL], step)
             to_modes(h, f, w, step)
             move(h, w, y, step)
             evaluate(h, f, w, n, t, y, dy)

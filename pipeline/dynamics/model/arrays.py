@@ -162,6 +162,7 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
         m.MOMENTA: columns,
         m.DEFORMATION: nv,
         m.ARTICULATED: links,
+        m.TRANSMITTED: links,
         m.LOCAL: nv + known,
         m.GAIN: nv,
         m.ROWS: closure_rows + int(h[m.N_COUPLINGS]),

@@ -223,7 +223,7 @@ WIRED = (
         m.KNOWN_PAIRS,
         m.ENVELOPE,
     ),
-    *(m.CLOSURES, m.CLOSURE_ROWS, m.SUPPORT, m.ENTRIES, m.KNOWN_ENTRIES, m.CLOSURE_PAIRS, m.COMMON),
+    *(m.CLOSURES, m.CLOSURE_ROWS, m.SUPPORT, m.PATHS, m.ENTRIES, m.KNOWN_ENTRIES, m.CLOSURE_PAIRS, m.COMMON),
     *(m.CLOSURE_ENVELOPE, m.FLEX_NUMBERS, m.FLEX_DATA, m.MOMENT_VALUES, m.PORT_NUMBERS, m.PORT_DATA),
     *(m.BASIS_VALUES, m.INTERFACE_DATA),
 )
@@ -266,7 +266,7 @@ def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool,
 def articulated(numbering: Numbering) -> bool:
     """Whether the tree is so deep that articulated inertias take fewer operations than the mass matrix does."""
     mechanism = numbering.mechanism
-    if mechanism.closures or mechanism.scene.gear or not mechanism.all_rigid or joint_frictions(mechanism.scene):
+    if not mechanism.all_rigid:
         return False
     depths = [0] * len(mechanism.links)
     for i, link in enumerate(mechanism.links[1:], start=1):
@@ -286,7 +286,7 @@ def _rubbing(numbering: Numbering, parts: Parts, closures: tuple[Closure | Coupl
         return NO_FRICTION
     from flexclear.pipeline.dynamics.model import joint_friction
 
-    return joint_friction.fill(numbering, parts.joint_frictions, closures, slot)
+    return joint_friction.fill(numbering, parts.joint_frictions, closures, slot, parts.articulated)
 
 
 def _pose_row(placement: Placement) -> np.ndarray:
