@@ -160,8 +160,9 @@ EVALUATE, PROJECT, RETRACT, RATES = ADDRESSES = _places(4)
 
 # Wiring in h ---------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;
-#: component: independent mechanism that it belongs to, -1 of the ground
-LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by component")
+#: component: independent mechanism that it belongs to, -1 of the ground; leaf: whether it carries no other; first:
+#: whether none of its parent's has a larger number
+LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by component leaf first")
 SITES = wiring("link port")  # port: or -1
 #: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes have common
 #: entries of the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0,

@@ -100,37 +100,31 @@ def step(d, i, arm):
 
 
 @kernel
-def begin(d, i):
-    """Begin what link i offers to its parent, and needs from it, with the link's own."""
-    own, body, wrench, p = d.own[i], d.articulated[i], d.wrench[i], d.link_frames[i].origin
-    mass, moment, inertia = own.mass, own.moment, at6(own.inertia, 0)
-    put6(body.turning, 0, inertia)
-    body.mixed = skewed(moment)
-    put6(body.moving, 0, (mass, mass, mass, 0.0, 0.0, 0.0))
-    body.moment = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
-    body.force = add(body.own_force, wrench.force)
-    body.mass, body.centre = mass, add(moment, scale(mass, p))
-    body.polar = 0.5 * (inertia[0] + inertia[1] + inertia[2]) + 2.0 * dot(p, moment) + mass * dot(p, p)
-
-
-@kernel
 def reduce(d, i):
     """Take the coordinates of link i's joint out of its inertia and pass the rest to its parent.
 
     Stores the factor's part of each coordinate (MASS: 1/sqrt(D), GAIN: K) and L^-1 of minus the bias (FORCE).  Returns
     whether all pivots are sound.
     """
-    link, body, p, sound = d.links[i], d.articulated[i], d.link_frames[i].origin, True
-    A, B, C, M, F = at6(body.turning, 0), body.mixed, at6(body.moving, 0), body.moment, body.force
+    link, own, body, p, sound = d.links[i], d.own[i], d.articulated[i], d.link_frames[i].origin, True
+    A, mass, first, wrench = at6(own.inertia, 0), own.mass, own.moment, d.wrench[i]
+    B, C = skewed(first), (mass, mass, mass, 0.0, 0.0, 0.0)
+    M = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
+    F = add(body.own_force, wrench.force)
+    centre, polar = add(first, scale(mass, p)), 0.5 * (A[0] + A[1] + A[2]) + 2.0 * dot(p, first) + mass * dot(p, p)
+    if link.leaf == 0:
+        A, B, C = add6(A, at6(body.turning, 0)), add9(B, body.mixed), add6(C, at6(body.moving, 0))
+        M, F = add(M, body.moment), add(F, body.force)
+        mass, centre, polar = mass + body.mass, add(centre, body.centre), polar + body.polar
     if link.c0 < d.nv:
-        polar = body.polar - 2.0 * dot(p, body.centre) + body.mass * dot(p, p)
+        most = polar - 2.0 * dot(p, centre) + mass * dot(p, p)
         for k in range(link.c0, link.c0 + link.n_speeds):
             gain, angular, linear = d.gain[k], d.local[k].angular, d.local[k].linear
             moment = add(turn_symmetric(A, angular), turn(B, linear))
             force = add(turn_back(B, angular), turn_symmetric(C, linear))
             pivot = dot(angular, moment) + dot(linear, force)
-            most = polar * dot(angular, angular) + body.mass * dot(linear, linear)
-            sound = sound & (pivot > MASSLESS_PIVOT * most)  # not so of NaN
+            least = MASSLESS_PIVOT * (most * dot(angular, angular) + mass * dot(linear, linear))
+            sound = sound & (pivot > least)  # not so of NaN
             inverse = 1.0 / pivot
             root, rest = np.sqrt(inverse), -dot(angular, M) - dot(linear, F)
             d.mass[k], d.force[k] = root, root * rest
@@ -140,14 +134,24 @@ def reduce(d, i):
             B = less9(B, outer(inverse, moment, force))
             C = less(C, outer_symmetric(inverse, force))
     if link.parent > 0:
-        pass_on(d, i, A, B, C, M, F)
+        A, B = shifted(body.arm, A, B, C)
+        M = add(M, cross(body.arm, F))
+        above = d.articulated[link.parent]
+        if link.first == 0:
+            A, B, C = add6(A, at6(above.turning, 0)), add9(B, above.mixed), add6(C, at6(above.moving, 0))
+            M, F = add(M, above.moment), add(F, above.force)
+            mass, centre, polar = mass + above.mass, add(centre, above.centre), polar + above.polar
+        put6(above.turning, 0, A)
+        above.mixed = B
+        put6(above.moving, 0, C)
+        above.moment, above.force = M, F
+        above.mass, above.centre, above.polar = mass, centre, polar
     return sound
 
 
 @kernel
-def pass_on(d, i, A, B, C, M, F):
-    """Add inertia and wrench of link i, about its origin, to those of its parent."""
-    body, above, a = d.articulated[i], d.articulated[d.links[i].parent], d.articulated[i].arm
+def shifted(a, A, B, C):
+    """Return A and B of an inertia about the point from which `a` leads to the one that they are about."""
     before = (cross(a, (B[0], B[1], B[2])), cross(a, (B[3], B[4], B[5])), cross(a, (B[6], B[7], B[8])))
     lever = (cross(a, (C[0], C[3], C[4])), cross(a, (C[3], C[1], C[5])), cross(a, (C[4], C[5], C[2])))
     B = (
@@ -164,29 +168,17 @@ def pass_on(d, i, A, B, C, M, F):
         A[4] + before[0][2] + after[2][0],
         A[5] + before[1][2] + after[2][1],
     )
-    put6(above.turning, 0, add6(at6(above.turning, 0), A))
-    above.mixed = add9(above.mixed, B)
-    put6(above.moving, 0, add6(at6(above.moving, 0), C))
-    above.moment, above.force = add(above.moment, add(M, cross(a, F))), add(above.force, F)
-    above.mass += body.mass
-    above.centre = add(above.centre, body.centre)
-    above.polar += body.polar
-
-
-@kernel
-def rest(d):
-    """Let no wrench act on any link."""
-    for i in range(1, d.n_links):
-        d.articulated[i].moment, d.articulated[i].force = ZERO, ZERO
+    return A, B
 
 
 @kernel
 def forward(d, b):
     """L^-1 applied to the generalised forces in w from index b."""
-    rest(d)
     for i in range(d.n_links - 1, 0, -1):
         link, body = d.links[i], d.articulated[i]
-        moment, force = body.moment, body.force
+        moment, force = ZERO, ZERO
+        if link.leaf == 0:
+            moment, force = body.moment, body.force
         if link.c0 < d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
                 local, gain = d.local[k], d.gain[k]
@@ -194,9 +186,10 @@ def forward(d, b):
                 d.w[b + k] = value
                 moment, force = add(moment, scale(value, gain.moment)), add(force, scale(value, gain.force))
         if link.parent > 0:
-            above = d.articulated[link.parent]
-            above.moment = add(above.moment, add(moment, cross(body.arm, force)))
-            above.force = add(above.force, force)
+            above, moment = d.articulated[link.parent], add(moment, cross(body.arm, force))
+            if link.first == 0:
+                moment, force = add(moment, above.moment), add(force, above.force)
+            above.moment, above.force = moment, force
 
 
 @kernel
@@ -307,8 +300,6 @@ def make_eliminate(flexible: Any = None) -> Callable:
     @kernel
     def eliminate(d):
         sound = True
-        for i in range(1, d.n_links):
-            begin(d, i)
         for i in range(d.n_links - 1, 0, -1):
             sound = reduce(d, i) & sound
         return sound

@@ -296,6 +296,7 @@ def _pose_row(placement: Placement) -> np.ndarray:
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
     """Rows of the table LINKS."""
     rows: list[tuple[int, ...]] = []
+    last = {link.branch.parent: i for i, link in enumerate(numbering.mechanism.links) if i}
     for i, link in enumerate(numbering.mechanism.links):
         joint = parts.joints.index(link.kind) if i else -1
         flex = numbering.flexible.index(i) if link.flexible else -1
@@ -303,7 +304,8 @@ def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
         port = numbering.port_of(i - 1) if i else -1
         q, c = numbering.positions[i], numbering.coordinates[i]
         part = numbering.mechanism.components.of_link[i]
-        rows.append((link.branch.parent, joint, q.start, c.start, len(c), flex, inboard, port, part))
+        where = (link.branch.parent, joint, q.start, c.start, len(c), flex, inboard, port, part)
+        rows.append((*where, int(i not in last), int(last.get(link.branch.parent) == i)))
     return rows
 
 
