@@ -269,8 +269,8 @@ OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")
 COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
 #: of each link, about its origin, which arm leads to from its parent's: what it offers to its parent, inertia as
-#: (turning mixed; mixed^T moving) of twists to wrenches; a wrench; an acceleration; mass, first and polar moment about
-#: the kernels' origin of all beyond; the wrench that its own accelerations need (`equations.articulated`)
+#: (turning mixed; mixed^T moving) of twists to wrenches; a wrench; an acceleration; mass, first and polar moment of
+#: all beyond; the wrench that its own accelerations need (`equations.articulated`)
 ARTICULATED = work(
     "turning:6 mixed:3x3 moving:6 moment:3 force:3 angular:3 linear:3 arm:3 mass centre:3 polar own_moment:3 "
     "own_force:3"

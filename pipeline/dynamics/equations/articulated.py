@@ -107,23 +107,21 @@ def reduce(d, i):
     whether all pivots are sound.
     """
     link, own, body, p, sound = d.links[i], d.own[i], d.articulated[i], d.link_frames[i].origin, True
-    A, mass, first, wrench = at6(own.inertia, 0), own.mass, own.moment, d.wrench[i]
-    B, C = skewed(first), (mass, mass, mass, 0.0, 0.0, 0.0)
+    A, mass, centre, wrench = at6(own.inertia, 0), own.mass, own.moment, d.wrench[i]
+    B, C, polar = skewed(centre), (mass, mass, mass, 0.0, 0.0, 0.0), 0.5 * (A[0] + A[1] + A[2])
     M = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
     F = add(body.own_force, wrench.force)
-    centre, polar = add(first, scale(mass, p)), 0.5 * (A[0] + A[1] + A[2]) + 2.0 * dot(p, first) + mass * dot(p, p)
     if link.leaf == 0:
         A, B, C = add6(A, at6(body.turning, 0)), add9(B, body.mixed), add6(C, at6(body.moving, 0))
         M, F = add(M, body.moment), add(F, body.force)
         mass, centre, polar = mass + body.mass, add(centre, body.centre), polar + body.polar
     if link.c0 < d.nv:
-        most = polar - 2.0 * dot(p, centre) + mass * dot(p, p)
         for k in range(link.c0, link.c0 + link.n_speeds):
             gain, angular, linear = d.gain[k], d.local[k].angular, d.local[k].linear
             moment = add(turn_symmetric(A, angular), turn(B, linear))
             force = add(turn_back(B, angular), turn_symmetric(C, linear))
             pivot = dot(angular, moment) + dot(linear, force)
-            least = MASSLESS_PIVOT * (most * dot(angular, angular) + mass * dot(linear, linear))
+            least = MASSLESS_PIVOT * (polar * dot(angular, angular) + mass * dot(linear, linear))
             sound = sound & (pivot > least)  # not so of NaN
             inverse = 1.0 / pivot
             root, rest = np.sqrt(inverse), -dot(angular, M) - dot(linear, F)
@@ -135,7 +133,8 @@ def reduce(d, i):
             C = less(C, outer_symmetric(inverse, force))
     if link.parent > 0:
         A, B = shifted(body.arm, A, B, C)
-        M = add(M, cross(body.arm, F))
+        M, moved = add(M, cross(body.arm, F)), add(centre, scale(mass, body.arm))
+        polar, centre = polar + dot(body.arm, add(centre, moved)), moved
         above = d.articulated[link.parent]
         if link.first == 0:
             A, B, C = add6(A, at6(above.turning, 0)), add9(B, above.mixed), add6(C, at6(above.moving, 0))

@@ -206,8 +206,9 @@ def _symmetric(J: np.ndarray) -> list[float]:
     return [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
 
 
-#: free coordinates on the longest way to the ground up to which the mass matrix is factored as a matrix
-SHALLOW = 8
+#: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted, up to
+#: which the mass matrix is factored as a matrix: beyond it, articulated inertias take less time (docs/engine.md)
+DEEP = 9.0
 #: tables that follow from links, joints, frames and flexible bodies alone
 WIRED = (
     *(
@@ -264,14 +265,16 @@ def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool,
 
 
 def articulated(numbering: Numbering) -> bool:
-    """Whether the tree is so deep that articulated inertias take fewer operations than the mass matrix does."""
+    """Return whether the tree is so deep that articulated inertias are faster than the mass matrix (`DEEP`)."""
     mechanism = numbering.mechanism
-    if not mechanism.all_rigid:
+    if not mechanism.all_rigid or not numbering.nv:
         return False
-    depths = [0] * len(mechanism.links)
+    before, depths = [0] * len(mechanism.links), list[int]()
     for i, link in enumerate(mechanism.links[1:], start=1):
-        depths[i] = depths[link.branch.parent] + sum(c < numbering.nv for c in numbering.coordinates[i])
-    return max(depths) > SHALLOW
+        own = [c for c in numbering.coordinates[i] if c < numbering.nv]
+        depths += [before[link.branch.parent] + k for k in range(1, len(own) + 1)]
+        before[i] = before[link.branch.parent] + len(own)
+    return bool(np.sqrt(np.mean(np.square(depths))) > DEEP)
 
 
 #: tables of joints with friction, where there are none

@@ -160,7 +160,7 @@ class Trace:
 
     def _functions(self) -> SimpleNamespace:
         made = {name: self._function(name) for name in FUNCTIONS}
-        return SimpleNamespace(pi=np.pi, **made)
+        return SimpleNamespace(pi=np.pi, inf=np.inf, **made)
 
     def _function(self, name: str) -> Callable:
         def apply(*arguments: Any) -> Any:
