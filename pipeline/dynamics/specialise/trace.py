@@ -116,7 +116,7 @@ class Trace:
             values = []
             for block, (_, stores) in zip(branch.blocks, (first, second), strict=True):
                 with self.tape.inside(block):
-                    values.append(stores.get((memory, index), memory[index]))
+                    values.append(stores[memory, index] if (memory, index) in stores else memory[index])
             memory[index] = self.tape.join(branch, *values)
         return self._joined_results(branch, first[0], second[0])
 
