@@ -100,6 +100,22 @@ def step(d, i, arm):
 
 
 @kernel
+def weigh(d, i):
+    """Return mass and polar moment about its origin of link i and all beyond, and add them to its parent's."""
+    link, own, body = d.links[i], d.own[i], d.articulated[i]
+    mass, centre, polar = own.mass, own.moment, 0.5 * (own.inertia[0] + own.inertia[1] + own.inertia[2])
+    if link.leaf == 0:
+        mass, centre, polar = mass + body.mass, add(centre, body.centre), polar + body.polar
+    if link.parent > 0:
+        above, moved = d.articulated[link.parent], add(centre, scale(mass, body.arm))
+        whole, there = mass, polar + dot(body.arm, add(centre, moved))
+        if link.first == 0:
+            whole, moved, there = whole + above.mass, add(moved, above.centre), there + above.polar
+        above.mass, above.centre, above.polar = whole, moved, there
+    return mass, polar
+
+
+@kernel
 def reduce(d, i):
     """Take the coordinates of link i's joint out of its inertia and pass the rest to its parent.
 
@@ -107,14 +123,18 @@ def reduce(d, i):
     whether all pivots are sound.
     """
     link, own, body, p, sound = d.links[i], d.own[i], d.articulated[i], d.link_frames[i].origin, True
-    A, mass, centre, wrench = at6(own.inertia, 0), own.mass, own.moment, d.wrench[i]
-    B, C, polar = skewed(centre), (mass, mass, mass, 0.0, 0.0, 0.0), 0.5 * (A[0] + A[1] + A[2])
+    mass, polar = weigh(d, i)
+    A, B, C, wrench = (
+        at6(own.inertia, 0),
+        skewed(own.moment),
+        (own.mass, own.mass, own.mass, 0.0, 0.0, 0.0),
+        d.wrench[i],
+    )
     M = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
     F = add(body.own_force, wrench.force)
     if link.leaf == 0:
         A, B, C = add6(A, at6(body.turning, 0)), add9(B, body.mixed), add6(C, at6(body.moving, 0))
         M, F = add(M, body.moment), add(F, body.force)
-        mass, centre, polar = mass + body.mass, add(centre, body.centre), polar + body.polar
     if link.c0 < d.nv:
         for k in range(link.c0, link.c0 + link.n_speeds):
             gain, angular, linear = d.gain[k], d.local[k].angular, d.local[k].linear
@@ -132,42 +152,24 @@ def reduce(d, i):
             B = less9(B, outer(inverse, moment, force))
             C = less(C, outer_symmetric(inverse, force))
     if link.parent > 0:
-        A, B = shifted(body.arm, A, B, C)
-        M, moved = add(M, cross(body.arm, F)), add(centre, scale(mass, body.arm))
-        polar, centre = polar + dot(body.arm, add(centre, moved)), moved
+        # about the parent's origin, from which a leads to the link's
+        a = body.arm
+        x, y, z = cross(a, (B[0], B[1], B[2])), cross(a, (B[3], B[4], B[5])), cross(a, (B[6], B[7], B[8]))
+        A = add6(A, (x[0], y[1], z[2], x[1], x[2], y[2]))
+        x, y, z = cross(a, (C[0], C[3], C[4])), cross(a, (C[3], C[1], C[5])), cross(a, (C[4], C[5], C[2]))
+        B = add9(B, (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]))
+        x, y, z = cross(a, (B[0], B[1], B[2])), cross(a, (B[3], B[4], B[5])), cross(a, (B[6], B[7], B[8]))
+        A = add6(A, (x[0], y[1], z[2], y[0], z[0], z[1]))
+        M = add(M, cross(a, F))
         above = d.articulated[link.parent]
         if link.first == 0:
             A, B, C = add6(A, at6(above.turning, 0)), add9(B, above.mixed), add6(C, at6(above.moving, 0))
             M, F = add(M, above.moment), add(F, above.force)
-            mass, centre, polar = mass + above.mass, add(centre, above.centre), polar + above.polar
         put6(above.turning, 0, A)
         above.mixed = B
         put6(above.moving, 0, C)
         above.moment, above.force = M, F
-        above.mass, above.centre, above.polar = mass, centre, polar
     return sound
-
-
-@kernel
-def shifted(a, A, B, C):
-    """Return A and B of an inertia about the point from which `a` leads to the one that they are about."""
-    before = (cross(a, (B[0], B[1], B[2])), cross(a, (B[3], B[4], B[5])), cross(a, (B[6], B[7], B[8])))
-    lever = (cross(a, (C[0], C[3], C[4])), cross(a, (C[3], C[1], C[5])), cross(a, (C[4], C[5], C[2])))
-    B = (
-        *(B[0] + lever[0][0], B[1] + lever[1][0], B[2] + lever[2][0]),
-        *(B[3] + lever[0][1], B[4] + lever[1][1], B[5] + lever[2][1]),
-        *(B[6] + lever[0][2], B[7] + lever[1][2], B[8] + lever[2][2]),
-    )
-    after = (cross(a, (B[0], B[1], B[2])), cross(a, (B[3], B[4], B[5])), cross(a, (B[6], B[7], B[8])))
-    A = (
-        A[0] + before[0][0] + after[0][0],
-        A[1] + before[1][1] + after[1][1],
-        A[2] + before[2][2] + after[2][2],
-        A[3] + before[0][1] + after[1][0],
-        A[4] + before[0][2] + after[2][0],
-        A[5] + before[1][2] + after[2][1],
-    )
-    return A, B
 
 
 @kernel
