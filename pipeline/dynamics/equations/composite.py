@@ -26,12 +26,12 @@ rigid_inertia = rigid.inertia
 
 
 @kernel
-def no_modal_forces(h, w):
+def no_modal_forces(d):
     """No modes."""
 
 
 @kernel
-def no_link_load(h, w, i):
+def no_link_load(d, i):
     """No link is carried by a flexible one."""
 
 
@@ -50,7 +50,7 @@ def gather(d, i):
     """Force and momentum of link i's coordinates; then take its subtree to its parent."""
     link, wrench = d.links[i], d.wrench[i]
     for k in range(link.c0, link.c0 + link.n_speeds):
-        carry(d.h, d.w, i, k)
+        carry(d, i, k)
         column = d.columns[k]
         d.bias[k] = dot(column.angular, wrench.moment) + dot(column.linear, wrench.force)
     above = d.wrench[link.parent]
@@ -147,9 +147,9 @@ def make_eliminate(flexible: Any = None) -> Callable:
     def eliminate(d):
         copy_inertia(d)
         for i in range(d.n_links - 1, 0, -1):
-            port_load(d.h, d.w, i)
+            port_load(d, i)
             gather(d, i)
-        modal(d.h, d.w)
+        modal(d)
         assemble_mass(d)
         sound = envelope.factor(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, MASSLESS_PIVOT)
         for k in range(d.nv):

@@ -19,28 +19,13 @@ from flexclear.pipeline.dynamics.vectors import ZERO
 
 
 @kernel
-def nothing(h, f, w, n):
+def nothing(d):
     """Stands for the forces of parts that a mechanism does not have."""
 
 
 @kernel
-def no_modal_mass(h, f, w):
+def no_modal_rates(d, dy):
     """No modes."""
-
-
-@kernel
-def no_modal_rates(h, f, w, dy):
-    """No modes."""
-
-
-@kernel
-def no_closures(h, f, w, n):
-    """A tree needs no multipliers."""
-
-
-@kernel
-def no_known_forces(h, w):
-    """No closure loads a drive."""
 
 
 @kernel
@@ -74,11 +59,11 @@ def make_forces(
         ground.moment, ground.force = ZERO, ZERO
         for i in range(1, d.n_links):
             if d.links[i].flex < 0:
-                rigid_inertia(d.h, d.f, d.w, i)
-        flexible_inertia(d.h, d.f, d.w, d.n)
-        contact_forces(d.h, d.f, d.w, d.n)
-        applied(d.h, d.f, d.w, d.n)
-        stop_forces(d.h, d.f, d.w, d.n)
+                rigid_inertia(d, i)
+        flexible_inertia(d)
+        contact_forces(d)
+        applied(d)
+        stop_forces(d)
 
     return forces
 
@@ -119,11 +104,11 @@ def make_rates(
     kinematics = make_kinematics(joints, flexible, tree.localise, tree.step)
     forces = make_forces(flexible, contacts, loads, stops, tree.rigid_inertia)
     eliminate, backward, drive_forces = tree.make_eliminate(flexible), tree.backward, tree.drive_forces
-    modal_mass = no_modal_mass if flexible is None else flexible.mass_matrix
+    modal_mass = nothing if flexible is None else flexible.mass_matrix
     modal_rates = no_modal_rates if flexible is None else flexible.modal_rates
-    close = no_closures if closures is None else closures.close
-    known_forces = no_known_forces if closures is None else closures.known_forces
-    rub, rub_drives = (nothing, no_known_forces) if friction is None else friction
+    close = nothing if closures is None else closures.close
+    known_forces = nothing if closures is None else closures.known_forces
+    rub, rub_drives = (nothing, nothing) if friction is None else friction
 
     @kernel
     def store_rates(d, dy):
@@ -134,7 +119,7 @@ def make_rates(
             d.w[dy + k] = d.position_rate[k]
         for k in range(d.nv):
             d.w[dy + d.nq + k] = d.du[k]
-        modal_rates(d.h, d.f, d.w, dy)
+        modal_rates(d, dy)
         for k in range(d.n_ledger):
             d.w[dy + d.nq + d.nv + k] = d.ledger_rate[k]
 
@@ -150,19 +135,19 @@ def make_rates(
         for k in range(d.mass_size):
             d.mass[k] = 0.0
         forces(d)
-        modal_mass(h, f, w)
+        modal_mass(d)
         d.evaluation = m.OK
         if not eliminate(d):
             d.evaluation = m.NOT_POSITIVE
             return
-        close(h, f, w, n)
+        close(d)
         backward(d, h[m.FORCE])
         for k in range(d.nv):
             d.du[k] = d.force[k]
-        rub(h, f, w, n)
+        rub(d)
         drive_forces(d)
-        known_forces(h, w)
-        rub_drives(h, w)
+        known_forces(d)
+        rub_drives(d)
         store_rates(d, dy)
 
     return rates
