@@ -354,10 +354,10 @@ def make_observation(
         """State, contacts' modes and pieces of the laws of a row of the record."""
         mode, latched, state = m.record_columns(d.n_contacts)
         for c in range(d.n_contacts):
-            d.n[d.mode + c] = int(row[mode + c])
+            d.mode[c] = int(row[mode + c])
             d.latched[c] = row[latched + c]
         for k in range(d.n_laws):
-            d.n[d.active + k] = pieces[k]
+            d.active[k] = pieces[k]
         for k in range(d.ny):
             d.y[k] = row[state + k]
         return state
