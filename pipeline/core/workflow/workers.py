@@ -103,7 +103,8 @@ class Team:
         from multiprocessing.managers import SyncManager
 
         server, bell = SyncManager(ctx=_context()), Bell.made()
-        server.start(follow, (os.getpid(),))
+        with without_main():
+            server.start(follow, (os.getpid(),))
         return Team(width, pool(width, bell), bell, server, server.Queue())
 
     def end(self) -> None:
