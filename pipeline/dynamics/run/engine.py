@@ -182,14 +182,6 @@ class Engine:
         if self.n[m.ABRIDGED]:
             self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, float(self.control[m.TIME]))
 
-    def mass_factor(self) -> np.ndarray:
-        """L of the mass matrix M = L L^T that the last evaluation left in its envelope, shape (nv, nv)."""
-        L, entries = np.zeros((self.model.nv,) * 2), self.view(m.MASS)
-        for i, (first, origin) in enumerate(self.model.arrays.table(m.ENVELOPE)):
-            L[i, first : i + 1] = entries[origin + first : origin + i + 1]
-            L[i, i] = 1.0 / L[i, i]
-        return L
-
     def independence(self) -> np.ndarray:
         """How far each selected closure row is from depending on those before it, at the last evaluated state."""
         envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
