@@ -148,7 +148,7 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
     @kernel
     def contact(d, c):
         axis, turning = measure(d, c)
-        if d.n[d.mode + c] == 1:
+        if d.mode[c] == 1:
             forces(d, c, axis, turning)
 
     @kernel
