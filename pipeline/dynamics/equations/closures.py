@@ -154,9 +154,9 @@ def complete(d):
         couple(d, p)
     for r in range(d.n_kept_rows):
         d.row_scale[d.n_closure_rows + r] = d.schur[d.closure_envelope[r].origin + r]
-    sound = factor(d.h, d.at_closure_envelope, d.w, d.at_schur, d.n_kept_rows, SINGULAR_PIVOT)
+    sound = factor(d.h, d.h[m.CLOSURE_ENVELOPE.place], d.w, d.h[m.SCHUR], d.n_kept_rows, SINGULAR_PIVOT)
     pivot = independence(d) if sound else 0.0
-    d.last_pivot = pivot
+    d.pivot[m.LAST_PIVOT] = pivot
     d.evaluation = m.OK if pivot > SINGULAR_PIVOT else m.SINGULAR
 
 
@@ -209,23 +209,23 @@ def gather_rows(d, values):
 @kernel
 def solve(d):
     """Multipliers from their right-hand side, in place."""
-    forward(d.h, d.at_closure_envelope, d.w, d.at_schur, d.n_kept_rows, d.at_multiplier)
-    backward(d.h, d.at_closure_envelope, d.w, d.at_schur, d.n_kept_rows, d.at_multiplier)
+    forward(d.h, d.h[m.CLOSURE_ENVELOPE.place], d.w, d.h[m.SCHUR], d.n_kept_rows, d.h[m.MULTIPLIER])
+    backward(d.h, d.h[m.CLOSURE_ENVELOPE.place], d.w, d.h[m.SCHUR], d.n_kept_rows, d.h[m.MULTIPLIER])
 
 
 @kernel
 def respond(d):
     """Multipliers of what is asked of the rows (there, in place) and of FORCE, which holds L^-1 f and is completed by
     them: L^-T then gives the accelerations."""
-    take_spread(d, d.at_force)
+    take_spread(d, d.h[m.FORCE])
     solve(d)
-    add_spread(d, d.at_force, 1.0)
+    add_spread(d, d.h[m.FORCE], 1.0)
 
 
 @kernel
 def finish(d):
     """Multipliers of the rows' biases and of FORCE; see `respond`."""
-    gather_rows(d, d.at_gamma)
+    gather_rows(d, d.h[m.GAMMA])
     respond(d)
 
 
@@ -271,4 +271,4 @@ def correction(d, residual, step):
     for k in range(d.nv):
         d.w[step + k] = 0.0
     add_spread(d, step, -1.0)
-    backward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, step)
+    backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, step)

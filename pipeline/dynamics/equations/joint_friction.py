@@ -122,18 +122,18 @@ def make_unit_wrench(traction: Callable) -> Callable:
 @kernel
 def tree_response(d):
     """Accelerations in FORCE from the generalised forces there; no loop is closed."""
-    forward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, d.at_force)
-    backward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, d.at_force)
+    forward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
+    backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
 
 
 @kernel
 def closed_response(d):
     """Accelerations in FORCE from the generalised forces there, and their multipliers; loops stay closed."""
-    forward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, d.at_force)
+    forward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
     for k in range(d.n_kept_rows):
         d.multiplier[k] = 0.0
     respond(d)
-    backward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, d.at_force)
+    backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
 
 
 @kernel
@@ -357,7 +357,7 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callab
     def influences(d):
         """Reactions of all joints: of the present accelerations, then of the friction of each bearing alone."""
         for j in range(d.n_rubbing):
-            reaction(d, j, d.at_du, -1)
+            reaction(d, j, d.h[m.DU], -1)
         for k in range(d.n_kept_rows):
             d.smooth_multiplier[k] = d.multiplier[k]
         for e in range(d.n_bearings):
@@ -366,7 +366,7 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callab
             load_coordinates(d, e, 1.0)
             respond(d)
             for j in range(d.n_rubbing):
-                reaction(d, j, d.at_force, e)
+                reaction(d, j, d.h[m.FORCE], e)
 
     @kernel
     def joint_friction(d):

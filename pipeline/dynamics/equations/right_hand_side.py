@@ -205,14 +205,14 @@ def make_rates(
         gather_forces(d)
         assemble_mass(d)
         d.evaluation = m.OK
-        if not factor(h, d.at_envelope, w, d.at_mass, d.nv, MASSLESS_PIVOT):
+        if not factor(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, MASSLESS_PIVOT):
             d.evaluation = m.NOT_POSITIVE
             return
         for k in range(d.nv):
             d.force[k] = -d.bias[k]
-        forward(h, d.at_envelope, w, d.at_mass, d.nv, d.at_force)
+        forward(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, h[m.FORCE])
         close(d)
-        backward(h, d.at_envelope, w, d.at_mass, d.nv, d.at_force)
+        backward(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, h[m.FORCE])
         for k in range(d.nv):
             d.du[k] = d.force[k]
         rub(d)
