@@ -46,6 +46,6 @@ def text(reasons: Mapping[str, Mapping[str, Sequence[str]]], others: Mapping[str
     for scene, stages in reasons.items():
         lines += [scene, *(f"  note: {shown(note)}" for note in others.get(scene, ()))]
         for label, why in stages.items():
-            first, *others = map(shown, why or ["fresh"])
-            lines += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in others)]
+            first, *more = map(shown, why or ["fresh"])
+            lines += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in more)]
     return "\n".join(lines)
