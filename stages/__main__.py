@@ -19,7 +19,7 @@ from typing import NoReturn
 
 from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, InputError, ResourceError, shown
 from flexclear.pipeline.core.registry import suggestion
-from flexclear.pipeline.core.system import plain_output
+from flexclear.pipeline.core.system import plain_output, reader_has_gone
 from flexclear.pipeline.core.workflow import workers
 
 CLOSED_PIPE = 141
@@ -75,6 +75,9 @@ def main(arguments: list[str] | None = None) -> int:
         print("\nflexclear: interrupted; finished results are stored", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
+        if not reader_has_gone():
+            print(f"flexclear: {workers.LOST}", file=sys.stderr)
+            return ResourceError.exit_code
         # the reader (`| head`) has gone; keep the interpreter from complaining about it at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED_PIPE
