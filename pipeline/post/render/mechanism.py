@@ -11,7 +11,9 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.fields import Pose
+from flexclear.pipeline.post import body_stress
 from flexclear.pipeline.post.body_shape import faces, is_rod, scale_to, surface
 from flexclear.pipeline.post.render import forms, surfaces
 from flexclear.pipeline.post.render.forms import Seat
@@ -55,13 +57,17 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Flexible:
-    """A flexible body: its bundle, index in the run, columns of its modal coordinates, drawn exaggeration, colour."""
+    """A flexible body: its bundle, index in the run, columns of its modal coordinates, drawn exaggeration, colour.
+
+    stressed: whether its colours show von Mises stress, and not displacement.
+    """
 
     index: int
     bundle: xr.Dataset
     columns: np.ndarray
     scale: float
     color: str | None = None
+    stressed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,12 +98,27 @@ class Mechanism:
     size: float  #: diagonal of the box of all frames and of the flexible bodies at the start [m]
     cloud: np.ndarray  #: points that represent all that is drawn over the run, world axes [m], shape (n, 3)
     looks: Looks
+    stress: float | None = None  #: the stress at the upper end of the colours [Pa], where they show stress
 
 
-def mechanism(run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None) -> Mechanism:
-    """The drawn mechanism of a run; bundles by name of the flexible body."""
+def mechanism(
+    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None, *, stressed: bool = False
+) -> Mechanism:
+    """The drawn mechanism of a run; bundles by name of the flexible body.
+
+    stressed: whether the colours of flexible bodies show von Mises stress.  InputError for a run that has none.
+    """
     looks, given = looks or Looks(), parameters(run)
-    flexible = tuple(_flexible(run, name, bundle, looks) for name, bundle in bundles.items() if name in run.body.values)
+    if stressed and not body_stress.recorded(run):
+        problem = "the run records no von Mises stress"
+        raise InputError(
+            "--what stress", problem, 'ask for it: [output] stress = ["BODY"], a rod of known section or a solid'
+        )
+    flexible = tuple(
+        _flexible(run, name, bundle, looks, stressed=stressed)
+        for name, bundle in bundles.items()
+        if name in run.body.values
+    )
     places = run.frame_position.values if run.sizes.get("frame", 0) else run.position.values
     shown = np.concatenate([places.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
     low, high = shown.min(axis=0), shown.max(axis=0)
@@ -105,7 +126,8 @@ def mechanism(run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks |
     seats = _seats(given, bundles)
     parts = (*_bodies(run, given, bundles, seats, looks, size), *_joints(run, given, bundles, size))
     seen = view(run, given, looks.direction, looks.up)
-    return Mechanism(run, parts, flexible, seen, size, _cloud(run, parts, flexible), looks)
+    top = max(body_stress.largest(run), 1e-9) if stressed else None
+    return Mechanism(run, parts, flexible, seen, size, _cloud(run, parts, flexible), looks, top)
 
 
 def _cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible]) -> np.ndarray:
@@ -143,6 +165,13 @@ def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.n
     points, size = surface(body.bundle, q, body.scale)
     matrix = pose(run, body.index, step)
     return (points - _centre(body.bundle, q)) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
+
+
+def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
+    """What the colours of a body show at the points of `placed`: von Mises stress [Pa], or displacement [m]."""
+    if body.stressed:
+        return body_stress.on_surface(run, body.bundle, _names(run, "body")[body.index], step)
+    return placed(run, body, step)[1]
 
 
 def skin(body: Flexible, points: np.ndarray) -> Surface:
@@ -327,7 +356,7 @@ def _seated(
     return Part(bodies.index(body), surfaces.moved(part, origin - com, axes), color, opacity, contact=contact)
 
 
-def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks) -> Flexible:
+def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, stressed: bool) -> Flexible:
     owners = (
         run.mode_body.values
         if "mode_body" in run.coords
@@ -339,4 +368,8 @@ def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks) -> F
     q = run.modal_coordinate.values[:, columns]
     largest = q[int(np.argmax(np.abs(q).max(axis=1)))]
     scale = looks.exaggeration or max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
-    return Flexible(_names(run, "body").index(name), bundle, columns, scale, looks.bodies.get(name, {}).get("color"))
+    color = looks.bodies.get(name, {}).get("color")
+    shown = stressed and name in body_stress.recorded(run)
+    if stressed:  # grey does not look like a stress
+        color = None if shown else GROUND_COLOR
+    return Flexible(_names(run, "body").index(name), bundle, columns, scale, color, shown)
