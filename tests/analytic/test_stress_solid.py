@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from pathlib import Path
 from typing import Any
@@ -15,9 +16,14 @@ from skfem.helpers import ddot, sym_grad, trace
 
 import flexclear as fc
 from flexclear.pipeline.core.algebra import components, matrices, principal, von_mises
+from flexclear.pipeline.core.artifacts import modal  # noqa: F401  (registers `dataset.modal`)
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.post import body_stress
+from flexclear.pipeline.post.render import player
+from flexclear.pipeline.post.render.mechanism import mechanism
+from flexclear.pipeline.post.series import derive
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.model import solid_of, unknowns_of
 from flexclear.pipeline.structure.kinds.kind import of_mesh
@@ -369,3 +375,40 @@ def test_a_rod_and_a_solid_are_recorded_side_by_side(tmp_path: Path) -> None:
     axial, shear = stress[:, 0], np.hypot(stress[:, 4], stress[:, 5])
     exact = 0.5 * axial + np.sqrt(0.25 * axial**2 + shear**2)
     assert run["first_principal_stress"].sel(gauge="rod").values == pytest.approx(exact, abs=1e-9 * np.abs(axial).max())
+
+
+def test_pictures_show_what_is_recorded(tmp_path: Path) -> None:
+    """The colours of a page, and the peak in the post dataset, are those of the run."""
+    recipe = block("hex8", (6, 2, 1), SIZE, "mean")
+    load = {"tip": {"type": "point-force", "frame": "part.top", "force": FORCE}}
+    bundle, run = cantilever(tmp_path, recipe, CB, load=load, time={"end": 2e-3})
+    step = int(run["von_mises_stress"].sel(gauge="part").argmax())
+    drawn = mechanism(run, {"part": bundle}, stressed=True)
+    seen = body_stress.on_surface(run, bundle, "part", step)
+    assert seen == pytest.approx(von_mises(everywhere(bundle, run, step)), rel=1e-12)
+    assert drawn.stress == pytest.approx(seen.max(), rel=1e-12)
+    page = player.motion(drawn)
+    (mesh,) = [mesh for mesh in page["meshes"] if "levels" in mesh]
+    levels = np.frombuffer(base64.b64decode(mesh["levels"]), dtype=np.uint8).reshape(len(page["times"]), -1)
+    assert levels.shape[1] == bundle.sizes["node"]
+    assert levels.max() == 255
+    derived = derive(run)
+    peak = derived.sel(gauge="part")
+    assert float(peak["peak_stress"]) == pytest.approx(seen.max(), rel=1e-12)
+    assert float(peak["peak_stress_time"]) == run["time"].values[step]
+    assert peak["peak_stress_position"].values == pytest.approx(
+        bundle["node_position"].values[np.argmax(seen)], abs=1e-15
+    )
+
+
+def test_a_run_without_stress_has_no_picture_of_it(tmp_path: Path) -> None:
+    run = stress_runs.run("checks/clamped_rod", {"time.end": "0.2 ms"})
+    bare = run.drop_vars([name for name in run if "gauge" in run[name].dims])
+    with pytest.raises(FlexclearError, match=r"--what stress.*\n.*\[output\] stress"):
+        mechanism(bare, {}, stressed=True)
+
+
+def test_fewer_modes_of_a_bundle_have_no_stress_fields(tmp_path: Path) -> None:
+    """What all shapes lack is not what fewer of them lack."""
+    bundle, _ = cantilever(tmp_path, block("hex8", (6, 2, 1), SIZE, "mean"), CB)
+    assert "stress_field" not in bundle.modal.truncate(8)

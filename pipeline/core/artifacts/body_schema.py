@@ -236,5 +236,11 @@ BUNDLE: Schema = (
             ("node", "axis", "mode"), "rad m-1", "node rotation vector per modal coordinate, body axes"
         ),
         "radius": _V(("cell",), "m", "radius of the drawn section"),
+        "outline": _V(
+            ("cell", "around", "axis"),
+            "m",
+            "from a rod's centre line to points around its section, body axes, the first again last; not of round ones",
+            optional=True,
+        ),
     }
 )

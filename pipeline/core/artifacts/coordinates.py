@@ -76,6 +76,7 @@ COORDINATES: Schema = {
     "node": _number("node", "number of the node, from 0; `cell_node` refers to it"),
     "cell": _number("cell", "number of the cell, from 0"),
     "corner": _number("corner", "number of the corner of a cell, from 0"),
+    "around": _number("around", "number of the point around a drawn section, from 0"),
     "point": _number("point", "number of the Gauss point, from 0"),
     "region": _words("region", "name of the region of cells of one material"),
     "lump": _number("lump", "number of the lumped mass, from 0"),
@@ -108,7 +109,7 @@ COORDINATES: Schema = {
 }
 #: dimensions whose entries have no other name than their number, and the number of the first
 NUMBERED = {
-    **dict.fromkeys(("node", "cell", "corner", "point", "lump", "section", "slice", "fibre"), 0),
+    **dict.fromkeys(("node", "cell", "corner", "around", "point", "lump", "section", "slice", "fibre"), 0),
     **dict.fromkeys(("followed", "lag", "component", "band", "sector"), 0),
     **dict.fromkeys(("mode", "mode2", "rigid_mode"), 1),
 }

@@ -38,7 +38,8 @@ class Output(Part):
     """Regular output interval; drive breaks and events are always added.
 
     stress: flexible bodies whose stresses are recorded: section forces and peaks of rods, surfaces of solids.
-    gauges.NAME: where on a solid its stress is recorded next to the peak.  interval: time between two regular outputs.
+    gauges: where on solids stress is recorded next to the peak.
+    interval: time between two regular outputs.
     """
 
     interval: Annotated[Time, Field(gt=0.0)] = 1e-4

@@ -14,7 +14,7 @@ from flexclear.pipeline.core.algebra import quaternion_to_matrix
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.post import body_stress
-from flexclear.pipeline.post.body_shape import faces, is_rod, scale_to, surface
+from flexclear.pipeline.post.body_shape import faces, has_edges, scale_to, surface
 from flexclear.pipeline.post.render import forms, surfaces
 from flexclear.pipeline.post.render.forms import Seat
 from flexclear.pipeline.post.render.solids import equivalent
@@ -176,7 +176,7 @@ def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
 
 def skin(body: Flexible, points: np.ndarray) -> Surface:
     """The surface of a flexible body through points as of `placed`; empty for bare nodes."""
-    return surfaces.shaded(points, surfaces.triangulated(faces(body.bundle)), sharp=not is_rod(body.bundle))
+    return surfaces.shaded(points, surfaces.triangulated(faces(body.bundle)), sharp=has_edges(body.bundle))
 
 
 def _centre(bundle: xr.Dataset, q: np.ndarray) -> np.ndarray:

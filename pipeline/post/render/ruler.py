@@ -15,7 +15,7 @@ from flexclear.pipeline.post.series import parameters
 #: longest bar [pixels]
 LONGEST = 190.0
 #: colours of stress, and the width at either side of a picture that the bar of these colours takes [pixels]
-STRESS_COLORS, BAR = "turbo", 92
+STRESS_COLORS, BAR = "turbo", 100
 
 
 def project(drawn: Mechanism, points: np.ndarray, size: tuple[int, int], margin: int = 0) -> np.ndarray:
