@@ -133,12 +133,27 @@ def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) 
     return surfaces.merged([surfaces.bar(point, com, 0.7 * width), surfaces.moved(surfaces.sphere(radius), com)])
 
 
+def wheel_of_gear(seat: Seat, radius: float, size: float, *, inner: bool) -> Surface:
+    """A gear's wheel in its body's axes [m], as large as its pitch circle; inner: a ring whose teeth point inwards."""
+    width, axes = WIDTH * size, surfaces.along(seat.axes[:, 2])
+    if not inner:
+        return surfaces.moved(_disc(radius, width), seat.origin, axes)
+    turn = np.linspace(0.0, 2.0 * np.pi, 4 * surfaces.ROUND + 1)
+    rim = (radius + 0.4 * width) * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    mark = surfaces.moved(surfaces.box((1.2 * width, 0.5 * width, width)), np.array([radius + width, 0.0, 0.0]))
+    return surfaces.moved(surfaces.merged([surfaces.tube(rim, 0.4 * width, corners=12), mark]), seat.origin, axes)
+
+
 def _wheel(solid: Solid | None, axis: np.ndarray, size: float) -> Surface:
     """A disc about z with a mark that shows how it turns."""
     width = WIDTH * size
     radius = 3.0 * width
     if solid is not None and solid.round and abs(solid.axes[:, 2] @ axis) > 0.99:
         radius = float(np.clip(solid.half[0], 2.4 * width, LARGEST * size))
+    return _disc(radius, width)
+
+
+def _disc(radius: float, width: float) -> Surface:
     mark = surfaces.moved(surfaces.box((0.7 * radius, 0.5 * width, 1.3 * width)), np.array([0.55 * radius, 0.0, 0.0]))
     return surfaces.merged([surfaces.cylinder(radius, width), mark])
 

@@ -17,9 +17,10 @@ from flexclear.pipeline.post import body_stress
 from flexclear.pipeline.post.body_shape import faces, has_edges, scale_to, surface
 from flexclear.pipeline.post.render import forms, surfaces
 from flexclear.pipeline.post.render.forms import Seat
-from flexclear.pipeline.post.render.solids import equivalent
+from flexclear.pipeline.post.render.solids import Solid, equivalent
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View, view
+from flexclear.pipeline.post.render.wheels import Wheel, wheels
 from flexclear.pipeline.post.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
@@ -222,6 +223,7 @@ def _bodies(
 ) -> Iterator[Part]:
     """Rigid bodies and the ground, as their scene draws them or as links between their joints."""
     names, kinds = _names(run, "body"), dict[tuple[Any, ...], str]()
+    geared = wheels(given, lambda frame: _at_start(run, given, bundles, frame))
     for name, body in given.get("body", {}).items():
         look = looks.bodies.get(name, {})
         own = None if "geometry" not in look else forms.shapes(look["geometry"], looks.folder)
@@ -244,9 +246,39 @@ def _bodies(
         key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
         color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
         solid = equivalent(body["mass"], inertia) if np.any(inertia) else None
-        drawn = own if own is not None else forms.link(seats.get(name, []), com, solid, size, names.index(name))
+        drawn = own
+        if drawn is None:
+            drawn = _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, names.index(name))
         if len(drawn.points):
             yield Part(names.index(name), surfaces.moved(drawn, -com), color)
+
+
+def _with_wheels(
+    geared: Sequence[Wheel], seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: float, layer: int
+) -> Surface:
+    """A body between its joints, with the wheels of its gears."""
+    discs = [
+        forms.wheel_of_gear(
+            next(seat for seat in seats if seat.frame == wheel.frame), wheel.radius, size, inner=wheel.inner
+        )
+        for wheel in geared
+    ]
+    if discs and all(np.linalg.norm(seat.origin - seats[0].origin) < 1e-9 for seat in seats):
+        return surfaces.merged(discs)  # the body is the wheel
+    return surfaces.merged([*discs, forms.link(seats, com, solid, size, layer)])
+
+
+def _at_start(
+    run: xr.Dataset, given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], frame: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Origin [m] and axes of a named frame, in the world, at the first output."""
+    origin, axes = frame_pose(given, bundles, frame)
+    names, frames, body = _names(run, "body"), _names(run, "frame"), frame.partition(".")[0]
+    if body not in names:
+        return origin, axes
+    matrix = pose(run, names.index(body), 0)
+    where = run.frame_position.values[0, frames.index(frame)] if frame in frames else matrix[:3, 3]
+    return where, matrix[:3, :3] @ axes
 
 
 def _centre_at_rest(bundle: xr.Dataset) -> np.ndarray:
