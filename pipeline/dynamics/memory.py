@@ -354,7 +354,7 @@ REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(22, 27)
 ) = range(22)
 # fmt: on
 #: what an evaluation reads and reports there, by the names that kernels use (`fields`)
-REPORTS = {"evaluation": EVALUATION, "state": STATE, "abridged": ABRIDGED}
+REPORTS = {"evaluation": EVALUATION, "active": ACTIVE, "mode": MODE, "state": STATE, "abridged": ABRIDGED}
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
 NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER, SINGULAR_AHEAD = range(8, 14)

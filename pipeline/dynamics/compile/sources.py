@@ -284,8 +284,8 @@ def project(h, f, w, n, t, y, dy, tolerance):
     return projection(h, f, w, n, t, y, dy, tolerance)
 """
 RETRACT = """@calls.exported("retract")
-def retract(h, w, y, displacement, out, total):
-    retraction(h, w, y, displacement, out, total)
+def retract(h, f, w, n, y, displacement, out, total):
+    retraction(h, f, w, n, y, displacement, out, total)
     return 0
 """
 OBSERVE = """@calls.exported("observe")

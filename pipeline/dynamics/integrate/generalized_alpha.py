@@ -223,18 +223,18 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
         set_error_scales(h, f, w, h[m.Y])
         if not solve_step(h, f, w, n, step):
             return False
-        place_end(h, w, step, h[m.Y_NEW])
+        place_end(h, f, w, n, step, h[m.Y_NEW])
         return True
 
     return begin, attempt, error, hermite.make_extend(LAST), keep
 
 
 def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callable]:
-    """The kernels place_end(h, w, step, out) and solve_step(h, f, w, n, step)."""
+    """The kernels place_end(h, f, w, n, step, out) and solve_step(h, f, w, n, step)."""
     jacobian = make_jacobian(evaluate, retract)
 
     @kernel
-    def place_end(h, w, step, out):
+    def place_end(h, f, w, n, step, out):
         """State at the end of the step for the rates in NEW."""
         _, _, beta, gamma = coefficients(h, w)
         nq, nv, old, new, shift = h[m.NQ], h[m.NV], vector(h, RESCALED), vector(h, NEW), vector(h, DISPLACEMENT)
@@ -244,14 +244,14 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
             w[out + nq + k] = u + step * ((1.0 - gamma) * a + gamma * b)
         for k in range(nv, n_rates(h)):
             w[out + nq + k] = w[h[m.Y] + nq + k] + step * w[new + k]
-        retract(h, w, h[m.Y], shift, out, positions(h))
+        retract(h, f, w, n, h[m.Y], shift, out, positions(h))
 
     @kernel
     def residual(h, f, w, n, step):
         """What the rates in NEW leave of the method's equations, into RESIDUAL; False without a slope."""
         alpha_m, alpha_f, _, _ = coefficients(h, w)
         nq, old, start, end = h[m.NQ], vector(h, RESCALED), slope(h, 0), slope(h, ITERATE)
-        place_end(h, w, step, h[m.Y_NEW])
+        place_end(h, f, w, n, step, h[m.Y_NEW])
         evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_NEW], end)
         n[m.EVALUATIONS] += 1
         for i in range(n_rates(h)):
@@ -377,7 +377,7 @@ def make_jacobian(evaluate: Callable, retract: Callable) -> Callable:
             change = PERTURBATION * f[m.FLOORS.row(h, m.GROUPS.group(h, nq + k)) + m.FLOORS.natural]
             for j in range(nv):
                 w[shift + j] = change if j == k else 0.0
-            retract(h, w, y, shift, h[m.Y_STAGE], positions(h))
+            retract(h, f, w, n, y, shift, h[m.Y_STAGE], positions(h))
             if not column(h, f, w, n, t, slope_there, k, change, matrix(h, BY_POSITION)):
                 return False
         n[m.JACOBIANS] += 1

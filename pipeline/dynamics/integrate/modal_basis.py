@@ -23,6 +23,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies.interface import to_interface, to_modes
 from flexclear.pipeline.dynamics.equations.closures import add_spread, solve, take_spread
 from flexclear.pipeline.dynamics.equations.envelope import backward, forward
+from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot6
 
@@ -161,7 +162,7 @@ def turn(h, w, o, pair):
 
 # Oscillators ----------------------------------------------------------------------------------------------------------
 @kernel
-def constrained(h, w, b):
+def constrained(h, f, w, n, b):
     """P applied to the forces in w from place b; needs the factors of an evaluation. Leaves the multipliers.
 
     Modes are in the interface basis.
@@ -169,9 +170,10 @@ def constrained(h, w, b):
     forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], b)
     for k in range(h[m.MULTIPLIER], h[m.MULTIPLIER] + h[m.N_KEPT_ROWS]):
         w[k] = 0.0
-    take_spread(h, w, b)
-    solve(h, w)
-    add_spread(h, w, b, 1.0)
+    d = data(h, f, w, n)
+    take_spread(d, b)
+    solve(d)
+    add_spread(d, b, 1.0)
     backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], b)
 
 
@@ -196,17 +198,17 @@ def drive_power(h, w, b, motion):
 
 
 @kernel
-def respond(h, f, w, b):
+def respond(h, f, w, n, b):
     """What the forces in w from place b do, in place; and the drives' power then, and its rate, added after it."""
     nv = h[m.NV]
-    constrained(h, w, b)
+    constrained(h, f, w, n, b)
     w[b + nv] += drive_power(h, w, b, h[m.U])
     w[b + nv + 1] += drive_power(h, w, b, h[m.DU])
-    to_modes(h, f, w, b)
+    to_modes(data(h, f, w, n), b)
 
 
 @kernel
-def responses(h, f, w, o):
+def responses(h, f, w, n, o):
     """Responses to the root of each mode's stiffness, and the symmetric matrix."""
     nq, nv, e = h[m.NQ], h[m.NV], 0
     for i in range(count(h)):
@@ -219,8 +221,8 @@ def responses(h, f, w, o):
             w[root(h, o, e)] = np.sqrt(max(f[stiffness + j], 0.0))
             b = response(h, o, e) + nq
             w[b + c0 + j] = w[root(h, o, e)]
-            to_interface(h, f, w, b)
-            respond(h, f, w, b)
+            to_interface(data(h, f, w, n), b)
+            respond(h, f, w, n, b)
             e += 1
     for i in range(e):
         couple(h, w, o, i)
@@ -307,26 +309,26 @@ def make_find_oscillators(retract: Callable) -> Callable:
     """The kernel find_oscillators(h, f, w, n, o, known), at the state in Y or Y_NEW that has just been evaluated."""
 
     @kernel
-    def shapes(h, w, o, state, n):
+    def shapes(h, f, w, n, o, state, size):
         """Rows of C and shapes of B, from responses, axes and squares; slow oscillators have none."""
         nq, nv, largest = h[m.NQ], h[m.NV], 0.0
-        for i in range(n):
+        for i in range(size):
             largest = max(largest, w[matrix(h, o, i) + i])
-        for i in range(n):
+        for i in range(size):
             shape, omega2 = lifting(h, o, i), w[matrix(h, o, i) + i]
             stiff = omega2 > SLOW * SLOW * largest
             w[square(h, o, i)] = omega2 if stiff else 0.0
-            for j in range(n):
+            for j in range(size):
                 w[reading(h, o, i) + j] = w[axes(h, o, i) + j] * w[root(h, o, j)]
             for c in range(h[m.NY]):
                 w[shape + c] = 0.0
             if not stiff:
                 continue
-            for j in range(n):
+            for j in range(size):
                 part, weight = response(h, o, j), w[axes(h, o, i) + j] / omega2
                 for c in range(nq, nq + nv + 2):
                     w[shape + c] += weight * w[part + c]
-        for i in range(n):
+        for i in range(size):
             # the responses are used up: room for a displacement, the positions that it leads to, and the change
             shape, spare, longest = lifting(h, o, i), response(h, o, 0), 0.0
             for c in range(nv):
@@ -334,7 +336,7 @@ def make_find_oscillators(retract: Callable) -> Callable:
             if longest > 0.0:
                 for c in range(nv):
                     w[spare + c] = w[shape + nq + c] * (A_LITTLE / longest)
-                retract(h, w, state, spare, spare + nv, spare + nv + nq)
+                retract(h, f, w, n, state, spare, spare + nv, spare + nv + nq)
                 for c in range(nq):
                     w[shape + c] = w[spare + nv + nq + c] * (longest / A_LITTLE)
 
@@ -342,7 +344,7 @@ def make_find_oscillators(retract: Callable) -> Callable:
     def find_oscillators(h, f, w, n, o, known):
         """Fill the basis; known: whether it holds the axes of another pose."""
         size = count(h)
-        responses(h, f, w, o)
+        responses(h, f, w, n, o)
         if known:
             into_axes(h, w, o, size)
         else:
@@ -350,7 +352,7 @@ def make_find_oscillators(retract: Callable) -> Callable:
                 for j in range(size):
                     w[axes(h, o, i) + j] = 1.0 if i == j else 0.0
         diagonalise(h, w, o, size)
-        shapes(h, w, o, n[m.STATE], size)
+        shapes(h, f, w, n, o, n[m.STATE], size)
         for i in range(size):
             w[damping(h, o, i)] = damp(h, f, w, o, i)
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.projection import keep_scales, largest
+from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.integrate.norms import finite
 from flexclear.pipeline.dynamics.integrate.poses import NO_POSES, Poses
 from flexclear.pipeline.dynamics.integrate.recording import (
@@ -142,7 +143,7 @@ def make_advance(
     @kernel
     def finish(h, f, w, n, t_new, tolerance):
         """Slope at Y_NEW with the loops closed to a tolerance; False when they cannot be."""
-        c, slope = h[m.CONTROL], h[m.SLOPES] + h[m.NY] * last
+        c, slope, d = h[m.CONTROL], h[m.SLOPES] + h[m.NY] * last, data(h, f, w, n)
         if not ends:
             evaluate(h, f, w, n, t_new, h[m.Y_NEW], slope)
             n[m.EVALUATIONS] += 1
@@ -151,8 +152,8 @@ def make_advance(
         if not (finite(h, w, slope) and finite(h, w, h[m.Y_NEW])):
             n[m.EVALUATION] = m.NOT_FINITE
             return False
-        w[c + m.DRIFT] = max(w[c + m.DRIFT], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS]))
-        w[c + m.RATE_DRIFT] = max(w[c + m.RATE_DRIFT], largest(w, h[m.RESIDUAL_RATE], h[m.N_CLOSURE_ROWS]))
+        w[c + m.DRIFT] = max(w[c + m.DRIFT], largest(d.residual, d.n_closure_rows))
+        w[c + m.RATE_DRIFT] = max(w[c + m.RATE_DRIFT], largest(d.residual_rate, d.n_closure_rows))
         used = project(h, f, w, n, t_new, h[m.Y_NEW], slope, tolerance)
         note(h, w)
         if used > 0:
@@ -181,7 +182,7 @@ def make_advance(
         return norm
 
     @kernel
-    def accept(h, w, t_new):
+    def accept(h, f, w, n, t_new):
         """Make the end of the step the start of the next."""
         slope = h[m.SLOPES]
         final = slope + h[m.NY] * last
@@ -189,7 +190,7 @@ def make_advance(
             w[h[m.Y] + k] = w[h[m.Y_NEW] + k]
             w[slope + k] = w[final + k]
         w[h[m.CONTROL] + m.TIME] = t_new
-        keep_scales(h, w)
+        keep_scales(data(h, f, w, n))
 
     @kernel
     def set_off(h, f, w, n):
@@ -263,7 +264,7 @@ def make_advance(
                 snapshot(h, w, n, rows, t, h[m.Y])
             record_outputs(h, f, w, n, step, known, outputs, rows, t_end)
             keep(h, f, w, n, step)
-            accept(h, w, t_end)
+            accept(h, f, w, n, t_end)
             plan(h, w, step, following)
             if along:
                 done(h, w, t_end)

@@ -105,8 +105,10 @@ def _sections(mesh: xr.Dataset, beam: Beam) -> tuple[np.ndarray, np.ndarray | No
     types = set(mesh.attrs["section"].split())
     area, (torsion, about_y, about_z) = mesh["area"].values, mesh["second_moment"].values.T
     full = np.sqrt(area / np.pi)
-    # of a tube: A = pi (R^2 - r^2) and I = A (R^2 + r^2) / 4
-    radius = np.sqrt(2.0 * about_y / area + 0.5 * area / np.pi) if types == {"tube"} else full
+    # of a tube, and of a circle: A = pi (R^2 - r^2) and I = A (R^2 + r^2) / 4
+    radius = (
+        np.sqrt(2.0 * about_y / area + 0.5 * area / np.pi) if "tube" in types and types <= {"circle", "tube"} else full
+    )
     if "rectangle" not in types:
         return radius, None
     ratio = np.sqrt(about_z / about_y)
