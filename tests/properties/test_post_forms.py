@@ -316,7 +316,7 @@ def test_what_cannot_be_shown_so_is_not_offered(what: str, kind: str):
 
 
 def test_wheels_of_gears_touch_where_their_pitch_circles_do(root: Path):
-    """Thirty teeth each of sun and planets, ninety of the ring, 90 mm between the axes; a rack at 100 mm a turn's rad."""
+    """Thirty teeth each of sun and planets, ninety of the ring, 90 mm between the axes; a rack at 100 mm."""
     given = tomllib.loads((root / "scenes" / "checks" / "gears.toml").read_text())
     given["gear"]["rack"]["ratio"] = -0.1
     offsets = {"planet1.axis": [0.09, 0, 0], "planet2.axis": [-0.045, 0.0779, 0], "planet3.axis": [-0.045, -0.0779, 0]}
