@@ -27,7 +27,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--what",
         choices=FORMATS,
-        help="the motion, the modes of flexible bodies, joints with clearance, or vibrations about equilibrium; "
+        help="the motion, its stress, modes of flexible bodies, joints with clearance, or vibrations; "
         "default: motion and modes",
     )
     known = list(dict.fromkeys(kind for kinds in FORMATS.values() for kind in kinds))

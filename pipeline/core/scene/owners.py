@@ -47,6 +47,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
         "worn": _still(scene.worn()),
         "mode": _still(f"{n}.{k}" for n, c in modes.items() if isinstance(c, int) for k in range(1, c + 1)),
         "section": _still(scene.output.stress or ()),
+        "gauge": _still(n for body in scene.output.stress or () for n in (body, *scene.output.gauge_names(body))),
         "": _still(_of_all(scene)),
     }
 

@@ -30,11 +30,9 @@ def drawn(mesh: xr.Dataset) -> xr.Dataset:
     data |= {
         "first_moment": (("axis",), float(data["mass"][1]) * data["com"][1]),
         "modal_first_moment": (("axis", "mode"), np.zeros((3, 1))),
-        "node_position": (("node", "axis"), shown.position),
-        "cell_node": (("cell", "corner"), shown.cell),
         "shape_translation": (("node", "axis", "mode"), still),
         "shape_rotation": (("node", "axis", "mode"), still),
-        "radius": (("cell",), shown.radius),
+        **shown.variables(),
     }
     return xr.Dataset(data, coordinates)
 
