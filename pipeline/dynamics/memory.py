@@ -1,7 +1,6 @@
 """The memory through which scene and compiled kernels speak: every index, row and field is declared here, once.
 
-A kernel's code depends only on the kinds of parts present. Everything else, how many there
-are, what is joined to what, every number, is in four flat arrays that every kernel takes:
+A kernel's code depends only on the kinds of parts present. Everything else is in four flat arrays that kernels take:
 
 - ``h`` (integers): a header with sizes and offsets, then the wiring tables;
 - ``f`` (floats): the numbers of the scene;
@@ -13,10 +12,8 @@ names of their fields (`named`), and rows of the record by what they hold (`reco
 ``h[m.FORCE]`` the index in w where a stretch begins, ``h[m.LINKS.place]`` that of a table in its array, and
 ``m.LINKS.parent`` where a field begins in a row of it.
 
-Flat arrays, because a compiled call costs what its arguments cost, and compilation too.  No two of them overlap in
-memory,
-and the compiler knows: what a kernel has read from h stays read, whatever it writes into w.  So a kernel that writes is
-never given one of them twice.
+Arrays are flat, because call and compilation cost what the arguments cost.  No two overlap, and the compiler knows: what
+a kernel has read from h stays read, whatever it writes into w.  So a kernel that writes never gets one of them twice.
 
 Words: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site* is a frame on a link
 that a joint, closure, contact or load uses. A *port* is a site on a flexible link. A *coordinate* is one generalised

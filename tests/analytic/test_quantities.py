@@ -157,7 +157,11 @@ def test_every_quantity_of_a_run_can_be_evaluated_compared_and_drawn(name: str) 
 
 @pytest.mark.parametrize("name", [*RUNS, "driven"])
 def test_a_sweep_keeps_of_every_quantity_what_the_run_holds(name: str) -> None:
-    """But for rounding, which the code of long runs has in another order: of all that is measured in the same unit."""
+    """But for rounding, which the code of long runs has in another order: of all that is measured in the same unit.
+
+    Steps whose lengths differ by rounding end with states that differ by what the tolerance of 1e-10 leaves, and impacts
+    make a difference up to a thousand times larger.
+    """
     data, asked = run(name), scene(name)
     chosen = [parse(text, asked.owners()) for text in names_in(data)]
     kept = [Recorded(q, "series") for q in chosen if q.over_time]
@@ -173,7 +177,7 @@ def test_a_sweep_keeps_of_every_quantity_what_the_run_holds(name: str) -> None:
         if one.reduction == "series":
             known = quantities.series(data, one.quantity)[at]
             np.testing.assert_allclose(
-                point.values[one.name].reshape(known.shape), known, rtol=0.0, atol=1e-9 * sizes[one.quantity.unit]
+                point.values[one.name].reshape(known.shape), known, rtol=0.0, atol=1e-7 * sizes[one.quantity.unit]
             )
         else:
             # an impact multiplies rounding; not by more than some thousand in so few
