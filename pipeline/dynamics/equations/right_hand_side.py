@@ -195,6 +195,7 @@ def make_rates(
 
     @kernel
     def rates(h, f, w, n, y, dy):
+        """Rates dy of the state y, both places in w; Wang & Wang (2019), eqs. (32), (34)."""
         d = data(h, f, w, n)
         d.state, d.abridged = y, 0
         spread_state(d, y)
