@@ -25,7 +25,7 @@ SINGULAR_PIVOT = 1e-13
 
 @kernel
 def rows(d, c):
-    """Wrenches, residuals [m or -], their rates, and acceleration biases of closure c; of Wang & Wang (2019) (30), (31)."""
+    """Wrenches, residuals [m or -], rates and acceleration biases of closure c; Wang & Wang (2019), eqs. (30), (31)."""
     closure = d.closures[c]
     a, b = d.site_frames[closure.site_a], d.site_frames[closure.site_b]
     A, B, omega_a, omega_b, p_b = a.axes, b.axes, a.omega, b.omega, b.origin
