@@ -52,14 +52,6 @@ def put6(a, i, s):
 
 
 @kernel
-def dot6(a, i, b, j):
-    """Product of the six-vectors stored from i in a and from j in b."""
-    first = a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
-    second = a[i + 3] * b[j + 3] + a[i + 4] * b[j + 4] + a[i + 5] * b[j + 5]
-    return first + second
-
-
-@kernel
 def add(a, b):
     """A + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])

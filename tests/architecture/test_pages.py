@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from collections import defaultdict
 from pathlib import Path
@@ -161,3 +162,27 @@ def test_every_file_and_module_that_a_page_names_exists(root: Path) -> None:
 @pytest.mark.parametrize("name", ["assembly/tree", "pipeline.dynamics.assembly", "model/trees.py", "tables.py"])
 def test_a_name_that_is_gone_is_noticed(root: Path, name: str) -> None:
     assert missing(root, f"See `{name}`.") == [name]
+
+
+def equations(text: str) -> set[int]:
+    """Numbers of the equations in brackets: (3), or (3)-(5)."""
+    ranges = re.findall(r"\((\d+)\)(?:-\((\d+)\))?", text)
+    return {k for first, last in ranges for k in range(int(first), int(last or first) + 1)}
+
+
+def test_equations_and_the_functions_that_theory_names_name_each_other(root: Path) -> None:
+    """Functions of the dynamics, each before the path of its module."""
+    page, found = (root / "docs" / "theory.md").read_text(encoding="utf-8"), 0
+    for numbers, where in re.findall(
+        r"^\| ([(\d][^|]*) \|[^|]*\| ([^|]*pipeline/dynamics[^|]*) \|$", page, re.MULTILINE
+    ):
+        for names, path in re.findall(r"((?:`\w+`, )+)`(pipeline/dynamics/[\w/]+\.py)`", where):
+            functions = {
+                node.name: ast.get_docstring(node) or ""
+                for node in ast.walk(ast.parse((root / path).read_text(encoding="utf-8")))
+                if isinstance(node, ast.FunctionDef)
+            }
+            for name in re.findall(r"\w+", names):
+                found += 1
+                assert equations(numbers) <= equations(functions[name]), f"{path}: {name}"
+    assert found == 14

@@ -131,7 +131,10 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
 
     @kernel
     def modes(d, k, a, alpha, omega):
-        """Inertial forces on the modes, and int rho r x S_j of each, into MODAL, as eigenmodes."""
+        """Inertial forces on the modes, and int rho r x S_j of each, into MODAL, as eigenmodes.
+
+        Source: Wang & Wang (2019), eqs. (9), (14), (15).
+        """
         P, n = d.modal, d.flexes[k].n_modes
         V, bias, S = 9 * n, 18 * n, 19 * n
         x, y, z = omega
@@ -168,6 +171,7 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
         """Spatial inertia, wrench, modal forces and modal momenta of flexible body k.
 
         As `rigid.inertia`, with the modal accelerations taken as zero; `modal_inertia` adds theirs.
+        Source: Wang & Wang (2019), eqs. (9), (14), (15).
         """
         body, mass = d.flexes[k], d.flex_numbers[k].mass
         frame, wrench = d.link_frames[body.link], d.wrench[body.link]

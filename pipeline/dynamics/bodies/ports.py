@@ -40,6 +40,7 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
     def relative_motion(d, p):
         """Pose, twist and acceleration of port p's frame in the body frame, and its rotation vector theta.
 
+        Source: Wang & Wang (2019), eqs. (2), (7), (8).
         Body components.  The accelerations hold what the known modal accelerations give.
         """
         port, undeformed = d.ports[p], d.port_numbers[p]

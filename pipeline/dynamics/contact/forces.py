@@ -36,14 +36,14 @@ def push(d, s, point, force):
 
 @kernel
 def point_velocity(frame, point):
-    """Velocity of the material point of a frame's body that is at `point`."""
+    """Velocity of the material point of a frame's body that is at `point`; Wang & Wang (2019), eqs. (23), (24)."""
     arm = sub(point, frame.origin)
     return add(frame.velocity, cross(frame.omega, arm))
 
 
 @kernel
 def tangential(normal, v):
-    """The part of v normal to `normal`."""
+    """The part of v normal to `normal`; Wang & Wang (2019), eqs. (23), (24)."""
     return sub(v, scale(dot(normal, v), normal))
 
 
@@ -136,7 +136,7 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
 
     @kernel
     def forces(d, c, axis, turning):
-        """Forces of a closed contact, on both bodies, and their powers."""
+        """Forces of a closed contact, on both bodies, and their powers; Wang & Wang (2019), eqs. (23), (24)."""
         contact, touch = d.contacts[c], d.touch[c]
         f_n = normal_force(d, c)
         p_WQ = add(d.site_frames[contact.inner].origin, scale(d.contact_numbers[c].radius, axis))

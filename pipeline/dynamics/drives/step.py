@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces, polynomials
 
 
 def pieces(law: Step, dimension: str) -> Pieces:
-    """Pieces between all starts and ends."""
+    """Pieces between all starts and ends; Wang & Wang (2019), eq. (35)."""
     breaks = sorted({*law.start, *law.end})
     starts = [breaks[0] - 1.0, *breaks]
     changes = [quantity(change, dimension) for change in law.change]

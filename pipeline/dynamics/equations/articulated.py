@@ -20,7 +20,6 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
@@ -286,7 +285,7 @@ def drive_forces(d):
     """Forces that the prescribed coordinates need: what their joints transmit at the accelerations in DU."""
     if d.n_drives == 0:
         return
-    transmit(d, d.h[m.DU], 1.0)
+    transmit(d, d.at_du, 1.0)
     for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
         if link.c0 >= d.nv:

@@ -28,7 +28,7 @@ SINGULAR_PIVOT = 1e-13
 
 @kernel
 def rows(d, c):
-    """Wrenches, residuals [m or -], their rates, and acceleration biases of closure c."""
+    """Wrenches, residuals [m or -], rates and acceleration biases of closure c; Wang & Wang (2019), eqs. (30), (31)."""
     closure = d.closures[c]
     a, b = d.site_frames[closure.site_a], d.site_frames[closure.site_b]
     A, B, omega_a, omega_b, p_b = a.axes, b.axes, a.omega, b.omega, b.origin
@@ -138,9 +138,9 @@ def couple_all(d):
         couple(d, p)
     for r in range(d.n_kept_rows):
         d.row_scale[d.n_closure_rows + r] = d.schur[d.closure_envelope[r].origin + r]
-    sound = factor(d.h, d.h[m.CLOSURE_ENVELOPE.place], d.w, d.h[m.SCHUR], d.n_kept_rows, SINGULAR_PIVOT)
+    sound = factor(d.h, d.at_closure_envelope, d.w, d.at_schur, d.n_kept_rows, SINGULAR_PIVOT)
     pivot = independence(d) if sound else 0.0
-    d.pivot[m.LAST_PIVOT] = pivot
+    d.last_pivot = pivot
     d.evaluation = m.OK if pivot > SINGULAR_PIVOT else m.SINGULAR
 
 
@@ -193,23 +193,23 @@ def gather_rows(d, values):
 @kernel
 def solve(d):
     """Multipliers from their right-hand side, in place."""
-    forward(d.h, d.h[m.CLOSURE_ENVELOPE.place], d.w, d.h[m.SCHUR], d.n_kept_rows, d.h[m.MULTIPLIER])
-    backward(d.h, d.h[m.CLOSURE_ENVELOPE.place], d.w, d.h[m.SCHUR], d.n_kept_rows, d.h[m.MULTIPLIER])
+    forward(d.h, d.at_closure_envelope, d.w, d.at_schur, d.n_kept_rows, d.at_multiplier)
+    backward(d.h, d.at_closure_envelope, d.w, d.at_schur, d.n_kept_rows, d.at_multiplier)
 
 
 @kernel
 def respond(d):
     """Multipliers of what is asked of the rows (there, in place) and of FORCE, which holds L^-1 f and is completed by
     them: L^-T then gives the accelerations."""
-    take_spread(d, d.h[m.FORCE])
+    take_spread(d, d.at_force)
     solve(d)
-    add_spread(d, d.h[m.FORCE], 1.0)
+    add_spread(d, d.at_force, 1.0)
 
 
 @kernel
 def finish(d):
     """Multipliers of the rows' biases and of FORCE; see `respond`."""
-    gather_rows(d, d.h[m.GAMMA])
+    gather_rows(d, d.at_gamma)
     respond(d)
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.bodies.rigid import carry
 from flexclear.pipeline.dynamics.equations import envelope
@@ -75,13 +74,13 @@ def assemble_mass(d):
 @kernel
 def forward(d, b):
     """L^-1 applied to the generalised forces in w from index b."""
-    envelope.forward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, b)
+    envelope.forward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, b)
 
 
 @kernel
 def backward(d, b):
     """L^-T applied to the vector in w from index b."""
-    envelope.backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, b)
+    envelope.backward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, b)
 
 
 @kernel
@@ -151,10 +150,10 @@ def make_eliminate(flexible: Any = None) -> Callable:
             gather(d, i)
         modal(d)
         assemble_mass(d)
-        sound = envelope.factor(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, MASSLESS_PIVOT)
+        sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, d.nv, MASSLESS_PIVOT)
         for k in range(d.nv):
             d.force[k] = -d.bias[k]
-        forward(d, d.h[m.FORCE])
+        forward(d, d.at_force)
         return sound
 
     return eliminate

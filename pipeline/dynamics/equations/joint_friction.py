@@ -335,16 +335,16 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool, tree: Any
     @kernel
     def solve(d):
         """Accelerations in FORCE from the generalised forces there, and their multipliers."""
-        forward(d, d.h[m.FORCE])
+        forward(d, d.at_force)
         close(d)
-        backward(d, d.h[m.FORCE])
+        backward(d, d.at_force)
 
     @kernel
     def influences(d):
         """Reactions of all joints: of the present accelerations, then of the friction of each bearing alone."""
-        transmit(d, d.h[m.DU], 1.0)
+        transmit(d, d.at_du, 1.0)
         for j in range(d.n_rubbing):
-            reaction(d, j, d.h[m.DU], -1)
+            reaction(d, j, d.at_du, -1)
         for k in range(d.n_kept_rows):
             d.smooth_multiplier[k] = d.multiplier[k]
         for e in range(d.n_bearings):
@@ -352,9 +352,9 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool, tree: Any
                 d.force[k] = 0.0
             load_coordinates(d, e, 1.0)
             solve(d)
-            transmit(d, d.h[m.FORCE], 0.0)
+            transmit(d, d.at_force, 0.0)
             for j in range(d.n_rubbing):
-                reaction(d, j, d.h[m.FORCE], e)
+                reaction(d, j, d.at_force, e)
 
     @kernel
     def joint_friction(d):

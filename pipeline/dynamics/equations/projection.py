@@ -44,7 +44,7 @@ def widest(d, values, solved):
     solved: whether only of the rows that are solved for.  Lengths of an independent mechanism that is smaller than all
     that there is count for more by that much.
     """
-    result, arm = 0.0, d.control[m.LENGTH]
+    result, arm = 0.0, d.length
     for c in range(d.n_closures):
         closure, weight = d.closures[c], d.closure_numbers[c].weight
         for k in range(closure.row0, closure.row0 + (closure.n_kept if solved else closure.n_rows)):
@@ -92,7 +92,7 @@ def make_stiffen(closures: Any) -> Callable:
 
     @kernel
     def stiffen(d):
-        multiply(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv)
+        multiply(d.h, d.at_envelope, d.w, d.at_mass, d.nv)
         for k in range(d.n_flex):
             body = d.flexes[k]
             n, c0 = body.n_modes, body.c0
@@ -102,7 +102,7 @@ def make_stiffen(closures: Any) -> Callable:
                 # without held shapes, shapes are eigenmodes
                 for j in range(0 if i >= body.n_held > 0 else i, i + 1):
                     d.mass[row + j] += SLOWLY**2 * d.interface_data[stiffness + n * i + j].value
-        factor(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, 0.0)
+        factor(d.h, d.at_envelope, d.w, d.at_mass, d.nv, 0.0)
         complete(d)
 
     return stiffen
@@ -140,8 +140,8 @@ def make_projection(
         residual says little about the error behind it, nothing is changed.
         """
         d = data(h, f, w, n)
-        step, used, apart = h[m.CORRECTION], 0, APART * d.control[m.LENGTH]
-        if d.pivot[m.LAST_PIVOT] < BLIND:
+        step, used, apart = d.at_correction, 0, APART * d.length
+        if d.last_pivot < BLIND:
             return 0
         for _ in range(ITERATIONS):
             if open_by(d) <= tolerance:
@@ -151,11 +151,11 @@ def make_projection(
             stiffen(d)
             if d.evaluation != m.OK:
                 return -1
-            correction(d, h[m.RESIDUAL_RATE], step)
+            correction(d, d.at_residual_rate, step)
             to_modes(d, step)
             for k in range(d.nv):
                 w[y + d.nq + k] += w[step + k]
-            correction(d, h[m.RESIDUAL], step)
+            correction(d, d.at_residual, step)
             to_modes(d, step)
             move(d, y, step)
             evaluate(h, f, w, n, t, y, dy)

@@ -125,6 +125,7 @@ def make_rates(
 
     @kernel
     def rates(h, f, w, n, y, dy):
+        """Rates dy of the state y, both places in w; Wang & Wang (2019), eqs. (32), (34)."""
         d = data(h, f, w, n)
         d.state, d.abridged = y, 0
         spread_state(d, y)
@@ -141,7 +142,7 @@ def make_rates(
             d.evaluation = m.NOT_POSITIVE
             return
         close(d)
-        backward(d, h[m.FORCE])
+        backward(d, d.at_force)
         for k in range(d.nv):
             d.du[k] = d.force[k]
         rub(d)

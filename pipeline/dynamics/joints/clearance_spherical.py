@@ -14,6 +14,7 @@ def separation(axes, numbers, p, v):
     """Gap [m], rate of penetration, normal towards the socket, its rate, and the offset that closes the gap.
 
     p, v: offset of the ball's centre from the socket's, its rate as seen from the socket, world axes.
+    Source: Wang & Wang (2019), eqs. (19), (20), (21), (22).
     axes: of the socket, world axes.  numbers: of the contact (CONTACT_NUMBERS).
     """
     distance, rate, normal, turning = radial(p, v)

@@ -11,7 +11,7 @@ from flexclear.pipeline.dynamics.vectors import IDENTITY, ZERO
 
 @kernel
 def motion(w, x, u, S):
-    """Motion of frame G in frame F: x metres along z (see `spherical.motion`)."""
+    """Motion of frame G in frame F: x metres along z (see `spherical.motion`); Wang & Wang (2019), eqs. (30), (31)."""
     for k in range(6):
         w[S + k] = 0.0
     w[S + 5] = 1.0

@@ -19,7 +19,10 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 @kernel
 def coefficient(speed, p):
-    """Mu [-] at the sliding speed [m/s] >= 0; p = (mu_s, mu_d, v_s, v_d, -, -)."""
+    """Mu [-] at the sliding speed [m/s] >= 0; p = (mu_s, mu_d, v_s, v_d, -, -).
+
+    Source: Wang & Wang (2019), eqs. (27), (28), (29).
+    """
     if speed >= p[3]:
         return p[1]
     if speed >= p[2]:

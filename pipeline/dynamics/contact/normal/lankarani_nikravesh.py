@@ -13,7 +13,7 @@ from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
 
 def factor(c_r: float) -> float:
-    """Factor a of the damping for the coefficient of restitution c_r asked for."""
+    """Factor a of the damping for the coefficient of restitution c_r asked for; Wang & Wang (2019), eq. (25)."""
     return 0.75 * (1.0 - c_r**2)
 
 
