@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import os
 import random
-import signal
 import subprocess
 import sys
 import tempfile
@@ -158,7 +157,7 @@ def _folders(folder: Path, environment: dict[str, str]) -> Counter[str]:
     for path in [*cached, *shown, store.root / "cache" / "imports.json"]:
         path.unlink(missing_ok=True)
         path.mkdir()
-        (path / "mine").write_text("stays", encoding="utf-8")
+        (path / "mine").write_text("stays", encoding="utf-8", newline="\n")
         code = _start(["run", SCENE], environment).wait()
         lost = not any(left.read_text(encoding="utf-8") == "stays" for left in path.parent.glob(f"{path.name}*/mine"))
         sound = code == 0 and not lost and _artifacts(store) == before and _shown(store) == "used"
@@ -276,7 +275,7 @@ def _helpers(
             time.sleep(0.01)
         children = system.children(process.pid)
         if children:
-            os.kill(rng.choice(children), signal.SIGKILL)
+            system.kill(rng.choice(children))
         said = process.communicate()[1].decode(errors="replace")
         sound = (
             process.returncode in SAID and "Traceback" not in said and not upkeep.inventory(store, whole=True).damaged

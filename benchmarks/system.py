@@ -5,6 +5,7 @@ Windows has no module `resource`. What needs it refuses there in words (`lacking
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Callable
 from contextlib import suppress
@@ -56,9 +57,15 @@ def children(process: int) -> list[int]:
     numbers: list[int] = []
     for task in Path(f"/proc/{process}/task").glob("*/children"):
         with suppress(OSError):
-            started = map(int, task.read_text().split())
+            started = map(int, task.read_text(encoding="utf-8").split())
             numbers += [n for n in started if b"resource_tracker" not in Path(f"/proc/{n}/cmdline").read_bytes()]
     return numbers
+
+
+def kill(process: int) -> None:
+    """End a process as the system does where memory is full; nothing where it has ended."""
+    with suppress(ProcessLookupError):
+        os.kill(process, signal.SIGKILL)
 
 
 def ended_by(exit_code: int) -> str:

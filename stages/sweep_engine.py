@@ -115,9 +115,11 @@ class Engine:
         journals = [job.journal if keep else None for job in mine]
         try:
             return self.submit(family, families[family], points, alone, journals, abreast)
-        except BrokenProcessPool as error:
+        except (BrokenProcessPool, ConnectionError, EOFError) as error:  # the others: of one killed while it starts
+            if not self.here:
+                raise
             failed: Future[Any] = Future()
-            failed.set_exception(error)
+            failed.set_exception(BrokenProcessPool(str(error)))
             return failed
 
 

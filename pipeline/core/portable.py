@@ -8,8 +8,8 @@ import unicodedata
 #: (https://learn.microsoft.com/windows/win32/fileio/naming-a-file)
 DEVICES = frozenset(["con", "prn", "aux", "nul", *(f"{port}{k}" for port in ("com", "lpt") for k in "0123456789¹²³")])
 
-#: characters that names on Windows cannot have
-FORBIDDEN = '<>:"|?*\\'
+#: characters that names on Windows cannot have; paths written with its own separator are refused in other words
+FORBIDDEN = '<>:"|?*'
 
 
 def folded(name: str) -> str:

@@ -8,10 +8,10 @@ are, what is joined to what, every number, is in four flat arrays that every ker
 - ``w`` (floats): the work space, the integrator's state and stages included;
 - ``n`` (integers): what changes while a run continues.
 
-Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the index in w where a stretch begins,
-``m.LINKS.parent(h, i)`` a field of row i of a wiring table, ``m.LINK_NUMBERS.row(h, i)`` the index of row i of a
-table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.  Python reads the same rows by the
-names of their fields (`named`), and rows of the record by what they hold (`record`).
+Kernels read and write all of it by the names that are declared here (`fields`).  Python reads the same rows by the
+names of their fields (`named`), and rows of the record by what they hold (`record`).  ``h[m.NV]`` is a size,
+``h[m.FORCE]`` the index in w where a stretch begins, ``h[m.LINKS.place]`` that of a table in its array, and
+``m.LINKS.parent`` where a field begins in a row of it.
 
 Flat arrays, because a compiled call costs what its arguments cost, and compilation too.  No two of them overlap in
 memory,
@@ -31,8 +31,8 @@ Modes are in X, U and the state as eigenmodes, in all else that has coordinates 
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from math import prod
 from typing import Any, NamedTuple
@@ -44,7 +44,7 @@ from flexclear.pipeline.core.event_kinds import COMPRESSION as COMPRESSION
 from flexclear.pipeline.core.event_kinds import OPENING as OPENING
 from flexclear.pipeline.core.event_kinds import SLIPPING as SLIPPING
 from flexclear.pipeline.core.event_kinds import STICKING as STICKING
-from flexclear.pipeline.dynamics.kernels import field_reader, kernel, row_reader
+from flexclear.pipeline.dynamics.kernels import kernel
 
 _place = count()
 #: tables in h, f and w, in their order there
@@ -104,34 +104,19 @@ def layout(declared: str) -> Any:
     return kind(**_begins(fields))
 
 
-def _table(array: str, declared: str, access: Callable[[int, int, int], Any]) -> Any:
+def _table(array: str, declared: str) -> Any:
+    """A table: its `place` (index) in the header, `size` of its rows, and where each field begins."""
     (index,), fields = _places(1), _fields(declared)
-    begins = _begins(fields)
-    size = begins.pop("size")
     make: Any = namedtuple
-    kind = make("Table", ["place", "size", "row", *fields])
-    table = kind(index, size, row_reader(index, size), *(access(index, size, begin) for begin in begins.values()))
+    kind = make("Table", ["place", *fields, "size"])
+    table = kind(place=index, **_begins(fields))
     TABLES[array].append(table)
     number = np.int64 if array == "h" else np.float64
     _ROWS[kind] = np.dtype([(name, number, shape) for name, shape in fields.items()])
     return table
 
 
-def wiring(declared: str) -> Any:
-    """A table in h: its `place` (index) in the header, `size` and `row(h, i)` of its rows, and for each field field(h,
-    i)."""
-    return _table("h", declared, field_reader)
-
-
-def numbers(declared: str) -> Any:
-    """A table in f: its `place` (index) in the header, `size` and `row(h, i)` of its rows, and where each field
-    begins."""
-    return _table("f", declared, lambda path, size, begin: begin)
-
-
-def work(declared: str) -> Any:
-    """A table in w, otherwise like `numbers`."""
-    return _table("w", declared, lambda path, size, begin: begin)
+wiring, numbers, work = partial(_table, "h"), partial(_table, "f"), partial(_table, "w")
 
 
 def named(rows: Any, entries: np.ndarray) -> np.ndarray:

@@ -119,6 +119,24 @@ def test_points_that_are_lost_with_a_process_are_run_again():
     assert pool.renewed == 1
 
 
+def test_a_process_that_dies_while_it_starts_is_renewed_as_well():
+    """What was to be written to it is a broken pipe then, not a broken pool."""
+    told, pool = list[int](), Mortal(recovers=True)
+    pool.given = 4  # its own deaths are over
+    submit, refused = pool.submit, [BrokenPipeError(32, "Broken pipe")]
+
+    def broken_once(*given: Any) -> Future[Any]:
+        if pool.given == 6 and refused:
+            raise refused.pop()
+        return submit(*given)
+
+    pool.submit = broken_once  # type: ignore[method-assign]
+    pool.run(told)
+    assert sorted(told) == list(range(40))
+    assert pool.renewed == 1
+    assert not refused
+
+
 def test_processes_that_keep_dying_end_the_sweep_in_words():
     told, pool = list[int](), Mortal(recovers=False)
     with pytest.raises(ResourceError, match="memory full"):

@@ -102,6 +102,32 @@ def test_a_script_without_a_guard_is_not_run_again_by_its_helpers(root: Path, tm
     assert done.stdout.split() == ["once", "2"], done.stderr
 
 
+BROKEN = """
+import sys
+from flexclear.stages import __main__, schema
+def command(options):
+    raise BrokenPipeError(32, "Broken pipe")
+if sys.argv[1] == "helper":
+    schema.command = command
+sys.exit(__main__.main(["schema"]))
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="other systems do not say who reads")
+@pytest.mark.parametrize("whose, code, words", [("helper", 4, "a helper process was killed"), ("reader", 141, "")])
+def test_a_broken_pipe_is_that_of_the_output_or_of_a_helper(root: Path, whose: str, code: int, words: str) -> None:
+    """A helper that was killed while it started ended commands with exit code 141, without a word."""
+    command = [sys.executable, "-c", BROKEN, whose]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    with subprocess.Popen(command, cwd=root, **pipes) as process:
+        if whose == "reader":
+            process.stdout.close()
+        said = process.stderr.read()
+        assert process.wait() == code
+    assert words in said
+    assert "Traceback" not in said
+
+
 @pytest.mark.parametrize("who", ["the idle worker", "the process of the progress"])
 def test_a_helper_that_is_killed_between_two_calls_is_one_sentence(who: str):
     """As by the system where memory is full; before, a traceback or an end without a word."""

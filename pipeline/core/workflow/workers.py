@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
 
+#: what is said of a helper that somebody has killed
+LOST = "a helper process was killed; is the memory full? Finished results are stored: run again to go on"
+
+
 @dataclass(frozen=True)
 class Bell:
     """How workers are asked to stop, and why. deaf: how many have a task that cannot leave anything in good order."""
@@ -83,8 +87,7 @@ def lost() -> Iterator[None]:
     try:
         yield
     except (BrokenProcessPool, EOFError, ConnectionError):
-        text = "a helper process was killed; is the memory full? Finished results are stored: run again to go on"
-        raise ResourceError(text) from None
+        raise ResourceError(LOST) from None
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import choose
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, cross, product, scale, turn
@@ -83,9 +82,9 @@ def make_kinematics(
         The relative twist is S u in the axes of the joint's first frame F, its rate S u' + bias.
         """
         link, base = d.links[i], d.site_frames[i - 1]
-        c0, x = link.c0, d.h[m.X] + link.q0
-        R_FG, p_FG, bias_angular, bias_linear = joint_motion(link.joint, d.w, x, d.h[m.U] + c0, d.h[m.SUBSPACE.place])
-        position_rate(link.joint, d.w, x, d.h[m.U] + c0, d.h[m.POSITION_RATE] + link.q0)
+        c0, x = link.c0, d.at_x + link.q0
+        R_FG, p_FG, bias_angular, bias_linear = joint_motion(link.joint, d.w, x, d.at_u + c0, d.at_subspace)
+        position_rate(link.joint, d.w, x, d.at_u + c0, d.at_position_rate + link.q0)
         F, omega_F, alpha_F = base.axes, base.omega, base.alpha
         arm = turn(F, p_FG)
         p, swing = add(base.origin, arm), cross(omega_F, arm)

@@ -22,6 +22,7 @@ from flexclear.pipeline.dynamics.model.driving import coordinate_of
 from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.plausibility import refuse_missed
 from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroup, Place
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
@@ -195,6 +196,7 @@ class Engine:
 def prepare(model: Model, progress: Progress) -> Engine:
     """The engine of a model, its kernels compiled or fetched from disk; SolverError for a start that cannot
     continue."""
+    refuse_missed(model.mechanism)
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
     if mobility.singular_start and not may_start_singular(model):
