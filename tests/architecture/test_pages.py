@@ -93,14 +93,6 @@ def test_the_way_of_the_data_leads_through_modules_that_exist(root: Path) -> Non
     assert [name for name in names if not exists(root, name)] == []
 
 
-def test_the_sizes_are_about_right(root: Path) -> None:
-    """Within a fifth: a table that is older than that says nothing."""
-    rows = re.findall(r"^\| `([\w/]+)` \| \d* \| (\d+) \|$", section(root), re.MULTILINE)
-    known = {name: sum(len(p.read_text().splitlines()) for p in (root / name).rglob("*.py")) for name, _ in rows}
-    assert {f"pipeline/dynamics/{name}" for name in parts(root) if name.endswith("/")} <= {f"{n}/" for n in known}
-    assert {name: n for name, n in rows if not 0.8 < int(n) / known[name] < 1.25} == {}
-
-
 # Names --------------------------------------------------------------------------------------------------------------
 
 #: what stands in backticks and looks like a file or module of the project, but for names in angles and asterisks
