@@ -203,7 +203,7 @@ def _driven_yoke(run: xr.Dataset, scene: Scene) -> str:
 
 def _rolling(run: xr.Dataset, scene: Scene) -> str:
     moved = run["position"].sel(body="ball").isel(time=-1) - run["position"].sel(body="ball").isel(time=0)
-    turned = float(run["angular_velocity"].sel(body="ball", axis="y")[-1]) * scene.joint["floor"].radius
+    turned = float(run["angular_velocity"].sel(body="ball", axis="y")[-1]) * scene.contacts()["floor"].radius
     slip = 1.0 - turned / float(np.linalg.norm(run["velocity"].sel(body="ball").values[-1]))
     return f"It gets {float(np.linalg.norm(moved)):.2f} m far; it slips by {100 * abs(slip):.2g} %."
 
