@@ -12,10 +12,13 @@ import gc
 import os
 import signal
 import sys
+from collections.abc import Collection
 from importlib import import_module
 from types import FrameType
+from typing import NoReturn
 
-from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, ResourceError, shown
+from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, InputError, ResourceError, shown
+from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.system import plain_output, reader_has_gone
 from flexclear.pipeline.core.workflow import workers
 
@@ -91,6 +94,29 @@ def _as_interrupt(number: int, frame: FrameType | None) -> None:
     handler(number, frame)
 
 
+class Parser(argparse.ArgumentParser):
+    """Answers a misspelt command or option by the nearest one."""
+
+    options: Collection[str] = ()
+
+    def error(self, message: str) -> NoReturn:
+        """Raise InputError with a suggestion where there is one; exit code 2 in any case."""
+        unknown = message.removeprefix("unrecognized arguments: ").split()
+        if unknown[0].startswith("-") and message.startswith("unrecognized"):
+            name = unknown[0].partition("=")[0]
+            raise InputError(name, "there is no such option", suggestion(name, sorted(self.options)))
+        super().error(message)
+
+
+def require_command(name: str) -> None:
+    """InputError for a word that is no command."""
+    if name in COMMANDS or name.startswith("-"):
+        return
+    if name.endswith(".toml"):
+        raise InputError(name, "is no command", f"a command comes first, as in: flexclear check {name}")
+    raise InputError(name, "there is no such command", suggestion(name, COMMANDS))
+
+
 class Version(argparse.Action):
     """Prints the version, which is searched for when it is asked for."""
 
@@ -104,7 +130,9 @@ class Version(argparse.Action):
 
 def parser(arguments: list[str]) -> argparse.ArgumentParser:
     """The command line: one sub-command per verb; the module of the one that `arguments` ask for is imported."""
-    top = argparse.ArgumentParser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
+    if arguments:
+        require_command(arguments[0])
+    top = Parser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
     top.add_argument("--version", action=Version, nargs=0, help="say the version")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     asked = [verb for verb in COMMANDS if verb in arguments[:1]]
@@ -115,6 +143,7 @@ def parser(arguments: list[str]) -> argparse.ArgumentParser:
             module = import_module(f"flexclear.stages.{verb}")
             module.arguments(below)
             below.set_defaults(command=module.command)
+            top.options = [option for action in below._actions for option in action.option_strings]
     return top
 
 

@@ -162,7 +162,7 @@ def _sampling(scene: Scene, own: Setting) -> Iterator[Design]:
     """The scene as it is, and with denser output."""
     interval, plain = scene.output.interval, {"solver": _own(scene, own), **PLAIN}
     yield Design("as it is", "sampling", {"interval": interval}, edited(scene, plain))
-    output = scene.output.model_dump(mode="json", exclude_none=True, exclude={"stress"})
+    output = scene.output.without(scene.output.stress or ())
     finer = edited(scene, {**plain, "output": output | {"interval": interval / FINER_OUTPUT}})
     yield Design("denser output", "sampling", {"interval": interval / FINER_OUTPUT}, finer)
 

@@ -17,7 +17,7 @@ from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
 from flexclear.stages import bundle
-from flexclear.stages.workplace import open_workplace
+from flexclear.stages.workplace import add_options, open_workplace
 
 LIBRARIES = (
     "numpy",
@@ -88,9 +88,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SCENE",
         help="compile now what runs of these scenes call, without running them; without names what most scenes call",
     )
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", help="with --bundle: change a value of the scene"
-    )
+    add_options(parser, "set")
     parser.add_argument("--out", type=Path, metavar="FILE.zip", help="where --bundle writes")
 
 

@@ -16,9 +16,8 @@ from flexclear.stages.workplace import open_workplace
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser)
+    run.scene_arguments(parser, "json")
     parser.add_argument("--to", choices=STAGES, default="post", metavar="STAGE", help="last stage")
-    as_json.json_argument(parser)
 
 
 def command(options: argparse.Namespace) -> None:

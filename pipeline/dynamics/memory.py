@@ -8,10 +8,10 @@ are, what is joined to what, every number, is in four flat arrays that every ker
 - ``w`` (floats): the work space, the integrator's state and stages included;
 - ``n`` (integers): what changes while a run continues.
 
-Kernels import this module as `m`. ``h[m.NV]`` is a size, ``h[m.FORCE]`` the index in w where a stretch begins,
-``m.LINKS.parent(h, i)`` a field of row i of a wiring table, ``m.LINK_NUMBERS.row(h, i)`` the index of row i of a
-table in f or w, and ``m.LINK_NUMBERS.mass`` where a field begins in such a row.  Python reads the same rows by the
-names of their fields (`named`), and rows of the record by what they hold (`record`).
+Kernels read and write all of it by the names that are declared here (`fields`).  Python reads the same rows by the
+names of their fields (`named`), and rows of the record by what they hold (`record`).  ``h[m.NV]`` is a size,
+``h[m.FORCE]`` the index in w where a stretch begins, ``h[m.LINKS.place]`` that of a table in its array, and
+``m.LINKS.parent`` where a field begins in a row of it.
 
 Flat arrays, because a compiled call costs what its arguments cost, and compilation too.  No two of them overlap in
 memory,
@@ -31,8 +31,8 @@ Modes are in X, U and the state as eigenmodes, in all else that has coordinates 
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import count
 from math import prod
 from typing import Any, NamedTuple
@@ -44,7 +44,7 @@ from flexclear.pipeline.core.event_kinds import COMPRESSION as COMPRESSION
 from flexclear.pipeline.core.event_kinds import OPENING as OPENING
 from flexclear.pipeline.core.event_kinds import SLIPPING as SLIPPING
 from flexclear.pipeline.core.event_kinds import STICKING as STICKING
-from flexclear.pipeline.dynamics.kernels import field_reader, kernel, row_reader
+from flexclear.pipeline.dynamics.kernels import kernel
 
 _place = count()
 #: tables in h, f and w, in their order there
@@ -104,34 +104,19 @@ def layout(declared: str) -> Any:
     return kind(**_begins(fields))
 
 
-def _table(array: str, declared: str, access: Callable[[int, int, int], Any]) -> Any:
+def _table(array: str, declared: str) -> Any:
+    """A table: its `place` (index) in the header, `size` of its rows, and where each field begins."""
     (index,), fields = _places(1), _fields(declared)
-    begins = _begins(fields)
-    size = begins.pop("size")
     make: Any = namedtuple
-    kind = make("Table", ["place", "size", "row", *fields])
-    table = kind(index, size, row_reader(index, size), *(access(index, size, begin) for begin in begins.values()))
+    kind = make("Table", ["place", *fields, "size"])
+    table = kind(place=index, **_begins(fields))
     TABLES[array].append(table)
     number = np.int64 if array == "h" else np.float64
     _ROWS[kind] = np.dtype([(name, number, shape) for name, shape in fields.items()])
     return table
 
 
-def wiring(declared: str) -> Any:
-    """A table in h: its `place` (index) in the header, `size` and `row(h, i)` of its rows, and for each field field(h,
-    i)."""
-    return _table("h", declared, field_reader)
-
-
-def numbers(declared: str) -> Any:
-    """A table in f: its `place` (index) in the header, `size` and `row(h, i)` of its rows, and where each field
-    begins."""
-    return _table("f", declared, lambda path, size, begin: begin)
-
-
-def work(declared: str) -> Any:
-    """A table in w, otherwise like `numbers`."""
-    return _table("w", declared, lambda path, size, begin: begin)
+wiring, numbers, work = partial(_table, "h"), partial(_table, "f"), partial(_table, "w")
 
 
 def named(rows: Any, entries: np.ndarray) -> np.ndarray:
@@ -174,8 +159,9 @@ EVALUATE, PROJECT, RETRACT, RATES = ADDRESSES = _places(4)
 
 # Wiring in h ---------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;
-#: component: independent mechanism that it belongs to, -1 of the ground
-LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by component")
+#: component: independent mechanism that it belongs to, -1 of the ground; leaf: whether it carries no other; first:
+#: whether none of its parent's has a larger number
+LINKS = wiring("parent joint q0 c0 n_speeds flex inboard_port carried_by component leaf first")
 SITES = wiring("link port")  # port: or -1
 #: data0: first of its numbers; inboard: whether modes move the inboard frame; coupled: whether modes have common
 #: entries of the mass matrix; n_held: shapes of the interface basis that move no frame, its first ones; basis0,
@@ -193,14 +179,16 @@ KNOWN_PAIRS = wiring("momentum column drive coordinate")
 #: rows of the mass matrix. first: column; origin: index of column 0, which may lie before that of the first
 ENVELOPE = wiring("first origin")
 #: threes: of rows that are solved for, which are adjacent in JACOBIAN and SPREAD and are worked on together; the
-#: last of them may end with zeros.  coupling: that this closure is, or -1
+#: last of them may end with zeros.  coupling: that this closure is, or -1; path0, n_path: of its links in PATHS
 CLOSURES = wiring(
-    "site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept threes coupling"
+    "site_a site_b row0 n_rows support0 n_support jacobian0 entry0 n_entries kept0 n_kept threes coupling path0 n_path"
 )
 CLOSURE_ROWS = wiring("kind a b")  # (0, i, 0): along axis i of frame A; (1, k, l): axis k of A against axis l of B
 SUPPORT = wiring("coordinate")  # coordinates on which a closure depends
 ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a coupling, 1 of its first joint
 KNOWN_ENTRIES = wiring("closure drive column sign part")
+#: links between the ground and a closure's ends, leaves first; slot: of the first coordinate of the link's joint, or -1
+PATHS = wiring("link slot")
 COUPLINGS = wiring("first second")  # gauges of two joint coordinates, of which the second follows the first
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
@@ -282,6 +270,17 @@ SUBSPACE = work("angular:3 linear:3")
 OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")
 COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
+#: of each link, about its origin, which arm leads to from its parent's: what it offers to its parent, inertia as
+#: (turning mixed; mixed^T moving) of twists to wrenches; a wrench; an acceleration; mass, first and polar moment of
+#: all beyond; the wrench that its own accelerations need (`equations.articulated`)
+ARTICULATED = work(
+    "turning:6 mixed:3x3 moving:6 moment:3 force:3 angular:3 linear:3 arm:3 mass centre:3 polar own_moment:3 "
+    "own_force:3"
+)
+#: of three closure rows at once: what a link transmits to its parent, a column each
+TRANSMITTED = work("moments:3x3 forces:3x3")
+#: of each coordinate: its column about its link's origin, and the factor's K
+LOCAL, GAIN = work("angular:3 linear:3"), work("moment:3 force:3")
 #: MODAL: P (9n), V (9n), forces on the modes (n), and their spin (3n) as eigenmodes and in the interface basis
 BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _named(
     STRETCHES, "bias modal_bias modal scratch mass force residual residual_rate gamma"

@@ -130,7 +130,7 @@ EFFECTS = {
     "friction": ("modified_coulomb", "flexclear.pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("flexible_bodies", "flexclear.pipeline.dynamics.bodies.flexible"),
     "closures": ("closures=", "flexclear.pipeline.dynamics.equations.closures"),
-    "couplings": ("closures=couplings", "flexclear.pipeline.dynamics.equations.couplings"),
+    "couplings": ("make_coupled_closing", "flexclear.pipeline.dynamics.equations.couplings"),
     "stops": ("make_stops", "flexclear.pipeline.dynamics.contact.stops"),
     "stiffening": ("import shortening", "flexclear.pipeline.dynamics.bodies.shortening"),
     "loads": ("make_loads", "flexclear.pipeline.dynamics.loads.composing"),

@@ -85,7 +85,8 @@ def test_compiled_kernels_do_as_interpreted_ones() -> None:
     for a, b, before in zip(plain, coded, arrays(), strict=True):
         np.testing.assert_array_equal(a, b)
         assert (a is plain[2] or a is plain[3]) != np.array_equal(a, before)
-    assert plain[3][m.EVALUATION] == m.LINKS.joint.py_func(plain[0], 2)
+    links = m.named(m.LINKS, plain[0][plain[0][m.LINKS.place] :][: ROWS * m.LINKS.size])
+    assert plain[3][m.EVALUATION] == links["joint"][2]
 
 
 def test_a_name_that_nothing_declares_is_an_error_of_the_compiler() -> None:

@@ -45,6 +45,7 @@ def _of_bearings(mechanism: Mechanism) -> Iterator[Guard]:
     """Of ideal joints: speeds, sliding that reverses under a law with bristles, and what presses that reverses."""
     bearing = 0
     for name, joint in mechanism.scene.rubbing().items():
+        assert joint.friction is not None
         law = lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
         for _ in BEARINGS[joint.type]:
             row = bearing * m.BENDS.size
