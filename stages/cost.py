@@ -48,20 +48,13 @@ FIGURES = {
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser)
+    run.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
-    as_json.json_argument(parser)
     parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn next to ours")
     parser.add_argument(
         "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all)"
     )
     parser.add_argument("--models", action="store_true", help="also other meshes, mode sets and beam theories")
-    parser.add_argument(
-        "--budget",
-        metavar="TIME",
-        default=f"{BUDGET:g}s",
-        help=f"processor time that the runs may take, such as 10s, 2min or 1h (default {BUDGET:g}s)",
-    )
 
 
 def command(options: argparse.Namespace) -> None:

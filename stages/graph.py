@@ -68,7 +68,7 @@ class Graph:
                 "flexclear.stages.s1_mesh:run",
                 s1_mesh.params(Path(recipe), self.recipe),
                 modules=s1_mesh.modules(Path(recipe)),
-                context={"folder": str(Path(recipe).parent.resolve())},
+                context={"folder": str(Path(recipe).parent.resolve()), "file": recipe},
             )
             for body, recipe in self.scene.recipes().items()
         }

@@ -45,6 +45,13 @@ def at6(a, i):
 
 
 @kernel
+def put6(a, i, s):
+    """Store a symmetric matrix (xx, yy, zz, xy, xz, yz) from index i."""
+    put(a, i, (s[0], s[1], s[2]))
+    put(a, i + 3, (s[3], s[4], s[5]))
+
+
+@kernel
 def dot6(a, i, b, j):
     """Product of the six-vectors stored from i in a and from j in b."""
     first = a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
@@ -56,6 +63,22 @@ def dot6(a, i, b, j):
 def add(a, b):
     """A + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@kernel
+def add6(a, b):
+    """Return a + b of symmetric matrices."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
+
+
+@kernel
+def add9(a, b):
+    """Return a + b of matrices."""
+    return (
+        *(a[0] + b[0], a[1] + b[1], a[2] + b[2]),
+        *(a[3] + b[3], a[4] + b[4], a[5] + b[5]),
+        *(a[6] + b[6], a[7] + b[7], a[8] + b[8]),
+    )
 
 
 @kernel

@@ -159,9 +159,13 @@ def scene_name(path: Path) -> str:
         raise InputError(shown(str(path)), "is no name for a scene: results go into a folder of that name", "rename it")
     if "scenes" in whole.parts[:-1]:
         last = len(whole.parts) - 1 - whole.parts[::-1].index("scenes")
-        return "/".join(whole.parts[last + 1 :])
-    here = Path.cwd()
-    return whole.relative_to(here).as_posix() if whole.is_relative_to(here) else whole.name
+        parts = whole.parts[last + 1 :]
+    else:
+        here = Path.cwd()
+        parts = whole.relative_to(here).parts if whole.is_relative_to(here) else (whole.name,)
+    for reason in filter(None, map(portable.unfit, parts)):
+        raise InputError(shown(str(path)), f"{reason}: results go into a folder of that name", "rename it")
+    return "/".join(parts)
 
 
 def _resolved(path: Path) -> Path:

@@ -15,7 +15,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies.interface import all_in_interface, deform, modal_rates
 from flexclear.pipeline.dynamics.bodies.modal_terms import (
     RATE,
@@ -152,7 +151,7 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
         body = d.flexes[k]
         n, c0, bias = body.n_modes, body.c0, 18 * body.n_modes
         T = bias + 4 * n
-        all_in_interface(d, k, d.h[m.MODAL] + bias, d.h[m.MODAL_BIAS] + c0, d.h[m.MODAL] + T)
+        all_in_interface(d, k, d.at_modal + bias, d.at_modal_bias + c0, d.at_modal + T)
         for j in range(n):
             drawn = first_moment(d, k, j, d.x, body.q0)  # if not zero, shapes are eigenmodes
             C = of_mode(d.interface_data, body.interface0, n, j)

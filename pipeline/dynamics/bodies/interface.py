@@ -14,7 +14,6 @@ Source: Craig & Bampton (1968), AIAA Journal 6, 1313-1319 (held shapes are fixed
 
 from __future__ import annotations
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, scale
 
@@ -79,7 +78,7 @@ def to_interface(d, b):
     """What w holds of each coordinate from place b on, modes as eigenmodes: now in the interface basis."""
     for k in range(d.n_flex):
         place = b + d.flexes[k].c0
-        in_interface(d, k, place, d.h[m.MODAL])
+        in_interface(d, k, place, d.at_modal)
         for j in range(d.flexes[k].n_modes):
             d.w[place + j] = d.modal[j]
 
@@ -89,7 +88,7 @@ def to_modes(d, b):
     """What w holds of each coordinate from place b on, modes in the interface basis: now as eigenmodes."""
     for k in range(d.n_flex):
         place = b + d.flexes[k].c0
-        in_modes(d, k, place, d.h[m.MODAL])
+        in_modes(d, k, place, d.at_modal)
         for j in range(d.flexes[k].n_modes):
             d.w[place + j] = d.modal[j]
 
@@ -99,4 +98,4 @@ def modal_rates(d, dy):
     """Accelerations of the eigenmodes into the rates dy of the state, from DU."""
     for k in range(d.n_flex):
         c0 = d.flexes[k].c0
-        in_modes(d, k, d.h[m.DU] + c0, dy + d.nq + c0)
+        in_modes(d, k, d.at_du + c0, dy + d.nq + c0)

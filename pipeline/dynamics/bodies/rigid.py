@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
+    ZERO,
     add,
     add_wrench,
     at6,
@@ -30,22 +31,40 @@ def spatial(own, mass, c, J):
 
 
 @kernel
-def inertia(d, i):
-    """Spatial inertia of link i (OWN) and the wrench on it (moment about the origin, force).
+def demand(d, i):
+    """Return mass of link i, its centre from its origin, inertia about the centre, and the moment there and force.
 
-    The wrench is what the accelerations now in its frame need, gravity being an acceleration of
-    the ground.
+    World axes.  Moment and force are what the accelerations now in its frame need, gravity being an acceleration of the
+    ground.
     """
-    frame, link, wrench = d.link_frames[i], d.link_numbers[i], d.wrench[i]
+    frame, link = d.link_frames[i], d.link_numbers[i]
     R, omega, alpha, mass = frame.axes, frame.omega, frame.alpha, link.mass
     arm = turn(R, link.com)
-    c = add(frame.origin, arm)
     J = congruence(R, at6(link.inertia, 0))
-    spatial(d.own[i], mass, c, J)
     a = add(frame.acceleration, add(cross(alpha, arm), cross(omega, cross(omega, arm))))
-    force = scale(mass, a)
-    moment = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega)))
+    return mass, arm, J, add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega))), scale(mass, a)
+
+
+@kernel
+def inertia(d, i):
+    """Spatial inertia of link i and the wrench on it, about the kernels' origin (OWN, WRENCH)."""
+    mass, arm, J, moment, force = demand(d, i)
+    c, wrench = add(d.link_frames[i].origin, arm), d.wrench[i]
+    spatial(d.own[i], mass, c, J)
     wrench.moment, wrench.force = add(moment, cross(c, force)), force
+
+
+@kernel
+def inertia_about_itself(d, i):
+    """The same about the link's origin (OWN, ARTICULATED): far from the kernels' origin both lose digits there.
+
+    The wrench about the kernels' origin is then that of all else that acts on the link.
+    """
+    mass, arm, J, moment, force = demand(d, i)
+    wrench, body = d.wrench[i], d.articulated[i]
+    spatial(d.own[i], mass, arm, J)
+    body.own_moment, body.own_force = add(moment, cross(arm, force)), force
+    wrench.moment, wrench.force = ZERO, ZERO
 
 
 @kernel

@@ -81,9 +81,9 @@ def evaluate(h, f, w, n, t, y, dy):
 
 
 @kernel
-def rates(h, f, w, n, t, y, dy):
+def rates(d, t, y, dy):
     """The right-hand side of which steps need only the rates."""
-    call(h[m.RATES], (h, f, w, n, float(t), y, dy))
+    call(d.h[m.RATES], (d.h, d.f, d.w, d.n, float(t), y, dy))
 
 
 @kernel
@@ -93,6 +93,6 @@ def project(h, f, w, n, t, y, dy, tolerance):
 
 
 @kernel
-def retract(h, f, w, n, y, retractment, out, total):
+def retract(d, y, retractment, out, total):
     """Positions after a retractment: `equations.retraction`."""
-    call(h[m.RETRACT], (h, f, w, n, y, retractment, out, total))
+    call(d.h[m.RETRACT], (d.h, d.f, d.w, d.n, y, retractment, out, total))

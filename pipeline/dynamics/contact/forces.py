@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies.rigid import apply_wrench
 from flexclear.pipeline.dynamics.choice import choose
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import ZERO, add, at, cross, dot, put, scale, sub, turn, turn_back
+from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at6, cross, dot, put, scale, sub, turn, turn_back
 
 
 @kernel
@@ -80,7 +80,7 @@ def rubbing(traction: Callable) -> Callable:
         axes, z = outer.axes, ZERO
         if contact.bristle >= 0:
             z = tangential(normal, turn(axes, at(d.w, d.state + contact.bristle)))
-        force, loss, bent, z_rate = traction(contact.friction, z, slip, f_n, numbers.friction_law)
+        force, loss, bent, z_rate = traction(contact.friction, z, slip, f_n, at6(numbers.friction_law, 0))
         if contact.bristle >= 0:
             bristle_rate(d, c, axes, normal, turning, z, z_rate)
         touch.friction_power, touch.bent, touch.slip = -loss, bent, np.sqrt(dot(slip, slip))
@@ -148,7 +148,7 @@ def make_contacts(surfaces: tuple[Any, ...], forms: tuple[Any, ...], frictions: 
     @kernel
     def contact(d, c):
         axis, turning = measure(d, c)
-        if d.n[d.mode + c] == 1:
+        if d.mode[c] == 1:
             forces(d, c, axis, turning)
 
     @kernel

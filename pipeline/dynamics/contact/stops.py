@@ -30,7 +30,7 @@ def make_stops(forms: tuple[Any, ...]) -> Callable:
         touch.gap, touch.rate, touch.normal_force, touch.friction_power = gap, sense * rate, 0.0, 0.0
         touch.damping_power, touch.stored, touch.bent, touch.slip = 0.0, 0.0, 0.0, 0.0
         touch.force, touch.offset, touch.point = ZERO, (numbers.clearance - gap, 0.0, 0.0), ZERO
-        if d.n[d.mode + c] == 1:
+        if d.mode[c] == 1:
             size = -sense * normal_force(d, c)
             touch.force = scale(size, force)
             apply_wrench(d, contact.inner, scale(size, moment), scale(size, force))

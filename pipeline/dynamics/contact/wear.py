@@ -34,7 +34,7 @@ def wearing(contacts: Callable) -> Callable:
 
     @kernel
     def wear_if_closed(d, k):
-        if d.n[d.mode + d.worn[k].contact] == 1:
+        if d.mode[d.worn[k].contact] == 1:
             wear(d, k)
 
     @kernel

@@ -14,10 +14,13 @@ rows of a closure come first among its rows, the residuals of all are known (`as
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.envelope import backward, factor, forward
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import ZERO, accumulate, add, at, axis, cross, dot, dot_wrench, put, scale, sub
+from flexclear.pipeline.dynamics.vectors import ZERO, accumulate, add, at, axis, cross, dot, dot_wrench, scale, sub
 
 #: pivots of J M^-1 J^T below this share of their diagonal mean a singular configuration
 SINGULAR_PIVOT = 1e-13
@@ -98,23 +101,6 @@ def jacobian(d, c):
 
 
 @kernel
-def spread(d, c):
-    """L^-1 J^T of closure c, laid out like J^T."""
-    closure = d.closures[c]
-    for t in range(closure.threes):
-        start = three(closure, t)
-        for a in range(closure.n_support):
-            i = d.support[closure.support0 + a].coordinate
-            first, row, value = d.envelope[i].first, d.envelope[i].origin, at(d.jacobian, start + 3 * a)
-            for b in range(a - 1, -1, -1):
-                k = d.support[closure.support0 + b].coordinate
-                if k < first:
-                    break  # in increasing order
-                value = sub(value, scale(d.mass[row + k], at(d.spread, start + 3 * b)))
-            put(d.spread, start + 3 * a, scale(d.mass[row + i], value))
-
-
-@kernel
 def put_couplings(d, row, column, values, count):
     """The first `count` of three entries of J M^-1 J^T."""
     put_some(d.schur, d.closure_envelope[row].origin + column, values, count)
@@ -144,10 +130,8 @@ def couple(d, p):
 
 
 @kernel
-def complete(d):
-    """The factor of J M^-1 J^T, of Jacobians that are there; needs the factor of M."""
-    for c in range(d.n_closures):
-        spread(d, c)
+def couple_all(d):
+    """The factor of J M^-1 J^T, from L^-1 J^T."""
     for k in range(d.schur_size):
         d.schur[k] = 0.0
     for p in range(d.n_closure_pairs):
@@ -230,14 +214,11 @@ def finish(d):
 
 
 @kernel
-def close(d):
-    """Rows, Jacobians and multipliers of all closures; see `finish`."""
+def locate(d):
+    """Rows and Jacobians of all closures."""
     for c in range(d.n_closures):
         rows(d, c)
         jacobian(d, c)
-    complete(d)
-    if d.evaluation == m.OK:
-        finish(d)
 
 
 @kernel
@@ -260,15 +241,48 @@ def known_forces(d):
         take_share(d, e, d.closures[d.known_entries[e].closure].row0)
 
 
-@kernel
-def correction(d, residual, step):
-    """The least correction of the coordinates, in the metric of M, that undoes a residual.
+class Closing(NamedTuple):
+    """Kernels of all closures.
 
-    step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both places in w, with the factors of `complete`.
+    close(d): rows, Jacobians and multipliers, see `finish`.  complete(d): the factor of J M^-1 J^T, of Jacobians that
+    are there; needs the factor of M.  correction(d, residual, step): step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both
+    indices in w, with the factors of `complete`: the least correction of the coordinates, in the metric of M, that
+    undoes a residual.  known_forces(d): takes the closures' fraction out of the forces that the drives must supply.
     """
-    gather_rows(d, residual)
-    solve(d)
-    for k in range(d.nv):
-        d.w[step + k] = 0.0
-    add_spread(d, step, -1.0)
-    backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, step)
+
+    close: Callable
+    complete: Callable
+    correction: Callable
+    known_forces: Callable
+
+
+def make_closing(tree: Any, locate: Callable = locate, known_forces: Callable = known_forces) -> Closing:
+    """Return the kernels of all closures.
+
+    tree: what factors the mass matrix, the module `articulated` or `composite`.  locate: fills rows and Jacobians.
+    """
+    spread, tree_backward = tree.spread, tree.backward
+
+    @kernel
+    def complete(d):
+        for c in range(d.n_closures):
+            spread(d, c)
+        couple_all(d)
+
+    @kernel
+    def close(d):
+        locate(d)
+        complete(d)
+        if d.evaluation == m.OK:
+            finish(d)
+
+    @kernel
+    def correction(d, residual, step):
+        gather_rows(d, residual)
+        solve(d)
+        for k in range(d.nv):
+            d.w[step + k] = 0.0
+        add_spread(d, step, -1.0)
+        tree_backward(d, step)
+
+    return Closing(close, complete, correction, known_forces)

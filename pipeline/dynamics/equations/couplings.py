@@ -8,14 +8,12 @@ A coupling is one row whose wrench on the second joint is that of a unit force a
 
 from __future__ import annotations
 
-from flexclear.pipeline.dynamics import memory as m
+from typing import Any
+
 from flexclear.pipeline.dynamics.equations import closures
-from flexclear.pipeline.dynamics.equations.closures import complete, finish
 from flexclear.pipeline.dynamics.gauge import bias, counted
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import add_wrench, dot_wrench, scale
-
-correction = closures.correction
 
 
 @kernel
@@ -55,8 +53,8 @@ def jacobian(d, c):
 
 
 @kernel
-def close(d):
-    """See `closures.close`."""
+def locate(d):
+    """Rows and Jacobians of all closures."""
     for c in range(d.n_closures):
         if d.closures[c].coupling < 0:
             closures.rows(d, c)
@@ -64,9 +62,6 @@ def close(d):
         else:
             row(d, c)
             jacobian(d, c)
-    complete(d)
-    if d.evaluation == m.OK:
-        finish(d)
 
 
 @kernel
@@ -91,3 +86,8 @@ def take_off_first_joints(d):
             a, b = d.wrench[d.sites[gauge.a].link], d.wrench[d.sites[gauge.b].link]
             add_wrench(b, scale(-size, wrench.moment), scale(-size, wrench.force))
             add_wrench(a, scale(size, wrench.moment), scale(size, wrench.force))
+
+
+def make_coupled_closing(tree: Any) -> closures.Closing:
+    """Return the kernels of all closures, couplings among them; see `closures.make_closing`."""
+    return closures.make_closing(tree, locate, known_forces)

@@ -28,13 +28,13 @@ reactions); Leine, Brogliato & Nijmeijer (2002), European Journal of Mechanics A
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import choose
 from flexclear.pipeline.dynamics.equations.closures import respond
-from flexclear.pipeline.dynamics.equations.envelope import backward, forward
 from flexclear.pipeline.dynamics.joints.bearings import BALL, PIN, SLIDER
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
@@ -43,7 +43,6 @@ from flexclear.pipeline.dynamics.vectors import (
     add,
     add_wrench,
     at,
-    at6,
     axis,
     cross,
     dot,
@@ -52,7 +51,6 @@ from flexclear.pipeline.dynamics.vectors import (
     sub,
     turn,
     turn_back,
-    turn_symmetric,
 )
 
 #: Newton's iterations for the loads; the change of a load, as share of the largest, at which they end, and below which
@@ -120,20 +118,16 @@ def make_unit_wrench(traction: Callable) -> Callable:
 
 
 @kernel
-def tree_response(d):
-    """Accelerations in FORCE from the generalised forces there; no loop is closed."""
-    forward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
-    backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
+def no_loops(d):
+    """No loop is closed."""
 
 
 @kernel
-def closed_response(d):
-    """Accelerations in FORCE from the generalised forces there, and their multipliers; loops stay closed."""
-    forward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
+def keep_closed(d):
+    """Let loops stay closed: complete FORCE, which holds L^-1 f, by multipliers."""
     for k in range(d.n_kept_rows):
         d.multiplier[k] = 0.0
     respond(d)
-    backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
 
 
 @kernel
@@ -164,53 +158,37 @@ def closure_wrench(d, c, part):
     return moment, force
 
 
-@kernel
-def demand(d, j, acceleration):
-    """What the links beyond joint j need through it for accelerations of the free coordinates (place in w)."""
-    joint, moment, force, angular, linear = d.rubbing[j], ZERO, ZERO, ZERO, ZERO
-    for k in range(joint.momentum0, joint.momentum0 + joint.n_momenta):
-        term = d.reaction_terms[k]
-        momentum, size = d.momenta[term.column], d.w[acceleration + term.coordinate]
-        moment, force = add(moment, scale(size, momentum.angular)), add(force, scale(size, momentum.linear))
-    for k in range(joint.column0, joint.column0 + joint.n_columns):
-        term = d.reaction_terms[k]
-        column, size = d.columns[term.column], d.w[acceleration + term.coordinate]
-        angular, linear = add(angular, scale(size, column.angular)), add(linear, scale(size, column.linear))
-    tree = d.inertia[joint.link]
-    centre = tree.moment
-    turned = add(turn_symmetric(at6(tree.inertia, 0), angular), cross(centre, linear))
-    moved = add(scale(tree.mass, linear), cross(angular, centre))
-    return add(moment, turned), add(force, moved)
+def make_reaction(demand: Callable) -> Callable:
+    """The kernel reaction(d, j, acceleration, bearing) that writes the reaction of joint j to REACTIONS.
 
-
-@kernel
-def reaction(d, j, acceleration, bearing):
-    """Write the reaction of joint j at these accelerations and the present multipliers to REACTIONS.
-
-    bearing: -1 for all but friction, else the friction alone of that bearing, of unit normal force.
+    At the accelerations in w from index `acceleration` and the present multipliers.  bearing: -1 for all but friction,
+    else the friction alone of that bearing, of unit normal force.  demand: of what factors the mass matrix.
     """
-    joint = d.rubbing[j]
-    rubbed = d.rubbing[d.bearings[bearing].joint].closure if bearing >= 0 else -1
-    if joint.closure >= 0:
-        moment, force = closure_wrench(d, joint.closure, 0)
-        if rubbed == joint.closure:
-            moment = add(moment, d.bearing[bearing].unit_moment)
-            force = add(force, d.bearing[bearing].unit_force)
-    else:
-        moment, force = demand(d, j, acceleration)
-        if bearing < 0:
-            moment, force = add(moment, d.wrench[joint.link].moment), add(force, d.wrench[joint.link].force)
-        for k in range(joint.loop0, joint.loop0 + joint.n_loops):
-            loop = d.reaction_loops[k]
-            sign, (around, along) = -1.0 * loop.sign, closure_wrench(d, loop.closure, loop.part)
-            if rubbed == loop.closure and loop.part == 0:
-                around = add(around, d.bearing[bearing].unit_moment)
-                along = add(along, d.bearing[bearing].unit_force)
-            moment, force = add(moment, scale(sign, around)), add(force, scale(sign, along))
-        if joint.reversed:
-            moment, force = scale(-1.0, moment), scale(-1.0, force)
-    reacted = d.reactions[j * (1 + d.n_bearings) + 1 + bearing]
-    reacted.moment, reacted.force = sub(moment, cross(d.site_frames[joint.site_b].origin, force)), force
+
+    @kernel
+    def reaction(d, j, acceleration, bearing):
+        joint = d.rubbing[j]
+        rubbed = d.rubbing[d.bearings[bearing].joint].closure if bearing >= 0 else -1
+        if joint.closure >= 0:
+            moment, force = closure_wrench(d, joint.closure, 0)
+            if rubbed == joint.closure:
+                moment = add(moment, d.bearing[bearing].unit_moment)
+                force = add(force, d.bearing[bearing].unit_force)
+        else:
+            moment, force = demand(d, j, acceleration, 1.0 if bearing < 0 else 0.0)
+            for k in range(joint.loop0, joint.loop0 + joint.n_loops):
+                loop = d.reaction_loops[k]
+                sign, (around, along) = -1.0 * loop.sign, closure_wrench(d, loop.closure, loop.part)
+                if rubbed == loop.closure and loop.part == 0:
+                    around = add(around, d.bearing[bearing].unit_moment)
+                    along = add(along, d.bearing[bearing].unit_force)
+                moment, force = add(moment, scale(sign, around)), add(force, scale(sign, along))
+            if joint.reversed:
+                moment, force = scale(-1.0, moment), scale(-1.0, force)
+        reacted = d.reactions[j * (1 + d.n_bearings) + 1 + bearing]
+        reacted.moment, reacted.force = sub(moment, cross(d.site_frames[joint.site_b].origin, force)), force
+
+    return reaction
 
 
 @kernel
@@ -344,18 +322,27 @@ def find_loads(d):
     return found
 
 
-def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callable:
+def make_joint_friction(tractions: tuple[Callable, ...], closed: bool, tree: Any) -> Callable:
     """The kernel joint_friction(d): accelerations, multipliers and ledger, completed by friction in joints.
 
     To be called when accelerations and multipliers are there, before the drives' forces are.  tractions: kernels of the
-    laws present (`contact.friction`).  closed: whether there are closures.
+    laws present (`contact.friction`).  closed: whether there are closures.  tree: what factors the mass matrix, the
+    module `equations.articulated` or `equations.composite`.
     """
-    unit_wrench = make_unit_wrench(choose(tractions))
-    respond = closed_response if closed else tree_response
+    unit_wrench, forward, backward = make_unit_wrench(choose(tractions)), tree.forward, tree.backward
+    close, transmit, reaction = keep_closed if closed else no_loops, tree.transmit, make_reaction(tree.demand)
+
+    @kernel
+    def solve(d):
+        """Accelerations in FORCE from the generalised forces there, and their multipliers."""
+        forward(d, d.h[m.FORCE])
+        close(d)
+        backward(d, d.h[m.FORCE])
 
     @kernel
     def influences(d):
         """Reactions of all joints: of the present accelerations, then of the friction of each bearing alone."""
+        transmit(d, d.h[m.DU], 1.0)
         for j in range(d.n_rubbing):
             reaction(d, j, d.h[m.DU], -1)
         for k in range(d.n_kept_rows):
@@ -364,7 +351,8 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callab
             for k in range(d.nv):
                 d.force[k] = 0.0
             load_coordinates(d, e, 1.0)
-            respond(d)
+            solve(d)
+            transmit(d, d.h[m.FORCE], 0.0)
             for j in range(d.n_rubbing):
                 reaction(d, j, d.h[m.FORCE], e)
 
@@ -384,7 +372,7 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callab
             bearing = d.bearing[e]
             load_coordinates(d, e, bearing.load)
             d.ledger_rate[d.rubbing_slot + d.bearings[e].joint] += bearing.load * bearing.loss
-        respond(d)
+        solve(d)
         for k in range(d.nv):
             d.du[k] += d.force[k]
         for k in range(d.n_kept_rows):

@@ -302,7 +302,7 @@ def make_observation(
     def place(d, t):
         """Positions and speeds of the state in Y."""
         laws(d.h, d.f, d.w, d.n, t)
-        spread_state(d, d.h[m.Y])
+        spread_state(d, d.at_y)
         prescribe(d)
 
     @kernel
@@ -311,21 +311,21 @@ def make_observation(
 
         column: number of columns before them.  frames: whether only those of links and sites.
         """
-        h, known = d.h, d.n_drives
+        known = d.n_drives
         stretches = (
-            (h[m.LINK_FRAMES.place], m.FRAME.size * d.n_links),
-            (h[m.SITE_FRAMES.place], m.FRAME.size * d.n_sites),
-            (h[m.Y], d.ny),
-            (h[m.X], d.nq + known),
-            (h[m.U], d.nv + known),
-            (h[m.SLOPES] + d.nq, d.nv),
-            (h[m.DU] + d.nv, known),
-            (h[m.WRENCH.place], m.WRENCH.size * d.n_links),
-            (h[m.TOUCH.place], m.TOUCH.size * d.n_contacts),
-            (h[m.LOAD.place], m.LOAD.size * d.n_loads),
-            (h[m.BEARING.place], m.BEARING.size * d.n_bearings),
-            (h[m.DRIVE_FORCE], known),
-            (h[m.JACOBIAN], d.jacobian_size),
+            (d.at_link_frames, m.FRAME.size * d.n_links),
+            (d.at_site_frames, m.FRAME.size * d.n_sites),
+            (d.at_y, d.ny),
+            (d.at_x, d.nq + known),
+            (d.at_u, d.nv + known),
+            (d.at_slopes + d.nq, d.nv),
+            (d.at_du + d.nv, known),
+            (d.at_wrench, m.WRENCH.size * d.n_links),
+            (d.at_touch, m.TOUCH.size * d.n_contacts),
+            (d.at_load, m.LOAD.size * d.n_loads),
+            (d.at_bearing, m.BEARING.size * d.n_bearings),
+            (d.at_drive_force, known),
+            (d.at_jacobian, d.jacobian_size),
         )
         for s in range(2 if frames else len(stretches)):  # one loop: several would each be compiled
             first, count = stretches[s]
@@ -354,10 +354,10 @@ def make_observation(
         """State, contacts' modes and pieces of the laws of a row of the record."""
         mode, latched, state = m.record_columns(d.n_contacts)
         for c in range(d.n_contacts):
-            d.n[d.mode + c] = int(row[mode + c])
+            d.mode[c] = int(row[mode + c])
             d.latched[c] = row[latched + c]
         for k in range(d.n_laws):
-            d.n[d.active + k] = pieces[k]
+            d.active[k] = pieces[k]
         for k in range(d.ny):
             d.y[k] = row[state + k]
         return state
@@ -365,9 +365,9 @@ def make_observation(
     @kernel
     def close(d, t, tolerance):
         """Close the loops of the state in Y, which has been evaluated, to `tolerance`."""
-        if d.evaluation == m.OK and project(d.h, d.f, d.w, d.n, t, d.h[m.Y], d.h[m.SLOPES], tolerance) < 0:
+        if d.evaluation == m.OK and project(d.h, d.f, d.w, d.n, t, d.at_y, d.at_slopes, tolerance) < 0:
             d.evaluation = m.NOT_CLOSED
-        if d.evaluation == m.OK and d.n_kept_rows > 0 and d.pivot[m.LAST_PIVOT] < BLIND:
+        if d.evaluation == m.OK and d.n_kept_rows > 0 and d.last_pivot < BLIND:
             d.evaluation = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
         if d.evaluation == m.OK:
             keep_scales(d)
@@ -387,7 +387,7 @@ def make_observation(
                     place(d, rows[r, 0])
                     break
                 foreseen = foreseen and foresee(d, rows, r, state, out, states)
-                evaluate(h, f, w, n, rows[r, 0], h[m.Y], h[m.SLOPES])
+                evaluate(h, f, w, n, rows[r, 0], d.at_y, d.at_slopes)
                 if not foreseen or (d.evaluation == m.OK and open_by(d) <= tolerance):
                     close(d, rows[r, 0], tolerance)
                     break

@@ -35,7 +35,7 @@ def make_laws(harmonics: Callable | None = None) -> Callable:
         """Value, rate and second rate of every law, from its piece in force."""
         d = data(h, f, w, n)
         for k in range(d.n_laws):
-            active = n[d.active + k]
+            active = d.active[k]
             piece, law = d.pieces[active], d.law[k]
             s = t - piece.start
             x, v, a = piece.coefficients[DEGREE], 0.0, 0.0

@@ -86,8 +86,9 @@ def no_modes(d, b):
 def make_stiffen(closures: Any) -> Callable:
     """The kernel stiffen(d): the factors of an evaluation, with the modal stiffness beside the mass.
 
-    closures: the module of that name.
+    closures: kernels of all closures.
     """
+    complete = closures.complete
 
     @kernel
     def stiffen(d):
@@ -102,7 +103,7 @@ def make_stiffen(closures: Any) -> Callable:
                 for j in range(0 if i >= body.n_held > 0 else i, i + 1):
                     d.mass[row + j] += SLOWLY**2 * d.interface_data[stiffness + n * i + j].value
         factor(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, 0.0)
-        closures.complete(d)
+        complete(d)
 
     return stiffen
 
@@ -116,7 +117,7 @@ def make_projection(
 ) -> Callable:
     """The kernel project(h, f, w, n, t, y, dy, tolerance).
 
-    evaluate: the right-hand side.  joints: modules of the joint types.  closures: the module of that name.
+    evaluate: the right-hand side.  joints: modules of the joint types.  closures: kernels of all closures.
     stiffen, to_modes: of `make_stiffen` and of `bodies.interface`, where bodies are flexible.
     """
     position_rates, correction = make_position_rates(joints), closures.correction

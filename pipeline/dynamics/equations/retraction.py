@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import choose
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -24,7 +23,7 @@ def make_position_rates(joints: tuple[Any, ...]) -> Callable:
     def position_rates(d):
         for i in range(1, d.n_links):
             link = d.links[i]
-            x, u, rate = d.h[m.X] + link.q0, d.h[m.U] + link.c0, d.h[m.POSITION_RATE] + link.q0
+            x, u, rate = d.at_x + link.q0, d.at_u + link.c0, d.at_position_rate + link.q0
             joint_rate(link.joint, d.w, x, u, rate)
         for k in range(d.n_flex):
             body = d.flexes[k]

@@ -14,7 +14,12 @@ from flexclear.pipeline.structure.kinds.kind import of_mesh
 
 def build(mesh: xr.Dataset) -> xr.Dataset:
     """Mass [kg], centre of mass [m], inertia about it [kg m^2] and frames of a mesh (schema RIGID), in its frame."""
-    return conform(xr.Dataset(*_rigid(of_mesh(mesh).assemble(mesh))), RIGID, title=_title(mesh))
+    return of_model(of_mesh(mesh).assemble(mesh), mesh.attrs["title"])
+
+
+def of_model(model: Model, title: str) -> xr.Dataset:
+    """The same of an assembled mesh with this title."""
+    return conform(xr.Dataset(*_rigid(model)), RIGID, title=f"Rigid body made of the mesh: {title}")
 
 
 def drawn(mesh: xr.Dataset) -> xr.Dataset:
@@ -30,10 +35,6 @@ def drawn(mesh: xr.Dataset) -> xr.Dataset:
         **shown.variables(),
     }
     return xr.Dataset(data, coordinates)
-
-
-def _title(mesh: xr.Dataset) -> str:
-    return f"Rigid body made of the mesh: {mesh.attrs['title']}"
 
 
 def _rigid(model: Model) -> tuple[dict[str, Any], dict[str, Any]]:
