@@ -110,6 +110,34 @@ def mujoco(loops: int) -> Peer:
     return Peer(evaluate, lambda: data.qacc[hinges].copy())
 
 
+def pinocchio_chain(links: int) -> Peer:
+    """`aba` of an open chain of hinged links (`families.growth.hinged`), bent and moving."""
+    import pinocchio as pin
+
+    model = pin.Model()
+    model.gravity.linear[:] = 0.0, 0.0, GRAVITY
+    rod = pin.Inertia(1.0, np.array([0.5, 0.0, 0.0]), np.diag(np.diag(THIN)[::-1]))
+    joint = 0
+    for k in range(links):
+        place = pin.SE3(np.eye(3), np.array([1.0 if k else 0.0, 0.0, 0.0]))
+        joint = model.addJoint(joint, pin.JointModelRY(), place, f"J{k}")
+        model.appendBodyToJoint(joint, rod, pin.SE3.Identity())
+    data, tau, (q, v) = model.createData(), np.zeros(links), bent(links)
+
+    def evaluate() -> object:
+        return pin.aba(model, data, q, v, tau)
+
+    return Peer(evaluate, lambda: np.asarray(evaluate()).copy())
+
+
+def bent(links: int) -> tuple[np.ndarray, np.ndarray]:
+    """Angles and rates of the hinges of a chain in its state [rad, rad/s]."""
+    number = np.arange(links)
+    return 0.3 * np.sin(number), 0.5 * np.cos(number)
+
+
+#: of open chains, by name
+CHAINS: dict[str, Callable[[int], Peer]] = {"Pinocchio, aba": pinocchio_chain}
 PEERS: dict[str, Callable[[int], Peer]] = {
     "Pinocchio, constraintDynamics": pinocchio,
     "MuJoCo, mj_forward": mujoco,

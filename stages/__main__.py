@@ -10,11 +10,16 @@ import argparse
 import atexit
 import gc
 import os
+import signal
 import sys
+from collections.abc import Collection
 from importlib import import_module
+from types import FrameType
+from typing import NoReturn
 
-from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, ResourceError, shown
-from flexclear.pipeline.core.system import plain_output
+from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, InputError, ResourceError, shown
+from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.system import plain_output, reader_has_gone
 from flexclear.pipeline.core.workflow import workers
 
 CLOSED_PIPE = 141
@@ -50,6 +55,7 @@ def main(arguments: list[str] | None = None) -> int:
     plain_output()
     own = arguments is None  # whether this process is the command's
     if own:
+        signal.signal(signal.SIGTERM, _as_interrupt)
         gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
         # at its end Python searches for garbage in all that there is, several times: a sixth of the time of a short
         # command, half a second where something was compiled; nobody gains by it, since the system takes all back
@@ -69,12 +75,46 @@ def main(arguments: list[str] | None = None) -> int:
         print("\nflexclear: interrupted; finished results are stored", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:
+        if not reader_has_gone():
+            print(f"flexclear: {workers.LOST}", file=sys.stderr)
+            return ResourceError.exit_code
         # the reader (`| head`) has gone; keep the interpreter from complaining about it at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return CLOSED_PIPE
     except (OSError, MemoryError) as error:  # of the machine, and nobody knew better words for it
         print(f"flexclear: {shown(str(error)) or 'there is not enough memory'}", file=sys.stderr)
         return ResourceError.exit_code
+
+
+def _as_interrupt(number: int, frame: FrameType | None) -> None:
+    """Stop as Ctrl-C does: schedulers of clusters and services send SIGTERM, and workers are to end in good order."""
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler):  # of a command in the background, Ctrl-C is ignored
+        raise KeyboardInterrupt
+    handler(number, frame)
+
+
+class Parser(argparse.ArgumentParser):
+    """Answers a misspelt command or option by the nearest one."""
+
+    options: Collection[str] = ()
+
+    def error(self, message: str) -> NoReturn:
+        """Raise InputError with a suggestion where there is one; exit code 2 in any case."""
+        unknown = message.removeprefix("unrecognized arguments: ").split()
+        if unknown[0].startswith("-") and message.startswith("unrecognized"):
+            name = unknown[0].partition("=")[0]
+            raise InputError(name, "there is no such option", suggestion(name, sorted(self.options)))
+        super().error(message)
+
+
+def require_command(name: str) -> None:
+    """InputError for a word that is no command."""
+    if name in COMMANDS or name.startswith("-"):
+        return
+    if name.endswith(".toml"):
+        raise InputError(name, "is no command", f"a command comes first, as in: flexclear check {name}")
+    raise InputError(name, "there is no such command", suggestion(name, COMMANDS))
 
 
 class Version(argparse.Action):
@@ -90,7 +130,9 @@ class Version(argparse.Action):
 
 def parser(arguments: list[str]) -> argparse.ArgumentParser:
     """The command line: one sub-command per verb; the module of the one that `arguments` ask for is imported."""
-    top = argparse.ArgumentParser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
+    if arguments:
+        require_command(arguments[0])
+    top = Parser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
     top.add_argument("--version", action=Version, nargs=0, help="say the version")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     asked = [verb for verb in COMMANDS if verb in arguments[:1]]
@@ -101,6 +143,7 @@ def parser(arguments: list[str]) -> argparse.ArgumentParser:
             module = import_module(f"flexclear.stages.{verb}")
             module.arguments(below)
             below.set_defaults(command=module.command)
+            top.options = [option for action in below._actions for option in action.option_strings]
     return top
 
 

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import math
 from typing import Any
-
-
-def json_argument(parser: argparse.ArgumentParser) -> None:
-    """For scripts: what else is printed, as JSON."""
-    parser.add_argument("--json", action="store_true", help="print the results as JSON")
 
 
 def as_json(value: object) -> str:

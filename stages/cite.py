@@ -18,19 +18,20 @@ from flexclear.pipeline.core.workflow.fingerprint import Sources, imported, pare
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.stages import run
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import open_workplace
+from flexclear.stages.workplace import add_options, open_workplace
 
 INTEGRATE, COMPILE = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.compile"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scene", metavar="SCENE")
+    parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
+    add_options(parser, "set", "said")
 
 
 def command(options: argparse.Namespace) -> None:
     """Print them."""
-    (graph,) = run.graphs([options.scene])
+    (graph,) = run.graphs([options.scene], options.set)
     print(text(graph, open_workplace().sources), end="")
 
 

@@ -12,7 +12,7 @@ from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.ideal import EFFECTS, ideal, loose
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import run
+from flexclear.stages import as_json, run
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace, check, open_workplace
 
@@ -34,7 +34,7 @@ TABLES = ("differences.md", "costs.md")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser)
+    run.scene_arguments(parser, "json")
     parser.add_argument(
         "--ideal",
         nargs="?",
@@ -51,6 +51,9 @@ def command(options: argparse.Namespace) -> None:
     workplace = open_workplace(options)
     scenes = [graph.scene for graph in run.graphs(options.scenes, options.set)]
     comparison = bring(scenes, workplace, options.ideal)
+    if options.json:
+        print(as_json.as_json(comparison.dataset()))
+        return
     print(*(comparison.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")
     run.print_files(
         comparison.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"}
@@ -96,7 +99,7 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
     check(made)
     # their kernels are there now, so that these do not compile side by side what the first ones did
     tight = {
-        label: graph.tighter(int(workplace.store.load(made.records[id(graph.simulate)]).attrs["evaluations"]))
+        label: graph.tighter(workplace.store.load(made.records[id(graph.simulate)]).attrs)
         for label, graph in graphs.items()
         if graph.has_tighter
     }

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.errors import FlexclearError, SolverError
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.solver import of_run
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import as_json, cost_design, cost_peers, kernels, limit, run, s4_simulate
 from flexclear.stages.cost_peers import Track
@@ -47,20 +48,13 @@ FIGURES = {
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser)
+    run.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
-    as_json.json_argument(parser)
     parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn next to ours")
     parser.add_argument(
         "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all)"
     )
     parser.add_argument("--models", action="store_true", help="also other meshes, mode sets and beam theories")
-    parser.add_argument(
-        "--budget",
-        metavar="TIME",
-        default=f"{BUDGET:g}s",
-        help=f"processor time that the runs may take, such as 10s, 2min or 1h (default {BUDGET:g}s)",
-    )
 
 
 def command(options: argparse.Namespace) -> None:
@@ -161,10 +155,7 @@ class Study:
         outcome = self.workplace.bring([graph.simulate])
         check(outcome)
         text = self.workplace.store.load(outcome.records[id(graph.simulate)]).attrs
-        solver = self.scene.solver
-        rtol = float(text.get("accuracy_rtol", solver.rtol))
-        begun = solver.integrator if "switched" in text and not self.scene.by_need() else str(text["method"])
-        return cost_design.Setting(begun, rtol, solver.step)
+        return cost_design.Setting(*of_run(self.scene.solver, self.scene.by_need(), text), self.scene.solver.step)
 
     def task(self) -> Task:
         """The task of the study of all points that there are."""

@@ -9,7 +9,7 @@ from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import run, s4_watched, s8_effects
+from flexclear.stages import as_json, run, s4_watched, s8_effects
 from flexclear.stages.workplace import Workplace, check, open_workplace
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser)
+    run.scene_arguments(parser, "json")
     parser.add_argument(
         "--members",
         type=int,
@@ -33,12 +33,17 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring the tables up to date, print them and say where they are."""
-    workplace = open_workplace(options)
+    workplace, tables = open_workplace(options), dict[str, xr.Dataset]()
     for graph in run.graphs(options.scenes, options.set):
         done, record = bring(graph.scene, workplace, options.members)
+        if options.json:
+            tables[graph.scene.name] = workplace.store.load(record)
+            continue
         folder = workplace.store.root / done.folder
         print(workplace.store.path(done.stage, record.key, "effects.md").read_text(encoding="utf-8"))
         run.print_files(folder, {"index.html": "the page", "effects.nc": "all influences", "effects.png": "the chart"})
+    if options.json:
+        print(as_json.as_json(tables))
 
 
 def bring(scene: Scene, workplace: Workplace, members: int = s4_watched.MEMBERS) -> tuple[Task, Record]:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from importlib.util import find_spec
-from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +12,11 @@ from flexclear.pipeline.core.artifacts.store import write_dataset
 from flexclear.pipeline.core.errors import InputError
 
 if TYPE_CHECKING:
-    import pandas as pd
     import xarray as xr
 
 #: by ending: library that writes it, where that is not installed with this program
 NEEDS = {".nc": "", ".csv": "", ".mat": "", ".parquet": "pyarrow", ".xlsx": "openpyxl"}
+KNOWN = ", ".join(NEEDS)
 
 
 def check_format(target: Path, endings: Sequence[str] = tuple(NEEDS), option: str = "--out") -> None:
@@ -29,33 +28,20 @@ def check_format(target: Path, endings: Sequence[str] = tuple(NEEDS), option: st
         raise InputError(f"{option} {target}", f"needs the library {library}", f"pip install {library}, or write .csv")
 
 
-def write(dataset: xr.Dataset, target: Path) -> None:
-    """Write a dataset: ``.nc`` and ``.mat`` hold all of it, the tables what it has over time."""
+def write(dataset: xr.Dataset, target: Path, rows: Sequence[Hashable] = ("time",)) -> None:
+    """Write a dataset: ``.nc`` and ``.mat`` hold all of it, tables what has the dimensions `rows`."""
     if target.suffix == ".nc":
         write_dataset(target, dataset)
         return
+    from flexclear.pipeline.core.artifacts.table import table
+
     made: dict[str, Callable[[], bytes]] = {
-        ".csv": lambda: table(dataset).to_csv().encode(),
-        ".parquet": lambda: _written(table(dataset).to_parquet),
-        ".xlsx": lambda: _written(table(dataset).to_excel),
+        ".csv": lambda: table(dataset, rows).to_csv().encode(),
+        ".parquet": lambda: _written(table(dataset, rows).to_parquet),
+        ".xlsx": lambda: _written(table(dataset, rows).to_excel),
         ".mat": lambda: _matlab(dataset),
     }
     publish(target, made[target.suffix]())
-
-
-def table(dataset: xr.Dataset) -> pd.DataFrame:
-    """Everything over time, a column per component: ``position platform x [m]``; rows by time [s]."""
-    import pandas as pd
-
-    columns = {}
-    for name, variable in dataset.data_vars.items():
-        if not variable.dims or variable.dims[0] != "time" or not variable.size:
-            continue
-        labels = product(*(variable[dim].values.tolist() for dim in variable.dims[1:]))
-        values = variable.values.reshape(len(variable), -1)
-        for column, label in zip(values.T, labels, strict=True):
-            columns[" ".join(map(str, (name, *label))) + f" [{variable.attrs.get('units', '1')}]"] = column
-    return pd.DataFrame(columns, index=pd.Index(dataset["time"].values, name="time [s]"))
 
 
 def _matlab(dataset: xr.Dataset) -> bytes:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.units import quantity
 from flexclear.stages import as_json, export, run
-from flexclear.stages.workplace import common_arguments, open_workplace
+from flexclear.stages.workplace import add_options, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 NUMBER = "+-.0123456789eE"
 #: speeds of one diagram
 MOST = 10_000
+#: endings of pictures of Campbell diagrams
+PICTURES = (".png", ".svg")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -41,10 +44,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--drive", metavar="NAME", help="with --speeds: the drive, where several move")
     parser.add_argument(
-        "--out", type=Path, action="append", metavar="FILE", help="with --speeds: write .nc, .png or .svg; repeatable"
+        "--out",
+        type=Path,
+        action="append",
+        metavar="FILE",
+        help=f"write the result here: {export.KNOWN}; with --speeds also .png, .svg; repeatable",
     )
-    as_json.json_argument(parser)
-    common_arguments(parser)
+    add_options(parser, "usual", "json")
 
 
 def command(options: argparse.Namespace) -> None:
@@ -57,31 +63,40 @@ def command(options: argparse.Namespace) -> None:
     if options.speeds is not None:
         diagram(graph.scene, time, options)
         return
-    for option in ("out", "drive"):
-        if getattr(options, option) is not None:
-            raise InputError(f"--{option}", "belongs to a Campbell diagram", "add --speeds, e.g. 0:500rpm:50")
+    if options.drive is not None:
+        raise InputError("--drive", "belongs to a Campbell diagram", "add --speeds, e.g. 0:500rpm:50")
+    targets = _targets(options, ())
     modes = run.linear(graph.scene, time, moving=options.moving, workplace=open_workplace(options))
     print(as_json.as_json(modes) if options.json else text(modes).rstrip("\n"))
+    for target in targets:
+        with disk_limits(target.parent):
+            export.write(modes, target, ("vibration",))
+
+
+def _targets(options: argparse.Namespace, pictures: Sequence[str]) -> list[Path]:
+    """The files of `--out`, checked before the work; pictures: endings besides those of datasets."""
+    targets: list[Path] = options.out or []
+    for target in targets:
+        export.check_format(target, (*export.NEEDS, *pictures))
+        run.check_target(target)
+    return targets
 
 
 def diagram(scene: Scene, time: float | None, options: argparse.Namespace) -> None:
     """Print the table of a Campbell diagram, and write its dataset and its picture."""
     given = speeds(options.speeds)
-    targets = options.out or []
-    for target in targets:
-        export.check_format(target, (".nc", ".png", ".svg"))
-        run.check_target(target)
+    targets = _targets(options, PICTURES)
     made = run.linear(scene, time, speeds=given, drive=options.drive, workplace=open_workplace(options))
     from flexclear.pipeline.post.plotting import campbell
 
     print(as_json.as_json(made) if options.json else campbell.text(made))
-    pictures = campbell.files("campbell", made) if any(target.suffix != ".nc" for target in targets) else {}
+    pictures = campbell.files("campbell", made) if any(target.suffix in PICTURES for target in targets) else {}
     for target in targets:
         with disk_limits(target.parent):
-            if target.suffix == ".nc":
-                export.write(made, target)
-            else:
+            if target.suffix in PICTURES:
                 publish(target, pictures[f"campbell{target.suffix}"])
+            else:
+                export.write(made, target, ("speed",))
 
 
 def speeds(text: str) -> list[float]:

@@ -10,13 +10,6 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.units import quantity
 
 
-def argument(parser: argparse.ArgumentParser) -> None:
-    """How long the command may take."""
-    parser.add_argument(
-        "--limit", metavar="TIME", help="stop in good order after, e.g., 2h (exit code 4); run again to continue"
-    )
-
-
 def deadline(options: argparse.Namespace | None) -> tuple[float, str]:
     """Seconds from now, and what is said then; InputError for what is no time."""
     text = getattr(options, "limit", None)

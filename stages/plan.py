@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.coupling import lessened
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import limit, run, s4_watched, s8_plan
+from flexclear.stages import as_json, export, limit, run, s4_watched, s8_plan
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import FailedTasksError, Workplace, check, open_workplace
 
@@ -34,13 +34,10 @@ LEVELS = ("10 %", "1 %", "0.1 %")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser)
+    run.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
     parser.add_argument("--out", type=Path, metavar="FILE.toml", help="write the planned scene here, too (one scene)")
     parser.add_argument(
         "--verify", action="store_true", help="run the full scene and say what the plan's true error is"
-    )
-    parser.add_argument(
-        "--budget", metavar="TIME", default=f"{BUDGET:g}s", help=f"time for members that decide (default {BUDGET:g}s)"
     )
 
 
@@ -49,21 +46,29 @@ def command(options: argparse.Namespace) -> None:
     if options.out is not None:
         if len(options.scenes) > 1:
             raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "plan the scenes one by one")
+        export.check_format(options.out, (".toml",))
         run.check_target(options.out)
     workplace = open_workplace(options)
-    missed = list[str]()
+    missed, plans = list[str](), dict[str, object]()
     budget = limit.seconds(options.budget, "--budget")
     for graph in run.graphs(options.scenes, options.set):
         if graph.scene.accuracy is None and not options.verify and options.out is None:
-            print(levels(graph.scene, workplace))
+            plans[graph.scene.name] = table = levels(graph.scene, workplace)
+            if not options.json:
+                print(table)
             continue
         planned = bring(graph.scene, workplace)
-        print(planned.text())
+        plans[graph.scene.name] = planned.dataset() if options.json else None
+        if not options.json:
+            print(planned.text())
         if options.out is not None:
             publish(options.out, planned.file(options.out))
         if options.verify:
             missed += verify(planned, workplace, budget)
-        planned.tell()
+        if not options.json:
+            planned.tell()
+    if options.json:
+        print(as_json.as_json(plans))
     if missed:
         raise run.MissedAccuracyError("\n".join(missed))
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.units import quantity
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import run
+from flexclear.stages import as_json, run
 from flexclear.stages.graph import Graph
 from flexclear.stages.s6_render import FORMATS
 from flexclear.stages.workplace import Workplace, check, open_workplace, relative
@@ -23,11 +23,11 @@ USUAL = (("motion", "png"), ("motion", "mp4"), ("motion", "html"), ("modes", "ht
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser)
+    run.scene_arguments(parser, "json")
     parser.add_argument(
         "--what",
         choices=FORMATS,
-        help="the motion, the modes of flexible bodies, joints with clearance, or vibrations about equilibrium; "
+        help="the motion, its stress, modes of flexible bodies, joints with clearance, or vibrations; "
         "default: motion and modes",
     )
     known = list(dict.fromkeys(kind for kinds in FORMATS.values() for kind in kinds))
@@ -55,10 +55,16 @@ def command(options: argparse.Namespace) -> None:
     if len(graphs) > 1 and requested == [("modes", "html")]:
         made.append(_beside(graphs))
     outcome = workplace.bring(made)
+    files = dict[str, list[str]]()
     for task in made:
         record = outcome.records.get(id(task))
-        if record is not None:
+        if record is None:
+            continue
+        files.setdefault(task.scene, []).extend(str(workplace.store.root / task.folder / name) for name in record.files)
+        if not options.json:
             _tell(workplace, task.folder, list(record.files))
+    if options.json:
+        print(as_json.as_json(files))
     check(outcome)
 
 

@@ -10,7 +10,8 @@ import argparse
 from pathlib import Path
 
 from flexclear.pipeline.post.render import gl
-from flexclear.stages.workplace import Workplace, check, common_arguments, open_workplace, relative
+from flexclear.stages import as_json
+from flexclear.stages.workplace import Workplace, add_options, check, open_workplace, relative
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -22,29 +23,33 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--folder", action="store_true", help="a folder with the page and its pictures as files, not one file with all"
     )
     parser.add_argument(
-        "--budget",
-        metavar="TIME",
-        help="processor time for the three answers about each scene, such as 10s, 2min or 1h; default: three times the "
-        "run's own",
-    )
-    parser.add_argument(
         "--answers", choices=("all", "none"), default="all", help="none leaves the three answers out (default all)"
     )
-    common_arguments(parser)
+    add_options(parser, "usual", "budget", "json")
 
 
 def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
     workplace = open_workplace(options)
-    if not options.scenes:
-        print(relative(make(workplace, folder=options.folder)))
-        return
-    from flexclear.stages import limit, own_report, run
+    pages: dict[str, str] = {}
 
-    seconds = None if options.budget is None else limit.seconds(options.budget, "--budget")
-    for graph in run.graphs(options.scenes, options.set):
-        answers = options.answers != "none"
-        print(relative(own_report.make(graph, workplace, folder=options.folder, seconds=seconds, answers=answers)))
+    def made(name: str, page: Path) -> None:
+        pages[name] = str(page)
+        if not options.json:
+            print(relative(page))
+
+    if not options.scenes:
+        made("paper", make(workplace, folder=options.folder))
+    else:
+        from flexclear.stages import limit, own_report, run
+
+        seconds = None if options.budget is None else limit.seconds(options.budget, "--budget")
+        for graph in run.graphs(options.scenes, options.set):
+            answers = options.answers != "none"
+            page = own_report.make(graph, workplace, folder=options.folder, seconds=seconds, answers=answers)
+            made(graph.scene.name, page)
+    if options.json:
+        print(as_json.as_json(pages))
 
 
 def make(workplace: Workplace, *, folder: bool = False) -> Path:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import re
+import sys
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
@@ -21,10 +22,10 @@ from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.resource_estimate import check_run
 from flexclear.pipeline.core.workflow.progress import WARNING
 from flexclear.pipeline.core.workflow.schedule import Outcome
-from flexclear.stages import export, owner
+from flexclear.stages import as_json, export, owner
 from flexclear.stages.graph import STAGES, Graph
 from flexclear.stages.s5_post import origins
-from flexclear.stages.workplace import Workplace, check, common_arguments, open_workplace, relative
+from flexclear.stages.workplace import Workplace, add_options, check, open_workplace, relative
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,11 +33,13 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
 #: bytes of what `--set` changes that stand in the name of a folder
 LONGEST_EDITS = 100
+#: folder below a scene's results that is not for users
+FACTS = ".facts"
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    scene_arguments(parser)
+    scene_arguments(parser, "json")
     parser.add_argument(
         "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
     )
@@ -44,7 +47,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         "--out",
         type=Path,
         metavar="FILE",
-        help="write the run here: .nc or .mat; .csv, .parquet, .xlsx",
+        help=f"write the run here: {export.KNOWN}",
     )
     parser.add_argument(
         "--planned", action="store_true", help="plan first, and run what the requested accuracy calls for"
@@ -72,20 +75,33 @@ def command(options: argparse.Namespace) -> None:
             workplace.monitor.say(taken)
     outcome = workplace.bring([task for graph in requested for task in graph.up_to(options.to)])
     check(outcome)
-    if options.to == "bundle":
+    if options.to == "bundle" and not options.json:
         print("\n\n".join(filter(None, (deficits(graph, workplace, outcome) for graph in requested))))
     if options.out is not None:
         copy_run(requested[0], workplace, options.out)
-    for graph in requested if options.to in ("simulate", "ensemble", "post") else ():
+    if options.json:
+        print(as_json.as_json({graph.scene.name: _result(graph, workplace, outcome) for graph in requested}))
+    for graph in requested if options.to in ("simulate", "ensemble", "post") and not options.json else ():
         print_files(workplace.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
     missed = [text for plan in plans if options.verify for text in plan.missed()]
     conclude(requested, workplace, outcome, missed)
 
 
-def scene_arguments(parser: argparse.ArgumentParser) -> None:
-    """What all commands take that bring scenes up to date."""
+def _result(graph: Graph, workplace: Workplace, outcome: Outcome) -> dict[str, object]:
+    """What `run --json` prints of a scene: the files that are shown, warnings, and the verdict on its accuracy."""
+    folder, record = workplace.store.root / graph.simulate.folder, outcome.records.get(id(graph.simulate))
+    said = {} if record is None else record.said
+    return {
+        "files": [str(path) for path in sorted(folder.rglob("*")) if path.is_file() and FACTS not in path.parts],
+        "warnings": [text for text in said.get("warnings", "").split("\n") if text],
+        "accuracy": said.get("accuracy_verdict"),
+    }
+
+
+def scene_arguments(parser: argparse.ArgumentParser, *more: str, **changed: Any) -> None:
+    """What all commands take that bring scenes up to date; more, changed: as of `workplace.add_options`."""
     parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
-    common_arguments(parser)
+    add_options(parser, "usual", *more, **changed)
 
 
 def print_files(folder: Path, files: Mapping[str, str]) -> None:
@@ -128,21 +144,22 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
     An edited scene (`override`) is cached like any other but does not replace its file's
     results under results/runs.  Raises FlexclearError.
     """
-    require_names(scene)
+    examine(scene)
     workplace = workplace or open_workplace()
     import_module("flexclear.pipeline.core.artifacts.modal")  # gives the dataset its accessor
     task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: workers would run a caller's script again from its top
     outcome = workplace.bring([task], jobs=1)
     check(outcome)
-    return workplace.store.load(outcome.records[id(task)]).assign_attrs(
-        title=scene.title, scene=scene.name, **origins(scene)
-    )
+    from flexclear.pipeline.core.artifacts.table import recorded
+
+    made = workplace.store.load(outcome.records[id(task)])
+    return recorded(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)))
 
 
 def graph(scene: Scene) -> Graph:
     """The tasks of a scene; an edited one does not replace its file's results under results/runs."""
-    require_names(scene)
+    examine(scene)
     return Graph(scene, shown=scene.path is None or as_in_its_file(scene))
 
 
@@ -252,9 +269,9 @@ def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, pl
         for sentence in filter(None, record.said.get("warnings", "").split("\n")):
             workplace.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
         verdict, requested = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
-        if verdict != "met" and requested is not None:
+        if verdict != "met":
             text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is stored"
-            if requested.allow_missed:
+            if requested is None or requested.allow_missed:
                 workplace.monitor.say(text)
             else:
                 missed.append(f"{text}\n  hint: ask for less, or write allow_missed = true in [accuracy]")
@@ -286,15 +303,17 @@ def overrides(settings: Sequence[str]) -> dict[str, object]:
 def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
     """The scene called `name` with `settings` changed; its own name then contains them, and so do its results."""
     scene = load_scene(find_scene(name), overrides(settings))
-    if settings:
-        scene._name = f"{scene.name},{_edits(settings)}"
+    scene._name = with_edits(scene.name, settings)
     return scene
 
 
-def _edits(settings: Sequence[str]) -> str:
-    """What was changed, as part of a folder's name: of what is long the beginning, and a digest of the whole."""
+def with_edits(name: str, settings: Sequence[str]) -> str:
+    """The name with what was changed, as a folder's name: of what is long the beginning, and a digest of the whole."""
+    if not settings:
+        return name
     suffix = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # which Windows leaves out
-    return suffix if len(suffix.encode()) <= LONGEST_EDITS else f"{suffix[:40]},{sha256(suffix.encode())[:16]}"
+    short = suffix if len(suffix.encode()) <= LONGEST_EDITS else f"{suffix[:40]},{sha256(suffix.encode())[:16]}"
+    return f"{name},{short}"
 
 
 def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
@@ -305,7 +324,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
     for name in names:
         try:
             graph = Graph(loaded(name, settings))
-            require_names(graph.scene)
+            examine(graph.scene, settings)
             with in_file(graph.scene.path):
                 graph.up_to("post")
             path = graph.scene.path
@@ -330,6 +349,26 @@ def in_file(path: Path | None) -> Iterator[None]:
         if path is None or not error.place.startswith("["):
             raise
         raise InputError(f"{path} {error.place}", error.problem, error.remedy) from None
+
+
+def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
+    """Plausibility warnings about a scene; those about values that `settings` changed are located there."""
+    from flexclear.pipeline.core.scene.plausibility import implausible
+
+    changed = overrides(settings)
+    doubts = []
+    for doubt in implausible(scene):
+        key = doubt.place.partition("[")[2].rstrip("]")
+        place = f"--set {key}" if key in changed else doubt.place
+        doubts.append(InputError(place, doubt.problem, doubt.remedy))
+    return doubts
+
+
+def examine(scene: Scene, settings: Sequence[str] = ()) -> None:
+    """Print plausibility warnings; InputErrors for names that lead nowhere. Both before anything is computed."""
+    require_names(scene)
+    for doubt in implausibilities(scene, settings):
+        print(f"flexclear: {WARNING}{lines.located(doubt)}", file=sys.stderr)
 
 
 def require_names(scene: Scene) -> None:

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
 
 KINDS = "flexclear.pipeline.structure.kinds"
+#: what kinds of bodies call a recipe, whose file they do not know
+PLACE = "mesh recipe"
 #: keys of a recipe's shape that name files
 FILES = ("file", "stiffness", "mass", "unknowns")
 
@@ -38,7 +40,7 @@ def params(recipe: Path, edits: Mapping[str, Any] | None = None) -> dict[str, An
     factor = changes.pop("elements", None)
     if factor is not None and isinstance(table.get("elements"), int):
         changes["elements"] = factor * table["elements"]
-    for path in _files(table, recipe.parent):
+    for path in files(table, recipe.parent):
         if not is_file(path):
             raise InputError(f"{recipe} [shape]", f"there is no file {path}", "paths are relative to the recipe")
     sources(recipe)
@@ -73,26 +75,34 @@ def kind_of(recipe: Path) -> str:
     return str(kinds.get(str(shape.get("type")), "beam")) if isinstance(shape, Mapping) else "beam"
 
 
-def _files(table: Mapping[str, Any], folder: Path) -> list[Path]:
+def files(table: Mapping[str, Any], folder: Path) -> list[Path]:
     """The files that a recipe names; others that their formats need are not known before they are read."""
     shape = table.get("shape")
     named = shape if isinstance(shape, Mapping) else {}
     return [folder / str(named[key]) for key in FILES if key in named]
 
 
+def in_recipe(error: InputError, path: Path) -> InputError:
+    """The error of a mesh with the file of its recipe instead of the word for it."""
+    return InputError(error.place.replace(PLACE, str(path), 1), error.problem, error.remedy)
+
+
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The mesh (schema MESH or SOLID) as ``nc``, and for other programs as ``vtu``.
 
-    params: besides the recipe its folder, which the files that it names are relative to.
+    params: besides the recipe its file, and its folder, which the files that it names are relative to.
     """
     from flexclear.pipeline.structure.kinds import kind
 
     folder = Path(params.get("folder", "."))
-    for path in _files(params["recipe"], folder):
+    for path in files(params["recipe"], folder):
         file_dependencies.note(path)  # some readers are not written in Python
 
     part = kind.of_recipe(params["recipe"])
-    result = part.build(params["recipe"], folder)
+    try:
+        result = part.build(params["recipe"], folder)
+    except InputError as error:
+        raise in_recipe(error, Path(params.get("file", PLACE))) from None
     with tempfile.TemporaryDirectory() as made:
         path = Path(made) / "mesh.vtu"
         part.write_vtu(result, path)

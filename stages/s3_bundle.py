@@ -20,8 +20,10 @@ WHERE = "[output] stress"
 
 
 def params(scene: Scene, body: str) -> dict[str, Any]:
-    """Whether stresses are to be recovered and bending shortens the body; nothing where the scene asks for neither."""
-    asked = {"stress": True} if body in (scene.output.stress or ()) else {}
+    """Whether and where stresses are to be recovered, and whether bending shortens the body; what is asked for only."""
+    asked: dict[str, Any] = {"stress": True} if body in (scene.output.stress or ()) else {}
+    if gauges := scene.output.on(body):
+        asked["gauges"] = {name: gauge.model_dump(mode="json", exclude_none=True) for name, gauge in gauges.items()}
     return asked | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
 
 
@@ -40,7 +42,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     mesh, modes = inputs["mesh"], inputs["modes"]
     extra: dict[str, Any] = {}
     if params.get("stress"):
-        extra |= lookup(STRESS, str(mesh.attrs.get("body_kind", "beam")), where=WHERE)(mesh, modes)
+        recover = lookup(STRESS, str(mesh.attrs.get("body_kind", "beam")), where=WHERE)
+        extra |= recover(mesh, modes, params.get("gauges", {}))
     if params.get("stiffening"):
         extra |= import_module(SHORTENING).variables(mesh, modes)
     return {"nc": bundle.build(mesh, modes, extra)}

@@ -20,10 +20,13 @@ if TYPE_CHECKING:
 #: what can be shown, as what; repeated here, because asking the modules that draw takes their import
 FORMATS: dict[str, tuple[str, ...]] = {
     "motion": ("png", "gif", "mp4", "html", "gltf", "pvd"),
+    "stress": ("png", "gif", "mp4", "html"),
     "modes": ("png", "gif", "mp4", "html", "gltf", "pvd"),
     "joint": ("png", "gif", "mp4", "html"),
     "vibrations": ("png", "gif", "mp4", "html"),
 }
+#: films of what have curves next to them
+FILMED = ("motion", "stress")
 #: keys of `[view]` that pictures of solids heed
 SEEN = ("direction", "up", "zoom", "exaggeration", "duration", "impact_slowdown")
 
@@ -41,7 +44,7 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     Raises InputError for files of shapes that are not there.
     """
     values: dict[str, Any] = {"what": what, "format": kind}
-    if what in ("motion", "vibrations") and kind in ("png", "gif", "mp4"):
+    if what in ("motion", "stress", "vibrations") and kind in ("png", "gif", "mp4"):
         values["gl"] = gl_state()
     if kind == "html":
         values["title"] = scene.title
@@ -50,10 +53,10 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     if scene.view is not None and what != "modes":
         asked = scene.view.model_dump(mode="json", include=set(SEEN), exclude_none=True)
         values |= {"view": asked} if asked else {}
-    if (what == "joint" and kind in ("png", "html")) or (what == "motion" and kind in ("gif", "mp4")):
+    if (what == "joint" and kind in ("png", "html")) or (what in FILMED and kind in ("gif", "mp4")):
         terms = [term for quantity in scene.watched() for term in quantity.terms()]
         values["watched"] = list(dict.fromkeys(term.owner for term in terms if term.owner))
-        if what == "motion" and scene.view is not None and scene.view.watch is not None:
+        if what in FILMED and scene.view is not None and scene.view.watch is not None:
             values["curves"] = [quantity.written() for quantity in scene.watched()]
     return values
 

@@ -1,17 +1,17 @@
-"""``flexclear schema``: JSON schemas of scene files and mesh recipes."""
+"""``flexclear schema``: JSON schemas of scene files, mesh recipes and sweeps."""
 
 from __future__ import annotations
 
 import argparse
 import json
 
-KINDS = ("scene", "recipe")
+KINDS = ("scene", "recipe", "sweep")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument(
-        "kind", nargs="?", choices=KINDS, default="scene", metavar="KIND", help="scene (default) or recipe"
+        "kind", nargs="?", choices=KINDS, default="scene", metavar="KIND", help="scene (default), recipe or sweep"
     )
 
 
@@ -19,6 +19,8 @@ def command(options: argparse.Namespace) -> None:
     """Print it."""
     if options.kind == "scene":
         from flexclear.pipeline.core.scene.json_schema import scene_schema as schema
+    elif options.kind == "sweep":
+        from flexclear.pipeline.core.scene.json_schema import sweep_schema as schema
     else:
         from flexclear.pipeline.structure.fe.json_schema import recipe_schema as schema
     print(json.dumps(schema(), indent=2))

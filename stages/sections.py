@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
-from flexclear.stages import as_json, limit, run
+from flexclear.stages import as_json, run
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check, open_workplace, said_arguments
+from flexclear.stages.workplace import Workplace, check, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -24,14 +24,11 @@ COUNTS = {"periods": "recorded periods", "transient": "periods before them that 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    run.scene_arguments(parser, "json")
     for name, text in COUNTS.items():
         parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
     parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
-    limit.argument(parser)
-    said_arguments(parser)
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write the verdicts as a page, too")
-    as_json.json_argument(parser)
 
 
 def command(options: argparse.Namespace) -> None:
@@ -40,7 +37,7 @@ def command(options: argparse.Namespace) -> None:
     if options.page is not None:
         run.check_target(options.page, "--page")
     workplace = open_workplace(options)
-    scenes = [with_sections(graph.scene, asked) for graph in run.graphs(options.scenes)]
+    scenes = [with_sections(graph.scene, asked) for graph in run.graphs(options.scenes, options.set)]
     tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
     outcome = workplace.bring([graph.verdict for graph in tasks.values()])
     check(outcome)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.errors import InputError, ResourceError
 from flexclear.pipeline.core.scene import lines
-from flexclear.stages import run, s1_mesh, s3_rigid, s6_render
+from flexclear.stages import as_json, run, s1_mesh, s3_rigid, s6_render
 from flexclear.stages.workplace import relative
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser)
+    run.scene_arguments(parser, "json")
 
 
 def command(options: argparse.Namespace) -> int:
@@ -31,19 +31,22 @@ def command(options: argparse.Namespace) -> int:
 
     Exit code 2 where a start does not fit; it is shown all the same.
     """
-    result = 0
+    result, made = 0, dict[str, list[str]]()
     for name in options.scenes:
         scene = run.loaded(name, options.set)
-        run.require_names(scene)
-        refused = shown(scene, quiet=options.quiet)
+        run.examine(scene, options.set)
+        files, refused = shown(scene, quiet=options.quiet or options.json)
+        made[scene.name] = [str(file) for file in files]
         if refused is not None:
             print(f"flexclear: {lines.located(refused)}", file=sys.stderr)
             result = refused.exit_code
+    if options.json:
+        print(as_json.as_json(made))
     return result
 
 
-def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> InputError | None:
-    """Write picture and page, and print where they are; returns why the start is refused, None where it fits."""
+def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> tuple[list[Path], InputError | None]:
+    """Write picture and page, and print where they are; returns the files, and why the start is refused if it is."""
     with run.in_file(scene.path):
         seen, refused = viewed(scene)
     files = files_of(scene, seen, Path.cwd() if folder is None else folder, quiet=quiet)
@@ -52,8 +55,8 @@ def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> I
     for gap in seen.gaps:
         print(f"flexclear: joint {gap.joint} does not fit at the start: {gap.said}", file=sys.stderr)
     if refused is not None and scene.path is not None and refused.place.startswith("["):
-        return InputError(f"{scene.path} {refused.place}", refused.problem, refused.remedy)
-    return refused
+        refused = InputError(f"{scene.path} {refused.place}", refused.problem, refused.remedy)
+    return files, refused
 
 
 @dataclass(frozen=True)

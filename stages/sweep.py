@@ -16,9 +16,9 @@ from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
 from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
 from flexclear.pipeline.core.workflow import cores
-from flexclear.stages import export, limit, run, sweep_large, sweep_plan
+from flexclear.stages import as_json, export, run, sweep_large, sweep_plan
 from flexclear.stages.sweep_engine import Engine, Job, engine, now
-from flexclear.stages.workplace import Workplace, open_workplace, relative, said_arguments
+from flexclear.stages.workplace import Workplace, add_options, open_workplace, relative
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,18 +37,11 @@ OFTEN, FRACTION = 2.0, 0.01
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
     parser.add_argument("sweeps", nargs="+", metavar="SWEEP", help="a sweep file, or a name below scenes/")
-    parser.add_argument(
-        "--jobs",
-        "--workers",
-        dest="workers",
-        type=int,
-        metavar="N",
-        help="processes at most (default: one for each core)",
-    )
+    add_options(parser, "usual", "json", jobs={"also": ("--workers",)})
     parser.add_argument("--scheduler", metavar="ADDRESS", help="run on the Dask cluster with this scheduler instead")
-    parser.add_argument("--out", type=Path, metavar="FILE.nc", help="copy the dataset here (one sweep); .zarr: as Zarr")
-    limit.argument(parser)
-    said_arguments(parser)
+    parser.add_argument(
+        "--out", type=Path, metavar="FILE", help=f"copy the dataset here (one sweep): {export.KNOWN}, .zarr"
+    )
 
 
 def command(options: argparse.Namespace) -> None:
@@ -59,17 +52,23 @@ def command(options: argparse.Namespace) -> None:
         if options.out.suffix == sweep_large.SUFFIX:
             sweep_large.require_zarr(f"--out {options.out}")
         else:
-            export.check_format(options.out, (".nc", sweep_large.SUFFIX))
+            export.check_format(options.out, (*export.NEEDS, sweep_large.SUFFIX))
             run.check_target(options.out)
     workplace = open_workplace(options)
     paths = [run.find_scene(name) for name in options.sweeps]
-    requested = [sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path)]]
+    requested = [
+        sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path, options.set)]
+    ]
     if options.out is not None and options.out.suffix != sweep_large.SUFFIX and sweep_large.is_large(requested[0]):
         raise InputError(f"--out {options.out}", "the dataset is larger than memory", "let its name end in .zarr")
-    with engine(width(options.workers), options.scheduler) as workers, workplace.limited():
+    made = {}
+    with engine(width(options.jobs), options.scheduler) as workers, workplace.limited():
         for path, plan in zip(paths, requested, strict=True):
-            folder = workplace.store.root / "sweeps" / scene_name(path).removeprefix("sweeps/")
-            _show(plan, bring(plan, workers, workplace, folder), folder, options.out)
+            name = run.with_edits(scene_name(path).removeprefix("sweeps/"), options.set)
+            made[name] = bring(plan, workers, workplace, folder := workplace.store.root / "sweeps" / name)
+            _show(plan, made[name], folder, options.out, quiet=options.json)
+    if options.json:
+        print(as_json.as_json(made))
 
 
 def width(asked: int | None) -> int:
@@ -79,15 +78,20 @@ def width(asked: int | None) -> int:
     return asked or cores.cores()
 
 
-def read(path: Path) -> tuple[Sweep, Scene]:
-    """A sweep file and its scene, which is searched for next to the file, then below scenes/."""
+def read(path: Path, settings: Sequence[str] = ()) -> tuple[Sweep, Scene]:
+    """A sweep file and its scene, which is searched for next to the file, then below scenes/.
+
+    settings: as `--set` has them; changes of the scene that hold at all points.
+    """
     sweep = load_sweep(path)
     own_path = path.parent / sweep.scene
     try:
         scene_path = own_path if is_file(own_path) else run.find_scene(sweep.scene)
     except InputError as error:
         raise InputError(f"{path} [scene]", f"'{sweep.scene}' {error.problem}", error.remedy) from None
-    return sweep, load_scene(scene_path)
+    scene = load_scene(scene_path, run.overrides(settings))
+    run.examine(scene, settings)
+    return sweep, scene
 
 
 def of_scene(
@@ -110,6 +114,7 @@ class _Desk:
     total: int
     done: dict[str, Point]
     waiting: list[tuple[Job, Point]] = field(default_factory=list)
+    here: bool = True  #: whether this machine computes them
     large: bool = False  #: values are left out of `done`: they are in the store, and memory does not hold them
     begun: float = field(default_factory=now)
     stored: float = field(default_factory=now)
@@ -138,7 +143,7 @@ class _Desk:
         for family in self.plan.families:
             mine = {job.key: point for job, point in self.waiting if job.family == family.key}
             if mine:
-                family.keep(mine, self.workplace.store, self.plan.recorded)
+                family.keep(mine, self.workplace.store, self.plan.recorded, self.here)
         self.waiting = []
 
 
@@ -166,9 +171,8 @@ def bring(plan: sweep_plan.Plan, workers: Engine, workplace: Workplace, folder: 
             key: point for family in ready.families for key, point in family.find(workplace.store, recorded).items()
         }
         requested = {job.key: job for job in ready.jobs}
-        desk = _Desk(
-            ready, workplace, len(requested), {key: points[key] for key in requested if key in points}, large=large
-        )
+        known = {key: points[key] for key in requested if key in points}
+        desk = _Desk(ready, workplace, len(requested), known, here=workers.here, large=large)
         missing = [job for key, job in requested.items() if key not in desk.done]
         try:
             if missing:
@@ -207,8 +211,8 @@ def _publish(result: xr.Dataset, folder: Path) -> None:
         shutil.rmtree(folder / f"{NAME}{sweep_large.SUFFIX}", ignore_errors=True)
 
 
-def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | None) -> None:
-    """Figures next to the dataset, and a summary on the screen."""
+def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | None, *, quiet: bool = False) -> None:
+    """Figures next to the dataset, and a summary on the screen unless `quiet`."""
     from flexclear.pipeline.core.artifacts.store import publish
     from flexclear.pipeline.post.sweep import figures
 
@@ -225,8 +229,9 @@ def _show(plan: sweep_plan.Plan, result: xr.Dataset, folder: Path, out: Path | N
         sweep_large.write_copy(out, result)
     elif out is not None:
         with disk_limits(out.parent):
-            write_dataset(out, result)
-    print("\n".join(summary(plan, result, file)))
+            export.write(result, out, result["status"].dims)
+    if not quiet:
+        print("\n".join(summary(plan, result, file)))
     if not (result["status"] == 0).any():
         raise SolverError(f"{plan.sweep.name}: every point was refused; the reasons are above")
 

@@ -12,6 +12,7 @@ import time
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from flexclear.pipeline.core.artifacts.paths import TREE, results_root
 from flexclear.pipeline.core.artifacts.store import Store
@@ -24,26 +25,48 @@ from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import limit
 
+#: options that mean the same on every command: how argparse adds each
+OPTIONS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
+    "set": (
+        ("--set",),
+        {
+            "action": "append",
+            "default": [],
+            "metavar": "KEY=VALUE",
+            "help": "change a value, such as joint.A1.clearance='0.2 mm'; may be given several times",
+        },
+    ),
+    "jobs": (("--jobs",), {"type": int, "metavar": "N", "help": "processes at most; default: one for each core"}),
+    "limit": (
+        ("--limit",),
+        {"metavar": "TIME", "help": "stop in good order after, e.g., 2h (exit code 4); run again to continue"},
+    ),
+    "budget": (("--budget",), {"metavar": "TIME", "help": "processor time for trial runs, such as 10s, 2min or 1h"}),
+    "json": (("--json",), {"action": "store_true", "help": "print the results as JSON"}),
+    "quiet": (("-q", "--quiet"), {"action": "store_true", "help": "say nothing but errors, warnings and results"}),
+    "verbose": (("-v", "--verbose"), {"action": "store_true", "help": "keep every line of progress, with times"}),
+}
 
-def common_arguments(parser: argparse.ArgumentParser) -> None:
-    """Values to change, processes, and how much is said."""
-    parser.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="change a value, such as joint.A1.clearance='0.2 mm'; may be given several times",
-    )
-    parser.add_argument("--jobs", type=int, metavar="N", help="processes at most; default: one for each core")
-    limit.argument(parser)
-    said_arguments(parser)
 
+def add_options(parser: argparse.ArgumentParser, *names: str, **changed: Any) -> None:
+    """Add options of `OPTIONS` by name; "said" adds quiet and verbose, "usual" what all commands take that compute.
 
-def said_arguments(parser: argparse.ArgumentParser) -> None:
-    """How much is said."""
-    said = parser.add_mutually_exclusive_group()
-    said.add_argument("-q", "--quiet", action="store_true", help="say nothing but errors, warnings and results")
-    said.add_argument("-v", "--verbose", action="store_true", help="keep every line of progress, with times")
+    changed: by name, keys of argparse that differ on this command, as its default; `also`: further names of it.
+    """
+    for name in names:
+        if name == "usual":
+            add_options(parser, "set", "jobs", "limit", "said", **changed)
+        elif name == "said":
+            said = parser.add_mutually_exclusive_group()
+            for option in ("quiet", "verbose"):
+                flags, keys = OPTIONS[option]
+                said.add_argument(*flags, **keys)
+        else:
+            flags, keys = OPTIONS[name]
+            more = dict(changed.get(name, {}))
+            also = more.pop("also", ())
+            text = f"{keys['help']} (default {more['default']})" if "default" in more else keys["help"]
+            parser.add_argument(*flags, *also, **keys | more | {"help": text})
 
 
 def relative(path: Path) -> str:

@@ -174,6 +174,40 @@ def _six_bar(run: xr.Dataset, scene: Scene) -> str:
     return f"It swings by {swing:.1f}°, and the motor supplies up to {float(torque):.2g} N m."
 
 
+def _rssr(run: xr.Dataset, scene: Scene) -> str:
+    swing = np.degrees(2.0 * _amplitude(run["joint_position"].sel(coordinate="out")))
+    peak = float(derive(run)["peak_force"].sel(contact="B"))
+    return f"It swings by {swing:.1f}°; the ball presses on its socket with up to {peak:.0f} N."
+
+
+def _arm(run: xr.Dataset, scene: Scene) -> str:
+    held = run["controller_force"].isel(time=-1)
+    shoulder, elbow = (float(held.sel(controller=f"{name}_motor")) for name in ("shoulder", "elbow"))
+    return f"It gets there, and is held by {shoulder:.1f} N m at the shoulder and {elbow:.2f} N m at the elbow."
+
+
+def _shaft(run: xr.Dataset, scene: Scene) -> str:
+    speed, time = run["angular_velocity"].sel(body="disc", axis="z").values, run["time"].values
+    wound = speed - np.polyval(np.polyfit(time, speed, 1), time)
+    crossings = np.flatnonzero(np.diff(np.sign(wound)) > 0)
+    period = (time[crossings[-1]] - time[crossings[0]]) / (len(crossings) - 1)
+    return f"It winds up and down at {1.0 / period:.0f} Hz while it speeds up to {abs(speed[-1]):.0f} rad/s."
+
+
+def _driven_yoke(run: xr.Dataset, scene: Scene) -> str:
+    angle = run["joint_position"].sel(coordinate="O").values
+    off = abs(run["position"].sel(body="yoke", axis="x").values - 0.05 * np.cos(angle)).max()
+    peak = float(derive(run)["peak_force"].sel(contact="slot"))
+    return f"It is off by up to {1e3 * off:.2f} mm, and the pin hits with up to {peak / 1e3:.1f} kN."
+
+
+def _rolling(run: xr.Dataset, scene: Scene) -> str:
+    moved = run["position"].sel(body="ball").isel(time=-1) - run["position"].sel(body="ball").isel(time=0)
+    turned = float(run["angular_velocity"].sel(body="ball", axis="y")[-1]) * scene.joint["floor"].radius
+    slip = 1.0 - turned / float(np.linalg.norm(run["velocity"].sel(body="ball").values[-1]))
+    return f"It gets {float(np.linalg.norm(moved)):.2f} m far; it slips by {100 * abs(slip):.2g} %."
+
+
 def _controllers(run: xr.Dataset, scene: Scene) -> str:
     push = abs(run["controller_force"]).max("time")
     return f"The hardest push is {float(push.max()):.3g} N, by '{push.idxmax().item()}'."
@@ -199,8 +233,10 @@ ENTRIES = {
         Entry("checks/clearance_slider_crank", "What does 0.1 mm of clearance do at 5000 rpm?", _slider_crank),
         Entry("gallery/scott_russell", "How straight is its straight line?", _scott_russell),
         Entry("gallery/six_bar", "How far does a rocker swing that a loose, bending link drives?", _six_bar),
+        Entry("gallery/rssr", "How far does a rocker across the crank's axis swing?", _rssr),
         Entry("gallery/stewart", "Which stroke and force must the six legs have for this path?", _stewart, at=0.0),
         Entry("gallery/robot_arm", "How much does the load swing after the arm has stopped?", _robot_arm),
+        Entry("gallery/pid_arm", "Which torques hold the arm where its controllers have moved it?", _arm),
         Entry("checks/universal_shaft", "How unevenly does the second shaft turn?", _universal),
         Entry("checks/heavy_top", "How does a fast top move that leans to its side?", _top, {"time.end": "0.3 s"}),
         Entry("checks/governor", "At which speed does it settle, and how high is the sleeve?", _governor),
@@ -209,8 +245,11 @@ ENTRIES = {
         Entry("checks/bricard", "How many freedoms has it?", _bricard, {"time.end": "1 s"}),
         Entry("checks/andrews_squeezer", "How fast does the squeezer run away?", _squeezer),
         Entry("checks/gears", "Which ratio has the planetary train?", _gears, {"time.end": "0.2 s"}),
+        Entry("gallery/gear_shaft", "At which frequency does a disc on a flexible shaft wind up and down?", _shaft),
+        Entry("gallery/driven_yoke", "How far is the motion of a loose yoke off a cosine?", _driven_yoke),
         Entry("checks/scotch_yoke", "How often does a loose pin hit its slot?", _yoke),
         Entry("checks/ball_on_plane", "How often does a ball bounce in half a second?", _balls),
+        Entry("gallery/rolling_ball", "How far does a ball roll down a slope in a second?", _rolling, at=1.0),
         Entry("checks/bushing", "How far does a block move on its rubber mount?", _bushing),
         Entry("checks/bifilar_pendulum", "What do the rods of a hanging bar carry?", _bifilar),
         Entry("checks/controllers", "How hard do the controllers push?", _controllers),

@@ -245,6 +245,36 @@ def four_bars(loops: int, lean: float = 0.0) -> Scene:
     )
 
 
+def hinged(links: int, end: float = 0.2) -> Scene:
+    """An open chain of rods of 1 m and 1 kg on hinges about y, along x at the start, under gravity along -z."""
+    across = {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}
+    body: dict[str, Any] = {"ground": {"type": "ground", "frames": {"tip": {"axes": across}}}}
+    joint: dict[str, Any] = {}
+    for k in range(links):
+        body[f"link{k}"] = {
+            "type": "rigid",
+            "mass": 1.0,
+            "inertia": [1e-4, 1.0 / 12.0, 1.0 / 12.0],
+            "pose": {"position": [k + 0.5, 0.0, 0.0]},
+            "frames": {
+                "foot": {"position": [-0.5, 0.0, 0.0], "axes": across},
+                "tip": {"position": [0.5, 0.0, 0.0], "axes": across},
+            },
+        }
+        joint[f"J{k}"] = {"type": "revolute", "between": [f"link{k - 1}.tip" if k else "ground.tip", f"link{k}.foot"]}
+    return Scene.model_validate(
+        {
+            "title": f"{links} links",
+            "body": body,
+            "joint": joint,
+            "load": {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
+            "time": {"end": end},
+            "output": {"interval": end / 10.0},
+            "solver": {"integrator": "dop853", "rtol": 1e-10},
+        }
+    )
+
+
 def show(records: list[Record]) -> str:
     """All tables, with the exponents of the growth."""
     loops, modes = ([r for r in records if "us" in r and what in r] for what in ("loops", "modes"))

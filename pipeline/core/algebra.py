@@ -170,3 +170,26 @@ def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """
     relative = quaternion_product(quaternion_conjugate(a), b)
     return 2.0 * np.arctan2(np.linalg.norm(relative[..., 1:], axis=-1), np.abs(relative[..., 0]))
+
+
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    """Von Mises stress, in the unit of the components, shape (...,) of (..., 6): xx yy zz yz xz xy."""
+    x, y, z, yz, xz, xy = np.moveaxis(stress, -1, 0)
+    normal = (x - y) ** 2 + (y - z) ** 2 + (z - x) ** 2
+    return np.asarray(np.sqrt(0.5 * normal + 3.0 * (yz**2 + xz**2 + xy**2)))
+
+
+def principal(stress: np.ndarray) -> np.ndarray:
+    """Principal stresses, the largest first, shape (..., 3) of (..., 6)."""
+    return np.asarray(np.linalg.eigvalsh(matrices(stress))[..., ::-1])
+
+
+def matrices(stress: np.ndarray) -> np.ndarray:
+    """Symmetric matrices (..., 3, 3) of components (..., 6)."""
+    x, y, z, yz, xz, xy = np.moveaxis(stress, -1, 0)
+    return np.stack([np.stack(row, axis=-1) for row in ((x, xy, xz), (xy, y, yz), (xz, yz, z))], axis=-2)
+
+
+def components(matrix: np.ndarray) -> np.ndarray:
+    """Components (..., 6) of symmetric matrices (..., 3, 3)."""
+    return np.asarray(matrix[..., [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]])

@@ -279,6 +279,19 @@ def plain_output() -> None:
             stream.reconfigure(errors="backslashreplace")
 
 
+def reader_has_gone() -> bool:
+    """Return whether nobody reads the output any more, as after `| head`; True where the system does not say."""
+    try:
+        import select
+
+        look = select.poll()
+        for stream in (sys.stdout, sys.stderr):
+            look.register(stream.fileno(), 0)
+        return any(event & (select.POLLERR | select.POLLHUP) for _, event in look.poll(0))
+    except (ImportError, AttributeError, OSError, ValueError):
+        return True
+
+
 def _text(path: str) -> str:
     try:
         return Path(path).read_text(encoding="utf-8").strip()

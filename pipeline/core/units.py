@@ -6,8 +6,13 @@ import math
 import re
 import sys
 from collections.abc import Iterable
+from difflib import get_close_matches
 from functools import lru_cache
 
+#: units that a message lists
+COMMON = ("m", "mm", "s", "kg", "N", "N m", "rad", "deg", "rpm", "Hz", "Pa", "J")
+#: a quotient of two numbers
+_FRACTION = re.compile(r"([-+]?[\d.]+) */ *([\d.]+)")
 #: a number that is written with a comma
 _COMMA = re.compile(r"\s*[-+]?\d+,\d")
 
@@ -234,7 +239,7 @@ def coefficient(value: object, dimension: str, order: int) -> float:
     kg, m, s, rad = _EXPONENTS[dimension]
     product = _product(_plain(match[2]))
     if product is None or product[1] != (kg, m, s - order, rad):
-        example = f"{_example(dimension)}/s^{order}" if order else _example(dimension)
+        example = f"{_example(dimension)}/s^{order}".removesuffix("^1") if order else _example(dimension)
         raise ValueError(
             f"'{value}' is the coefficient of t^{order} of {a(dimension)}: it has a unit such as {example}"
         )
@@ -284,11 +289,11 @@ def _read(value: object, dimension: str) -> float:
         if _COMMA.match(value):
             raise ValueError(f"'{value}' has a decimal comma; numbers have a decimal point")
         number, written = float(match[1]), match[2]
-        factor, factor_and_dimension = (1.0, dimension) if written is None else _known_unit(written, dimension)
+        factor, factor_and_dimension = (1.0, dimension) if written is None else _known_unit(written, dimension, value)
         if factor_and_dimension != dimension:
-            raise ValueError(
-                f"'{value}' is {a(factor_and_dimension)}, but {a(dimension)} belongs here, in {_known(dimension)}"
-            )
+            wanted = f"{a(dimension)} belongs here, in {_known(dimension)}"
+            wanted = "a number without a unit belongs here" if dimension == "number" else wanted
+            raise ValueError(f"'{value}' is {a(factor_and_dimension)}, but {wanted}")
         result = number * factor
     else:
         result = float(value) if abs(value) <= sys.float_info.max else math.inf
@@ -315,14 +320,26 @@ def any_quantity(value: object) -> float | str:
         return quantity(value, "number")
     known = unit(written)
     if known is None:
-        raise ValueError(f"unknown unit '{written}'; known: {', '.join(UNITS)}, and products of them")
+        raise ValueError(unknown(written, str(value)))
     dimension = known[1]
     return f"{quantity(value, dimension)!r} {_example(dimension, factor=1.0)}"
 
 
-def _known_unit(written: str, dimension: str) -> tuple[float, str]:
+def unknown(written: str, value: str = "") -> str:
+    """The message about a text that is no unit; value: the quantity that it belongs to."""
+    fraction = _FRACTION.fullmatch(value.strip())
+    if fraction is not None and float(fraction[2]):
+        return f"'{value}' is a fraction; a value is one number: write {float(fraction[1]) / float(fraction[2]):.12g}"
+    near = get_close_matches(written, list(UNITS), n=1)
+    hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(COMMON)} and products of such units"
+    return f"unknown unit '{written}'; {hint}"
+
+
+def _known_unit(written: str, dimension: str, value: str) -> tuple[float, str]:
     known = unit(written)
     if known is None:
+        if _FRACTION.fullmatch(value.strip()):
+            raise ValueError(unknown(written, value))
         raise ValueError(f"unknown unit '{written}'; {a(dimension)} is written in {_known(dimension)}")
     return known
 

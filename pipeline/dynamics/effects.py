@@ -35,6 +35,7 @@ class Parts:
     wear: whether that of contacts is counted.  stops: whether joint coordinates have ends.
     couplings: whether they follow each other.      harmonics: whether a law of time has some.
     load_kinks: whether friction along them bends.
+    articulated: whether the tree is so deep that its mass matrix is factored by articulated inertias.
     """
 
     joints: tuple[str, ...]
@@ -51,6 +52,7 @@ class Parts:
     joint_frictions: tuple[str, ...] = ()
     wear: bool = False
     load_kinks: bool = False
+    articulated: bool = False
 
 
 @dataclass(frozen=True)

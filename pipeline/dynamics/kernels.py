@@ -71,29 +71,3 @@ def _compiled(function: Callable) -> Any:
     from numba import njit
 
     return njit(**options)(function)
-
-
-def row_reader(index: int, size: int) -> Any:
-    """row(h, i): h[index] + size i."""
-
-    def row(h, i):
-        return h[index] + size * i
-
-    return row if INTERPRETED else Kernel(row, lambda function: _lookup(function, index, size, None))
-
-
-def field_reader(index: int, size: int, field: int) -> Any:
-    """read(h, i): h[h[index] + size i + field]."""
-
-    def read(h, i):
-        return h[h[index] + size * i + field]
-
-    return read if INTERPRETED else Kernel(read, lambda function: _lookup(function, index, size, field))
-
-
-def _lookup(function: Callable, index: int, size: int, field: int | None) -> Any:
-    if not known_release():
-        return _compiled(function)
-    from flexclear.pipeline.dynamics.lookup import Lookup
-
-    return Lookup(function.__name__, index, size, field)

@@ -45,11 +45,10 @@ def at6(a, i):
 
 
 @kernel
-def put9(a, i, m):
-    """Store a matrix from index i."""
-    put(a, i, (m[0], m[1], m[2]))
-    put(a, i + 3, (m[3], m[4], m[5]))
-    put(a, i + 6, (m[6], m[7], m[8]))
+def put6(a, i, s):
+    """Store a symmetric matrix (xx, yy, zz, xy, xz, yz) from index i."""
+    put(a, i, (s[0], s[1], s[2]))
+    put(a, i + 3, (s[3], s[4], s[5]))
 
 
 @kernel
@@ -64,6 +63,22 @@ def dot6(a, i, b, j):
 def add(a, b):
     """A + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@kernel
+def add6(a, b):
+    """Return a + b of symmetric matrices."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
+
+
+@kernel
+def add9(a, b):
+    """Return a + b of matrices."""
+    return (
+        *(a[0] + b[0], a[1] + b[1], a[2] + b[2]),
+        *(a[3] + b[3], a[4] + b[4], a[5] + b[5]),
+        *(a[6] + b[6], a[7] + b[7], a[8] + b[8]),
+    )
 
 
 @kernel
@@ -82,6 +97,32 @@ def scale(s, a):
 def dot(a, b):
     """A . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def dot_wrench(wrench, twist):
+    """Product of a row with moment and force, and one with an angular and a linear part."""
+    return dot(wrench.moment, twist.angular) + dot(wrench.force, twist.linear)
+
+
+@kernel
+def dot_momentum(momentum, twist):
+    """Product of two rows with an angular and a linear part."""
+    return dot(momentum.angular, twist.angular) + dot(momentum.linear, twist.linear)
+
+
+@kernel
+def add_wrench(row, moment, force):
+    """Add to the moment and the force of a row."""
+    row.moment = add(row.moment, moment)
+    row.force = add(row.force, force)
+
+
+@kernel
+def add_twist(row, angular, linear):
+    """Add to the angular and the linear part of a row."""
+    row.angular = add(row.angular, angular)
+    row.linear = add(row.linear, linear)
 
 
 @kernel

@@ -17,6 +17,11 @@ def is_rod(bundle: xr.Dataset) -> bool:
     return bundle.sizes["corner"] == 2
 
 
+def has_edges(bundle: xr.Dataset) -> bool:
+    """Whether the surface has edges, and is not round all over."""
+    return not is_rod(bundle) or "outline" in bundle
+
+
 def surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Points of the deformed surface [m], shape (point, 3), and the size of their displacement [m], (point,).
 

@@ -28,27 +28,35 @@ def centre_line(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[
 
 
 def surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Points of the deformed round surface [m], shape (ring, around, 3), and the displacement size [m], (ring,).
+    """Points of the deformed surface [m], shape (ring, around, 3), and the displacement size [m], (ring,).
 
     The sections stay plane and turn with the rod, so that torsion is seen too; both ends are capped.
     """
     points, displacement, turn = centre_line(bundle, q, scale)
-    axis = points[-1] - points[0]
-    axis /= np.linalg.norm(axis)
-    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    side /= np.linalg.norm(side)
-    phi = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
-    spokes = np.outer(np.cos(phi), side) + np.outer(np.sin(phi), np.cross(axis, side))
-    radius = np.append(np.repeat(bundle.radius.values, PER_CELL), bundle.radius.values[-1])[:, None, None]
-    turned = spokes[None] + np.cross(turn[:, None, :], spokes[None])
-    # a large drawn rotation stretches linearised spokes: keep the section round
-    turned *= radius / np.linalg.norm(turned, axis=-1, keepdims=True)
+    cells = _spokes(bundle, points)
+    spokes = np.concatenate([np.repeat(cells, PER_CELL, axis=0), cells[-1:]])
+    turned = spokes + np.cross(turn[:, None, :], spokes)
+    # a large drawn rotation stretches linearised spokes: keep the section's size
+    turned *= np.linalg.norm(spokes, axis=-1, keepdims=True) / np.linalg.norm(turned, axis=-1, keepdims=True)
     centres = (points + displacement)[:, None, :]
     rings = centres + turned
     # flat caps: the first and last rings, shrunk to their centres
     rings = np.concatenate([np.repeat(centres[:1], AROUND + 1, 1), rings, np.repeat(centres[-1:], AROUND + 1, 1)])
     size = np.linalg.norm(displacement, axis=-1)
     return rings, np.concatenate([size[:1], size, size[-1:]])
+
+
+def _spokes(bundle: xr.Dataset, points: np.ndarray) -> np.ndarray:
+    """From the centre line to the outline of each cell [m], shape (cell, around, 3)."""
+    if "outline" in bundle:
+        return np.asarray(bundle["outline"].values)
+    axis = points[-1] - points[0]
+    axis /= np.linalg.norm(axis)
+    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    side /= np.linalg.norm(side)
+    phi = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
+    circle = np.outer(np.cos(phi), side) + np.outer(np.sin(phi), np.cross(axis, side))
+    return np.asarray(bundle.radius.values[:, None, None] * circle)
 
 
 def scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:

@@ -49,6 +49,11 @@ POST: Schema = {
         ("drive",), "N", "largest magnitude of what the drive supplies", optional=True, turning="N m"
     ),
     "peak_drive_force_time": _V(("drive",), "s", "time of that magnitude", optional=True),
+    "peak_stress": _V(("gauge",), "Pa", "largest von Mises stress of the gauge", optional=True),
+    "peak_stress_time": _V(("gauge",), "s", "time of that stress", optional=True),
+    "peak_stress_position": _V(
+        ("gauge", "axis"), "m", "undeformed position of that stress, body frame; of a rod its section's", optional=True
+    ),
     "eccentricity": _V(("time", "contact"), "m", "distance of ball and socket centres", optional=True, turning="rad"),
     "clearance": _V(("contact",), "m", "radial clearance; of a plane without meaning", optional=True, turning="rad"),
     "impact_time": _V(("impact",), "s", "time of a closing above the impact threshold", optional=True),

@@ -100,6 +100,12 @@ def extremes(run: xr.Dataset | LabelledArrays, reaction: np.ndarray) -> Variable
     for name, (dims, values) in series.items():
         variables[f"peak_{name}"] = (dims, values.max(axis=0, initial=0.0))
         variables[f"peak_{name}_time"] = (dims, run["time"].values[first_largest(values, axis=0)])
+    if "von_mises_stress" in run:
+        at = first_largest(run["von_mises_stress"].values, axis=0)
+        gauges = np.arange(len(at))
+        variables["peak_stress"] = (("gauge",), run["von_mises_stress"].values[at, gauges])
+        variables["peak_stress_time"] = (("gauge",), run["time"].values[at])
+        variables["peak_stress_position"] = (("gauge", "axis"), run["stress_position"].values[at, gauges])
     if "event_peak_force" in run:
         variables["peak_force"] = (("contact",), _peak_force(run))
     return variables

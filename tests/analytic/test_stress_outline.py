@@ -11,7 +11,8 @@ import xarray as xr
 
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.dynamics.record.stress import Motion, peak_stresses, section_forces
+from flexclear.pipeline.dynamics.record.body_loads import Motion
+from flexclear.pipeline.dynamics.record.stress import peak_stresses, section_forces
 from flexclear.pipeline.structure.fe import section as sections
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
@@ -40,7 +41,7 @@ def peaks(found: Outline, forces: list[float]) -> tuple[float, float]:
             "section_round": (("section",), np.array([found.round], dtype=np.int8)),
         }
     )
-    axial, mises = peak_stresses(data, np.array(forces)[None, None])
+    axial, mises, _ = peak_stresses(data, np.array(forces)[None, None])
     return float(axial[0, 0]), float(mises[0, 0])
 
 
@@ -55,7 +56,7 @@ def test_rounding_does_not_choose_between_tension_and_compression(nudge: float) 
             "section_round": (("section",), np.zeros(1, dtype=np.int8)),
         }
     )
-    axial, _ = peak_stresses(data, np.array([0.0, 0.0, 0.0, 0.0, 2.0, 0.0])[None, None])
+    axial, _, _ = peak_stresses(data, np.array([0.0, 0.0, 0.0, 0.0, 2.0, 0.0])[None, None])
     assert axial[0, 0] == pytest.approx(-2e6, rel=1e-14)
 
 
@@ -137,7 +138,7 @@ def test_shear_of_a_round_section_sums_to_its_force(hole: float) -> None:
 def reduced(**changes: Any) -> xr.Dataset:
     grid = build(**changes)
     found = solve(grid, "craig-bampton", 6)
-    return bundle.build(grid, found, recover(grid, found))
+    return bundle.build(grid, found, recover(grid, found, {}))
 
 
 def test_a_tapered_tube_knows_its_end_sections() -> None:
@@ -223,9 +224,9 @@ def test_only_flexible_bodies_have_sections(root: Path, names: list[str]) -> Non
     assert names == [] or names[-1] in str(caught.value)
 
 
-def test_a_solid_is_refused_with_the_place(root: Path, tmp_path: Path) -> None:
-    recipe = tmp_path / "block.toml"
-    recipe.write_text('elements = 1\n[shape]\ntype = "block"\n')
+def test_matrices_alone_are_refused_with_the_place(root: Path, tmp_path: Path) -> None:
+    recipe = tmp_path / "part.toml"
+    recipe.write_text('[shape]\ntype = "matrices"\n')
     graph = clamped(root, {"output.stress": ["rod"], "body.rod.mesh": str(recipe)})
-    with pytest.raises(InputError, match=r"\[output\] stress.*solid"):
+    with pytest.raises(InputError, match=r"\[output\] stress.*matrices"):
         graph.up_to("bundle")

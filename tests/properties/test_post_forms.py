@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+import tomllib
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -15,13 +16,17 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.post.body_shape import surface
 from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, shape_files, surfaces, vibrations
 from flexclear.pipeline.post.render.forms import Seat
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
 from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.render.solids import equivalent
 from flexclear.pipeline.post.render.vibrations import Vibrations
-from flexclear.pipeline.post.rod_shape import AROUND
+from flexclear.pipeline.post.render.wheels import wheels
+from flexclear.pipeline.post.rod_shape import AROUND, PER_CELL
+from flexclear.pipeline.structure.kinds.kind import of_recipe
+from flexclear.pipeline.structure.modes.rigid import drawn
 from flexclear.stages import s4_simulate, s6_render
 from tests.paper import synthetic
 
@@ -305,3 +310,49 @@ def test_what_cannot_be_shown_so_is_not_offered(what: str, kind: str):
 
     assert kind not in MAKERS[what]
     assert {name: tuple(kinds) for name, kinds in MAKERS.items()} == s6_render.FORMATS
+
+
+# Wheels and sections --------------------------------------------------------------------------------------------------
+
+
+def test_wheels_of_gears_touch_where_their_pitch_circles_do(root: Path):
+    """Thirty teeth each of sun and planets, ninety of the ring, 90 mm between the axes; a rack at 100 mm."""
+    given = tomllib.loads((root / "scenes" / "checks" / "gears.toml").read_text())
+    given["gear"]["rack"]["ratio"] = -0.1
+    offsets = {"planet1.axis": [0.09, 0, 0], "planet2.axis": [-0.045, 0.0779, 0], "planet3.axis": [-0.045, -0.0779, 0]}
+
+    def placed(frame: str) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(offsets.get(frame, [0.0, 0.0, 0.0]), dtype=float), np.eye(3)
+
+    found = wheels(given, placed)
+    # the offsets are rounded to a tenth of a millimetre
+    assert [(w.radius, w.inner) for w in found["sun"][:1]] == [(pytest.approx(0.045, abs=1e-4), False)]
+    assert [(w.radius, w.inner) for w in found["ring"][:1]] == [(pytest.approx(0.135, abs=1e-4), True)]
+    assert found["planet2"][0].radius == pytest.approx(0.045, abs=1e-4)
+    assert found["wheel"][0].radius == 0.1
+    assert "rack" not in found
+
+
+def test_a_ring_and_a_tube_are_seen_from_outside():
+    """The volume that the triangles enclose is positive, as of every other form."""
+    where = Seat("ring.axis", np.zeros(3), np.eye(3), "revolute", False)
+    turn = np.linspace(0.0, 2.0 * np.pi, 129)
+    torus = surfaces.tube(np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn]), 0.1, corners=12)
+    for shape in (torus, *(forms.wheel_of_gear(where, 1.0, 1.0, inner=inner) for inner in (True, False))):
+        a, b, c = np.moveaxis(shape.points[shape.triangles], 1, 0)
+        assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0
+
+
+def test_a_rectangular_rod_is_drawn_with_its_sides(root: Path):
+    """Width along y and height along z of the rod, at every ring; a tube has its outer radius."""
+    recipe = tomllib.loads((root / "meshes" / "checks" / "leg.toml").read_text())
+    shape = {"type": "straight-beam", "length": 0.2}
+    plain = {"elements": 2, "shape": shape, "material": recipe["material"], "frames": {"a": {"x": 0.0}}}
+    rectangle = {"section": {"type": "rectangle", "width": 0.012, "height": 0.008}}
+    flat = drawn(of_recipe(plain).build(plain | rectangle, root))
+    points, _ = surface(flat, np.zeros(1))
+    assert np.ptp(points, axis=0) == pytest.approx([0.2, 0.012, 0.008], abs=1e-15)
+    corners = np.abs(np.abs(points[:, 1:]) - [0.006, 0.004]).max(axis=1) < 1e-12
+    assert corners.sum() == 5 * (2 * PER_CELL + 1)  # the first one is there twice
+    round_one = plain | {"section": {"type": "tube", "radius": 0.01, "inner_radius": 0.008}}
+    assert drawn(of_recipe(plain).build(round_one, root))["radius"].values == pytest.approx(0.01, rel=1e-12)

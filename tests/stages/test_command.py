@@ -141,7 +141,23 @@ def test_scenes_are_named_by_file_or_by_name(command: Said, root: Path):
     assert by_name[1].splitlines()[0] == "sps4/ideal"
 
 
-@pytest.mark.parametrize("arguments", [[], ["fly"], ["run"], ["run", "sps4/ideal", "--to", "moon"]])
+@pytest.mark.parametrize(
+    "arguments, said",
+    [
+        (["chek", "a.toml"], "chek: there is no such command\n  hint: did you mean 'check'?"),
+        (["fly"], "fly: there is no such command\n  hint: known: cache, check,"),
+        (["a.toml"], "a.toml: is no command\n  hint: a command comes first, as in: flexclear check a.toml"),
+        (["run", "checks/pendulum", "--jbos", "2"], "--jbos: there is no such option\n  hint: did you mean '--jobs'?"),
+        (["sweep", "a", "--workes=3"], "--workes: there is no such option\n  hint: did you mean '--workers'?"),
+    ],
+)
+def test_a_misspelt_command_or_option_gets_the_nearest_one(command: Said, arguments: list[str], said: str):
+    code, _, err = command(*arguments)
+    assert code == 2
+    assert err.startswith(f"flexclear: {said}")
+
+
+@pytest.mark.parametrize("arguments", [[], ["run"], ["run", "sps4/ideal", "--to", "moon"]])
 def test_usage_mistakes_end_with_2(command: Said, arguments: list[str]):
     code, _, err = command(*arguments)
     assert code == 2

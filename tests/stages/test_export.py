@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.table import table
 from flexclear.pipeline.core.errors import InputError
 from flexclear.stages import export
 
@@ -27,11 +28,25 @@ def dataset() -> xr.Dataset:
 
 
 def test_a_table_has_a_column_for_each_component(dataset: xr.Dataset) -> None:
-    found = export.table(dataset)
+    found = table(dataset)
     assert list(found.columns[:3]) == ["position crank x [m]", "position crank y [m]", "position crank z [m]"]
     assert found.shape == (2, 7)
     assert found["position rod z [m]"].tolist() == [5.0, 11.0]
     assert found.index.tolist() == [0.0, 0.5]
+
+
+def test_a_sweep_has_a_row_for_each_point() -> None:
+    """Rows are the combinations of all parameters, the last of which varies fastest; coordinates have units."""
+    c = ("c", [1e-4, 2e-4], {"units": "m"})
+    data = xr.Dataset(
+        {"v": (("c", "mu", "axis"), np.arange(12.0).reshape(2, 3, 2), {"units": "m/s"}), "grid": ("mu", [1, 2, 3])},
+        {"c": c, "mu": [0.0, 0.1, 0.2], "axis": ["x", "y"]},
+    )
+    found = table(data, ("c", "mu"))
+    assert found.index.names == ["c [m]", "mu"]
+    assert found.index.tolist()[:4] == [(1e-4, 0.0), (1e-4, 0.1), (1e-4, 0.2), (2e-4, 0.0)]
+    assert found["v y [m/s]"].tolist() == [1.0, 3.0, 5.0, 7.0, 9.0, 11.0]
+    assert list(found.columns) == ["v x [m/s]", "v y [m/s]"]
 
 
 def test_what_is_written_can_be_read(dataset: xr.Dataset, tmp_path: Path) -> None:

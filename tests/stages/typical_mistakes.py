@@ -1,6 +1,6 @@
-"""A hundred mistakes that people make in a scene of their own, each as an edit of the slider-crank to start from.
+"""Mistakes that people make in a scene of their own, each as an edit of the slider-crank to start from.
 
-(file, what stands there, what is written instead).  What is said of each is in `typical_mistakes.txt`.
+(file, its text, what is written instead).  The message of each is in `typical_mistakes.txt`.
 """
 
 # ruff: noqa: E501 - an edit is easier to read on one line
@@ -8,6 +8,10 @@
 from __future__ import annotations
 
 SCENE, ROD = "slider_crank.toml", "rod.toml"
+CONTROLLER = '\n[load.hold]\ntype = "pid"\njoint = "guide"\nproportional = {}\nreference = {}\n'
+GEAR = '\n[gear.pair]\nfirst = "main"\nsecond = "wrist"\nratio = {}\n'
+STOP = '\n[stop.end]\njoint = "guide"\nlower = 0\nupper = {}\nnormal = {{ {} }}\n'
+SPRING = '\n[load.spring]\ntype = "spring-damper"\nbetween = ["ground.main", "slider.pin"]\n{}\n'
 #: name -> file, text in it, text in its place; the text None appends
 MISTAKES: dict[str, tuple[str, str | None, str]] = {
     # quantities
@@ -58,7 +62,7 @@ MISTAKES: dict[str, tuple[str, str | None, str]] = {
     "unknown joint type": (SCENE, 'type = "prismatic"', 'type = "slider"'),
     "unknown table": (SCENE, "[load.gravity]", "[force.gravity]"),
     "plural table": (SCENE, "[body.crank]", "[bodies.crank]"),
-    "misspelt section": (SCENE, "[solver]", "[slover]"),
+    "misspelt section": (SCENE, None, '\n[slover]\nrtol = 1e-5\n'),
     "unknown load": (SCENE, 'type = "gravity"', 'type = "weight"'),
     "unknown law": (SCENE, 'type = "step"', 'type = "ramp"'),
     "unknown contact law": (SCENE, 'law = "flores"', 'law = "florez"'),
@@ -115,9 +119,9 @@ MISTAKES: dict[str, tuple[str, str | None, str]] = {
     "negative number of modes": (SCENE, "count = 13 }", "count = -1 }"),
     "half a mode": (SCENE, "count = 13 }", "count = 12.5 }"),
     "damping of zero": (SCENE, "damping = 0.02", "damping = 0"),
-    "unknown integrator": (SCENE, 'integrator = "radau"', 'integrator = "rado"'),
-    "tolerance as text": (SCENE, "rtol = 1e-5", 'rtol = "tight"'),
-    "tolerance above one": (SCENE, "rtol = 1e-5", "rtol = 2"),
+    "unknown integrator": (SCENE, None, '\n[solver]\nintegrator = "rado"\n'),
+    "tolerance as text": (SCENE, None, '\n[solver]\nrtol = "tight"\n'),
+    "tolerance above one": (SCENE, None, "\n[solver]\nrtol = 2\n"),
     "gravity as a number": (SCENE, 'acceleration = [0, "-9.81 m/s^2", 0]', "acceleration = 9.81"),
     # recipes
     "misspelt key of a recipe": (ROD, "elements = 10", "element = 10"),
@@ -142,4 +146,67 @@ MISTAKES: dict[str, tuple[str, str | None, str]] = {
     "torque of a drive": (SCENE, 'joint = "main"', 'joint = "main"\ntorque = "2 N m"'),
     "friction called mu": (SCENE, "static = 0.1, dynamic = 0.08", "static = 0.1, dynamic = 0.08, mu = 0.1"),
     "frames of a flexible body": (SCENE, 'mesh = "rod.toml" ', 'frames.end = {}\nmesh = "rod.toml" '),
+    # implausible values, which are warnings
+    "mass in grams without a unit": (SCENE, 'mass = "0.8 kg"', "mass = 800"),
+    "inertia in kg mm^2 without a unit": (SCENE, '["600 kg mm^2", "600 kg mm^2", "1000 kg mm^2"]', "[600, 600, 1000]"),
+    "inertia of a body with one frame without a unit": (SCENE, '["150 kg mm^2", "150 kg mm^2", "150 kg mm^2"]', "[150, 150, 150]"),
+    "clearance in mm without a unit": (SCENE, 'clearance = "0.1 mm"', "clearance = 0.2"),
+    "degrees without a unit": (SCENE, 'change = "360 deg"', "change = 360"),
+    "interval longer than the run": (SCENE, 'interval = "0.1 ms"', 'interval = "1 s"'),
+    "forgotten joint": (SCENE, '[joint.wrist]\ntype = "revolute"\nbetween = ["rod.small_end", "slider.pin"]\n', ""),
+    "negative gain": (SCENE, None, CONTROLLER.format("-5", "0.2")),
+    "negative gain with a unit": (SCENE, None, CONTROLLER.format('"-5 N/mm"', "0.2")),
+    # meshes and modes
+    "more modes than the mesh has": (SCENE, "count = 13 }", "count = 500 }"),
+    "fewer modes than the interfaces need": (SCENE, "count = 13 }", "count = 3 }"),
+    "recipe without interfaces": (ROD, 'interfaces = ["big_end", "small_end"] ', ""),
+    "held direction that is none": (SCENE, 'reference = "craig-bampton", count = 13', 'reference = "constrained", held = ["big_end.u"], count = 7'),
+    "too few motions held": (SCENE, 'reference = "craig-bampton", count = 13', 'reference = "constrained", held = ["big_end.x"], count = 7'),
+    "same interface twice": (SCENE, "count = 13 }", 'count = 13, interfaces = ["big_end", "big_end"] }'),
+    "pins of a recipe along the rod": (ROD, 'small_end = { x = "200 mm", axes = { z = [0, 0, 1], x = [1, 0, 0] } }', 'small_end = { x = "200 mm" }'),
+    "rod twice as long": (ROD, 'length = "200 mm"', 'length = "400 mm"'),
+    "frequency as a force": (SCENE, "count = 13 }", 'up_to = "5 kN" }'),
+    "damping in per cent without a sign": (SCENE, "damping = 0.02", 'damping = "two"'),
+    # the start
+    "position of a frame in mm without a unit": (SCENE, 'frames.pin = { position = ["50 mm", 0, 0] }\n\n[body.rod]', "frames.pin = { position = [50, 0, 0] }\n\n[body.rod]"),
+    "pose in mm without a unit": (SCENE, 'pose = { position = ["250 mm", 0, 0] }', "pose = { position = [250, 0, 0] }"),
+    "axis of a joint turned": (SCENE, 'frames.guide = { axes = { z = [1, 0, 0], x = [0, 1, 0] } }\n\n#', "frames.guide = {}\n\n#"),
+    "drive twice": (SCENE, None, '\n[drive.again]\njoint = "main"\nlaw = 0\n'),
+    "drive far from the pose": (SCENE, 'law = { type = "step", start = "0 s", end = "0.12 s", change = "360 deg" }', 'law = { type = "polynomial", coefficients = ["90 deg", "60 rpm"] }'),
+    "start of a joint in another unit": (SCENE, None, '\n[start.joint.guide]\nposition = "90 deg"\n'),
+    "start of an unknown joint": (SCENE, None, '\n[start.joint.pim]\nposition = 0\n'),
+    "joint of a body with itself": (SCENE, 'between = ["ground.main", "crank.main"]', 'between = ["crank.pin", "crank.main"]'),
+    # other parts
+    "ratio of teeth as a fraction": (SCENE, None, GEAR.format('"-20/60"')),
+    "ratio in another unit": (SCENE, None, GEAR.format('"3 kg"')),
+    "gear of an unknown joint": (SCENE, None, GEAR.format("-3").replace('"main"', '"mian"')),
+    "gain in another unit": (SCENE, None, CONTROLLER.format('"5 N m/rad"', "0.2")),
+    "reference of a controller in another unit": (SCENE, None, CONTROLLER.format("5", '"90 deg"')),
+    "stop without stiffness": (SCENE, None, STOP.format("0.1", 'law = "flores", restitution = 0.5')),
+    "stop whose ends are exchanged": (SCENE, None, STOP.format("-0.1", 'law = "flores", restitution = 0.5, stiffness = 1e6')),
+    "spring without free length": (SCENE, None, SPRING.format('stiffness = "2 N/mm"')),
+    "spring of negative stiffness": (SCENE, None, SPRING.format('stiffness = -2\nfree_length = "50 mm"')),
+    "force of two components": (SCENE, None, '\n[load.push]\ntype = "point-force"\nframe = "slider.pin"\nforce = [1, 0]\n'),
+    "table of a law that is not there": (SCENE, 'law = { type = "step", start = "0 s", end = "0.12 s", change = "360 deg" }', 'law = { type = "table", file = "angle.csv", time = { column = 1, unit = "s" }, value = { column = 2, unit = "deg" } }'),
+    "rate in another unit": (SCENE, 'law = { type = "step", start = "0 s", end = "0.12 s", change = "360 deg" }', 'law = { type = "polynomial", coefficients = [0, "60 N"] }'),
+    "accuracy in another unit": (SCENE, None, '\n[accuracy]\nslider.position = "1 deg"\n'),
+    "accuracy of an unknown quantity": (SCENE, None, '\n[accuracy]\nslider.positon = "1 um"\n'),
+    "watched expression with an unknown quantity": (SCENE, '"slider.position"', '"slider.position.x - crank.height"'),
+    "gravity as a speed": (SCENE, 'acceleration = [0, "-9.81 m/s^2", 0]', 'acceleration = [0, "-9.81 m/s", 0]'),
+    "one member": (SCENE, None, "\n[ensemble]\nmembers = 1\n"),
+    "period below zero": (SCENE, None, '\n[sections]\nperiod = "-1 s"\n'),
+    "memory without a unit of bytes": (SCENE, None, '\n[limits]\nmemory = "4 gigs"\n'),
+    "removed without extends": (SCENE, "title = ", 'remove = ["joint.pin"]\ntitle = '),
 }  # fmt: skip
+#: implausible, but not refused
+WARNED = (
+    "mass in grams without a unit",
+    "inertia in kg mm^2 without a unit",
+    "inertia of a body with one frame without a unit",
+    "clearance in mm without a unit",
+    "degrees without a unit",
+    "interval longer than the run",
+    "forgotten joint",
+    "negative gain",
+    "negative gain with a unit",
+)

@@ -20,6 +20,8 @@ SOLID: Schema = {
     "tie_node": _V(("tie",), "1", "tied node"),
     "tie_weight": _V(("tie",), "1", "its weight in a mean"),
     "tie_frame": _V(("tie",), "1", "index of the frame that it is tied to among `frame`"),
+    "patch_node": _V(("patch",), "1", "node of the boundary in a named region"),
+    "patch_region": _V(("patch",), "1", "index of that region among `surface_region`"),
 }
 
 #: next to stage 3: what a rigid body made from a mesh needs
@@ -61,7 +63,7 @@ MATRICES: Schema = {
     "pair_value": _V(("pair_entry",), "kg", "integral of rho S_k S_l", optional=True),
 }
 
-#: stage 3 on request: what section forces and stresses follow from
+#: stage 3 on request: what section forces and stresses follow from, of rods and of solids
 STRESS: Schema = {
     "section_place": _V(
         ("section",), "m", "position of the section along the rod; one at either end of each cell", True
@@ -95,6 +97,12 @@ STRESS: Schema = {
         turning="m-3",
     ),
     "section_round": _V(("section",), "1", "one where the section is the same about every axis", True),
+    "stress_field": _V(
+        ("node", "tensor", "field"), "Pa", "stress at the node, body axes, per unit of the field's factor in SI", True
+    ),
+    "node_doubtful": _V(("node",), "1", "one where a cell of the node touches a rigidly tied frame", True),
+    "gauge_node": _V(("gauge_entry",), "1", "node of a gauge", True),
+    "gauge_index": _V(("gauge_entry",), "1", "index of that gauge among `gauge`", True),
 }
 
 #: stages 2 and 3: what the reduced body lacks next to the full model
@@ -228,5 +236,11 @@ BUNDLE: Schema = (
             ("node", "axis", "mode"), "rad m-1", "node rotation vector per modal coordinate, body axes"
         ),
         "radius": _V(("cell",), "m", "radius of the drawn section"),
+        "outline": _V(
+            ("cell", "around", "axis"),
+            "m",
+            "from a rod's centre line to points around its section, body axes, the first again last; not of round ones",
+            optional=True,
+        ),
     }
 )

@@ -76,6 +76,7 @@ COORDINATES: Schema = {
     "node": _number("node", "number of the node, from 0; `cell_node` refers to it"),
     "cell": _number("cell", "number of the cell, from 0"),
     "corner": _number("corner", "number of the corner of a cell, from 0"),
+    "around": _number("around", "number of the point around a drawn section, from 0"),
     "point": _number("point", "number of the Gauss point, from 0"),
     "region": _words("region", "name of the region of cells of one material"),
     "lump": _number("lump", "number of the lumped mass, from 0"),
@@ -85,6 +86,13 @@ COORDINATES: Schema = {
     "section_load": _words("section_load", "section force N, Qy, Qz, or moment T, My, Mz"),
     "section_load_motion": _words("section_load", "translation for forces, rotation for moments"),
     "stress": _words("stress", "axial stress, and shear stress along y and z"),
+    "tensor": _words("tensor", "component of a symmetric tensor"),
+    "field": _words("field", "what a field's factor is: mode, frame with direction, or acceleration"),
+    "stress_field": _words("stress_field", "body, and what its stress field's factor is"),
+    "stress_field_body": _words("stress_field", "body whose stress field it is"),
+    "gauge": _words("gauge", "body, for all of it, or body.gauge; in the files of one body its gauges"),
+    "gauge_body": _words("gauge", "body that the gauge is on"),
+    "surface_region": _words("surface_region", "name of a region with nodes on the boundary"),
     "slice": _number("slice", "number of the slice, from 0"),
     "fibre": _number("fibre", "number of the fibre, from 0"),
     "member": _number("member", "number of the member, from 0"),
@@ -101,7 +109,7 @@ COORDINATES: Schema = {
 }
 #: dimensions whose entries have no other name than their number, and the number of the first
 NUMBERED = {
-    **dict.fromkeys(("node", "cell", "corner", "point", "lump", "section", "slice", "fibre"), 0),
+    **dict.fromkeys(("node", "cell", "corner", "around", "point", "lump", "section", "slice", "fibre"), 0),
     **dict.fromkeys(("followed", "lag", "component", "band", "sector"), 0),
     **dict.fromkeys(("mode", "mode2", "rigid_mode"), 1),
 }
@@ -112,6 +120,7 @@ NAMED: Mapping[str, tuple[str, ...]] = {
     "quat": QUATERNION,
     "section_load": ("N", "Qy", "Qz", "T", "My", "Mz"),
     "stress": ("axial", "shear_y", "shear_z"),
+    "tensor": ("xx", "yy", "zz", "yz", "xz", "xy"),
 }
 #: motions of entries that are always the same
 MOTIONS: Mapping[str, tuple[str, ...]] = {

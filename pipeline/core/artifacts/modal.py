@@ -10,7 +10,7 @@ from flexclear.pipeline.core.errors import InputError
 #: dimensions that count modes
 DIMENSIONS = ("mode", "mode2")
 #: what was measured of all modes together and cannot be derived for fewer
-OF_ALL = ("error_bound", "bound_frequency")
+OF_ALL = ("error_bound", "bound_frequency", "stress_field", "field")
 
 
 @xr.register_dataset_accessor("modal")

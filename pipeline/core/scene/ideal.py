@@ -40,7 +40,7 @@ def ideal(scene: Scene, effects: tuple[str, ...] = tuple(EFFECTS)) -> Scene:
             "compare it with another scene: flexclear compare A B",
         )
     if "flexibility" in effects and scene.output.stress is not None:
-        changes["output"] = scene.output.model_dump(mode="json", exclude={"stress"}, exclude_none=True)
+        changes["output"] = scene.output.without(scene.output.stress)
     return edited(scene, changes | owned(scene, tuple(loose(scene)) if "clearance" in effects else ()))
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 from flexclear.pipeline.core.scene.load import FAMILIES, SETTINGS
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.sweep import Sweep
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 #: definitions of parts of which only some keys are given, next to those of whole parts
@@ -39,6 +40,14 @@ def scene_schema() -> dict[str, Any]:
         "then": {"required": required, **{"properties": dict.fromkeys(("replace", "set", "remove"), False)}},
     }
     return identified(schema, "scene")
+
+
+def sweep_schema() -> dict[str, Any]:
+    """The schema of a sweep file; the values of a parameter may be a list without a key."""
+    schema = Sweep.model_json_schema(mode="validation", by_alias=True)
+    vary = schema["properties"]["vary"]
+    vary["additionalProperties"] = {"anyOf": [vary["additionalProperties"], {"type": "array", "minItems": 1}]}
+    return identified(schema, "sweep")
 
 
 def identified(schema: dict[str, Any], kind: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
 from flexclear.pipeline.core.scene.fields import Angle, Part, Rate, Time
-from flexclear.pipeline.core.units import UNITS, any_quantity, quantity, unit
+from flexclear.pipeline.core.units import any_quantity, quantity, unit, unknown
 
 _TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits the quantity"}
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]
@@ -162,7 +162,7 @@ class Column(Part):
     @classmethod
     def _known(cls, text: str) -> str:
         if text != "1" and unit(text) is None:
-            raise ValueError(f"unknown unit '{text}'; known: {', '.join(UNITS)}, products of them, and 1 for a number")
+            raise ValueError(f"{unknown(text)}; 1 is the unit of a number")
         return text
 
 

@@ -4,23 +4,74 @@ A request is a key of ``[output]``, with the variables that it adds to the run's
 name in `pipeline.dynamics.record` makes them.
 """
 
-from typing import Annotated, Any
+from collections.abc import Collection
+from typing import Annotated, Any, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Part, Time
+from flexclear.pipeline.core.scene.fields import Part, Position, Time
 from flexclear.pipeline.core.variable import Schema, Variable
+
+
+class Gauge(Part):
+    """Where on the surface of a solid its stress is recorded: one of position, frame and region.
+
+    body: the solid, one of those in `stress`.  position: of the nearest node, body frame.  frame: a frame of its
+    recipe, for the nodes that are tied to it.  region: a named region of its mesh.
+    """
+
+    body: str
+    position: Position | None = None
+    frame: str | None = None
+    region: str | None = None
+
+    @model_validator(mode="after")
+    def _one_rule(self) -> Self:
+        rules = ("position", "frame", "region")
+        given = [name for name in rules if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(f"one of {', '.join(rules)} says where, not {' and '.join(given) or 'none'}")
+        return self
 
 
 class Output(Part):
     """Regular output interval; drive breaks and events are always added.
 
-    stress: flexible bodies whose section forces and peak stresses are recorded.
+    stress: flexible bodies whose stresses are recorded: section forces and peaks of rods, surfaces of solids.
+    gauges: where on solids stress is recorded next to the peak.
     interval: time between two regular outputs.
     """
 
     interval: Annotated[Time, Field(gt=0.0)] = 1e-4
     stress: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    gauges: Annotated[dict[str, Gauge], Field(min_length=1)] | None = None
+
+    @model_validator(mode="after")
+    def _gauges_are_on_stressed_bodies(self) -> Self:
+        for name, gauge in (self.gauges or {}).items():
+            if gauge.body not in (self.stress or ()):
+                asked = ", ".join(self.stress or ()) or "none"
+                raise ValueError(f"gauges.{name}: '{gauge.body}' is none of the bodies in `stress` ({asked}); add it")
+        return self
+
+    def gauge_names(self, body: str) -> list[str]:
+        """Gauges of a body, as the run calls them."""
+        return [f"{body}.{name}" for name in self.on(body)]
+
+    def on(self, body: str) -> dict[str, Gauge]:
+        """The gauges of a body."""
+        return {name: gauge for name, gauge in (self.gauges or {}).items() if gauge.body == body}
+
+    def without(self, bodies: Collection[str]) -> dict[str, Any]:
+        """The same as a table in which the stresses of these bodies are not asked for."""
+        table = self.model_dump(mode="json", exclude_none=True, exclude={"stress", "gauges"})
+        stress = [name for name in self.stress or () if name not in bodies]
+        gauges = {
+            name: gauge.model_dump(mode="json", exclude_none=True)
+            for name, gauge in (self.gauges or {}).items()
+            if gauge.body not in bodies
+        }
+        return table | ({"stress": stress} if stress else {}) | ({"gauges": gauges} if gauges else {})
 
     def requests(self) -> dict[str, Any]:
         """What is asked for, by key."""
@@ -50,6 +101,22 @@ VARIABLES: dict[str, Schema] = {
         ),
         "peak_von_mises_stress": Variable(
             ("time", "section"), "Pa", "largest von Mises stress of the section", optional=True
+        ),
+        "von_mises_stress": Variable(
+            ("time", "gauge"), "Pa", "von Mises stress of the gauge's node where it is largest", optional=True
+        ),
+        **{
+            f"{rank}_principal_stress": Variable(
+                ("time", "gauge"), "Pa", f"{size} principal stress there, tension positive", optional=True
+            )
+            for rank, size in (("first", "largest"), ("second", "middle"), ("third", "smallest"))
+        },
+        "stress_position": Variable(
+            ("time", "gauge", "axis"), "m", "undeformed position of that node, body frame", optional=True
+        ),
+        "stress_tensor": Variable(("time", "gauge", "tensor"), "Pa", "stress there, body axes", optional=True),
+        "stress_factor": Variable(
+            ("time", "stress_field"), "1", "what the bundle's stress field is multiplied by, SI", optional=True
         ),
     },
 }

@@ -29,7 +29,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
         scene.contacts(),
         _still(name for name, body in scene.body.items() if not isinstance(body, Ground)),
     )
-    stops = {f"{name}.{end}": _turns(scene, stop) for name, stop in scene.stop.items() for end in stop.ends}
+    stops = {f"{name}.{end}": turns(scene, stop) for name, stop in scene.stop.items() for end in stop.ends}
     controllers = {name: load for name, load in forces.items() if isinstance(load, (Pid, SampledPid))}
     modes = {name: body.modes.count for name, body in scene.flexible().items()}
     return {
@@ -38,7 +38,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
         "joint": _still(scene.joint),
         "coordinate": _coordinates(scene),
         "drive": dict(_drives(scene)),
-        "controller": {name: _turns(scene, load) for name, load in controllers.items()},
+        "controller": {name: turns(scene, load) for name, load in controllers.items()},
         "gear": {name: _named(scene, gear.second) for name, gear in scene.gear.items()},
         "load": {name: _measures_angle(scene, load) for name, load in forces.items()},
         "bushing": _still(name for name, load in forces.items() if isinstance(load, Bushing)),
@@ -47,6 +47,7 @@ def owners(scene: Any) -> dict[str, dict[str, bool]]:
         "worn": _still(scene.worn()),
         "mode": _still(f"{n}.{k}" for n, c in modes.items() if isinstance(c, int) for k in range(1, c + 1)),
         "section": _still(scene.output.stress or ()),
+        "gauge": _still(n for body in scene.output.stress or () for n in (body, *scene.output.gauge_names(body))),
         "": _still(_of_all(scene)),
     }
 
@@ -85,10 +86,10 @@ def _drives(scene: Any) -> Iterator[tuple[str, bool]]:
         if isinstance(drive, PathDrive):
             yield from ((f"{name}.{part}", part.startswith("rotation")) for part, _ in drive.components())
         else:
-            yield name, _turns(scene, drive)
+            yield name, turns(scene, drive)
 
 
-def _turns(scene: Any, part: Any) -> bool:
+def turns(scene: Any, part: Any) -> bool:
     """Whether the coordinate of a part with `joint` and `coordinate` is an angle."""
     joint = scene.joint.get(part.joint)
     known = COORDINATES.get(joint.type, {}) if joint is not None else {}
@@ -104,4 +105,4 @@ def _named(scene: Any, text: str) -> bool:
 def _measures_angle(scene: Any, load: Any) -> bool:
     if getattr(load, "measured", None):
         return _named(scene, load.measured)
-    return hasattr(load, "joint") and _turns(scene, load)
+    return hasattr(load, "joint") and turns(scene, load)

@@ -37,13 +37,16 @@ OWNERS = {
     "rubbing": "joint with friction",
     "worn": "joint with wear",
     "mode": "mode, `body.number`",
-    "section": "body whose stresses are recorded",
+    "section": "rod whose stresses are recorded",
+    "gauge": "body whose stresses are recorded, or `body.gauge`",
     "": "the whole mechanism",
 }
 #: front of a variable's name that says the kind of part
 _FRONTS = ("frame_", "joint_", "drive_", "controller_", "gear_", "load_", "bushing_", "contact_", "wear_")
 #: variables whose quantity has another name
 _RENAMED = {"quaternion": "orientation", "joint_force": "force", "joint_moment": "moment", "contact_impulse": "impulse"}
+#: other words for a quantity
+_ALSO = {"von_mises_stress": {"von_mises", "peak_von_mises"}}
 #: what says how well the equations are posed, and no quantity
 _INDICATORS = ("mobility", "rank", "condition")
 #: what contacts have once per run or event, not over time
@@ -80,7 +83,8 @@ def _kinds() -> dict[str, Kind]:
     for name, variable in RUN.items():
         owner = variable.dims[1] if len(variable.dims) > 1 else ""
         dim = variable.dims[2] if len(variable.dims) > 2 else ""
-        if variable.dims[:1] == ("time",) and owner in OWNERS and name not in _INDICATORS:
+        named = variable.dims[:1] == ("time",) and owner in OWNERS and dim != "tensor"
+        if named and name not in _INDICATORS:
             both = (as_written(variable.units), as_written(variable.turning or variable.units))
             known[_RENAMED.get(name, name)] = Kind(owner, name, both, dim, variable.long_name)
     known["orientation"] = known["orientation"]._replace(units=("rad", "rad"))
@@ -99,7 +103,7 @@ def _words() -> dict[str, list[str]]:
     for key, kind in KINDS.items():
         front = next((front for front in _FRONTS if kind.variable.startswith(front)), "")
         every = {key, kind.variable.removeprefix(front)} | ({kind.variable} if key not in OF_CONTACTS[::2] else set())
-        for word in every - {EXPRESSION, ""}:
+        for word in (every | _ALSO.get(key, set())) - {EXPRESSION, ""}:
             words.setdefault(word, []).append(key)
     return words
 

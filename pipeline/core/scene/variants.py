@@ -103,9 +103,7 @@ def _settings(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
     rigid = {effect.owner for effect in gone if effect.kind == FLEXIBILITY}
     settings: dict[str, Any] = {}
     if scene.output.stress is not None and rigid & set(scene.output.stress):
-        output = scene.output.model_dump(mode="json", exclude={"stress"}, exclude_none=True)
-        left = [name for name in scene.output.stress if name not in rigid]
-        settings["output"] = output | ({"stress": left} if left else {})
+        settings["output"] = scene.output.without(rigid)
     if scene.start is not None and rigid & set(scene.start.modal):
         start = scene.start.model_dump(mode="json", exclude_none=True)
         settings["start"] = start | {"modal": {k: v for k, v in start["modal"].items() if k not in rigid}}

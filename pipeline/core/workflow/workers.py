@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
 
 
+#: what is said of a helper that somebody has killed
+LOST = "a helper process was killed; is the memory full? Finished results are stored: run again to go on"
+
+
 @dataclass(frozen=True)
 class Bell:
     """How workers are asked to stop, and why. deaf: how many have a task that cannot leave anything in good order."""
@@ -83,8 +87,7 @@ def lost() -> Iterator[None]:
     try:
         yield
     except (BrokenProcessPool, EOFError, ConnectionError):
-        text = "a helper process was killed; is the memory full? Finished results are stored: run again to go on"
-        raise ResourceError(text) from None
+        raise ResourceError(LOST) from None
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,8 @@ class Team:
         from multiprocessing.managers import SyncManager
 
         server, bell = SyncManager(ctx=_context()), Bell.made()
-        server.start(follow, (os.getpid(),))
+        with without_main():
+            server.start(follow, (os.getpid(),))
         return Team(width, pool(width, bell), bell, server, server.Queue())
 
     def end(self) -> None:

@@ -8,6 +8,7 @@ the integrator and on whether there are closures and contacts, not on joints or 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -53,7 +54,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
     Raises InputError when a name is not listed in its family.
     """
     names, parts = {part.module for part in named(scene)}, most_parts(scene)
-    return tuple(sorted(names.union(*(_composed(parts, scheme) for scheme in schemes(scene)))))
+    either = (parts, replace(parts, articulated=True))  # which, only the tree decides
+    return tuple(sorted(names.union(*(_composed(one, scheme) for one in either for scheme in schemes(scene)))))
 
 
 @cache
@@ -81,6 +83,7 @@ def specialised(parts: Parts, wiring: Wiring, lanes: int = 0) -> str:
     lanes: 0 for runs; of members of ensembles how many are evaluated at once, with equal bits whatever their number.
     """
     given, imports = _forces(parts)
+    given["tree"] = _tree(imports, parts)
     if parts.closures:
         given["closures"] = _closures(imports, parts)
     maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_rates")
@@ -100,6 +103,7 @@ def specialised(parts: Parts, wiring: Wiring, lanes: int = 0) -> str:
 
 def _evaluate(parts: Parts) -> str:
     given, imports = _forces(parts)
+    given["tree"] = _tree(imports, parts)
     if parts.closures:
         given["closures"] = _closures(imports, parts)
     if parts.harmonics:
@@ -134,7 +138,7 @@ def _observe(parts: Parts) -> str:
     if parts.harmonics:
         given["harmonics"] = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate")
     if parts.couplings:
-        given["couplings"] = _closures(imports, parts)
+        given["couplings"] = _import(imports, f"{DYNAMICS}.equations", "couplings")
     if parts.joint_frictions and parts.closures:
         given["friction"] = _import(imports, f"{DYNAMICS}.equations.joint_friction", "take_off_closures")
     maker = _import(imports, f"{DYNAMICS}.equations.observation", "make_observation")
@@ -168,20 +172,14 @@ def _events(imports: Imports, parts: Parts, scheme: Scheme) -> str:
     touching, chosen = parts.surfaces or parts.stops, not scheme.fixed
     if touching and not scheme.located:
         return _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
-    kinks = []
-    if parts.frictions and chosen:
-        kinks.append(_import(imports, f"{INTEGRATORS}.friction_kinks", "CONTACT_KINKS"))
-    if parts.joint_frictions and chosen:
-        kinks.append(_import(imports, f"{INTEGRATORS}.joint_friction_kinks", "BEARING_KINKS"))
-    if parts.load_kinks and chosen:
-        kinks.append(_import(imports, f"{INTEGRATORS}.load_kinks", "LOAD_FRICTION_KINKS"))
+    guarded = chosen and (parts.frictions or parts.joint_frictions or parts.load_kinks)
     if touching:
         located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
-        regimes = _import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")
-        return f"{located}({', '.join([regimes, *kinks])})"
-    if kinks:
-        return f"{_import(imports, f'{INTEGRATORS}.friction_kinks', 'kinks_alone')}({', '.join(kinks)})"
-    return ""
+        given = [_import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")]
+        if guarded:
+            given.append(_import(imports, f"{INTEGRATORS}.guards", "AMONG_CONTACTS"))
+        return f"{located}({', '.join(given)})"
+    return _import(imports, f"{INTEGRATORS}.guards", "GUARDS") if guarded else ""
 
 
 def _joints(parts: Parts) -> tuple[dict[str, str], Imports]:
@@ -218,12 +216,21 @@ def _joint_friction(imports: Imports, parts: Parts) -> str:
     laws = [listed(FRICTION_LAWS, law, where="parts")[0] for law in parts.joint_frictions]
     tractions = "".join(f"{_import(imports, FRICTION_LAWS, law)}.traction, " for law in laws)
     maker, drives = (_import(imports, module, name) for name in ("make_joint_friction", "load_drives"))
-    return f"({maker}(({tractions}), {parts.closures}), {drives})"
+    return f"({maker}(({tractions}), {parts.closures}, {_tree(imports, parts)}), {drives})"
+
+
+def _tree(imports: Imports, parts: Parts) -> str:
+    """The module that factors the mass matrix."""
+    return _import(imports, f"{DYNAMICS}.equations", "articulated" if parts.articulated else "composite")
 
 
 def _closures(imports: Imports, parts: Parts) -> str:
-    """The module of the closures: with couplings, or of joints alone."""
-    return _import(imports, f"{DYNAMICS}.equations", "couplings" if parts.couplings else "closures")
+    """The kernels of the closures: with couplings, or of joints alone."""
+    if parts.couplings:
+        maker = _import(imports, f"{DYNAMICS}.equations.couplings", "make_coupled_closing")
+    else:
+        maker = _import(imports, f"{DYNAMICS}.equations.closures", "make_closing")
+    return f"{maker}({_tree(imports, parts)})"
 
 
 def _projection(imports: Imports, parts: Parts) -> str:
@@ -284,8 +291,8 @@ def project(h, f, w, n, t, y, dy, tolerance):
     return projection(h, f, w, n, t, y, dy, tolerance)
 """
 RETRACT = """@calls.exported("retract")
-def retract(h, w, y, displacement, out, total):
-    retraction(h, w, y, displacement, out, total)
+def retract(h, f, w, n, y, displacement, out, total):
+    retraction(h, f, w, n, y, displacement, out, total)
     return 0
 """
 OBSERVE = """@calls.exported("observe")

@@ -119,12 +119,12 @@ def jump(law: Pieces, start: float, end: float) -> tuple[float, str] | None:
             here = left.value(right.start, order), right.value(right.start, order)
             step = abs(here[1] - here[0])
             # the size of the law is asked for last: most laws meet exactly
-            if step > 1e-6 * max(abs(here[0]), abs(here[1])) and step > 1e-6 * _size(law, start, end, order):
+            if step > 1e-6 * max(abs(here[0]), abs(here[1])) and step > 1e-6 * size(law, start, end, order):
                 return right.start, word
     return None
 
 
-def _size(law: Pieces, start: float, end: float, order: int) -> float:
+def size(law: Pieces, start: float, end: float, order: int) -> float:
     """Largest value of a law, or of a derivative, between two times, on a grid of each piece."""
     until = [*law.starts[1:], inf]
     spans = [

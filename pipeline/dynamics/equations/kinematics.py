@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import choose
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, cross, product, scale, turn
@@ -31,27 +30,44 @@ def rigid_site(d, s):
 
 
 @kernel
-def no_port(h, f, w, s):
+def no_port(d, s):
     """No body is flexible."""
 
 
 @kernel
-def undeformed(h, f, w):
+def undeformed(d):
     """No modes."""
 
 
 @kernel
-def rigid_inboard(h, f, w, i, p, R, omega, v, alpha, a):
+def no_column(d, k, angular, linear):
+    """Columns about the kernels' origin are enough."""
+
+
+@kernel
+def no_arm(d, i, arm):
+    """So are positions."""
+
+
+@kernel
+def rigid_inboard(d, i, p, R, omega, v, alpha, a):
     """A rigid link's frame is its inboard joint frame."""
     return p, R, omega, v, alpha, a
 
 
-def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
+def make_kinematics(
+    joints: tuple[Any, ...],
+    flexible: Any = None,
+    localise: Callable = no_column,
+    step: Callable = no_arm,
+) -> Callable:
     """The kernel kinematics(d) that moves everything.
 
     joints: modules of the joint types present.  flexible: kernels of the flexible bodies (`bodies.flexible`); their
     `deform` is called first, their
     `site` adds the deformation of a link to a site, their `inboard` steps from the inboard joint frame to the link's.
+    localise(d, k, angular, linear): called with each column about its joint's frame.  step(d, i, arm): called for each
+    link with the way from its inboard site to its joint's frame.
     """
     joint_motion = choose(tuple(joint.motion for joint in joints))
     position_rate = choose(tuple(joint.position_rate for joint in joints))
@@ -66,9 +82,9 @@ def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
         The relative twist is S u in the axes of the joint's first frame F, its rate S u' + bias.
         """
         link, base = d.links[i], d.site_frames[i - 1]
-        c0, x = link.c0, d.h[m.X] + link.q0
-        R_FG, p_FG, bias_angular, bias_linear = joint_motion(link.joint, d.w, x, d.h[m.U] + c0, d.h[m.SUBSPACE.place])
-        position_rate(link.joint, d.w, x, d.h[m.U] + c0, d.h[m.POSITION_RATE] + link.q0)
+        c0, x = link.c0, d.at_x + link.q0
+        R_FG, p_FG, bias_angular, bias_linear = joint_motion(link.joint, d.w, x, d.at_u + c0, d.at_subspace)
+        position_rate(link.joint, d.w, x, d.at_u + c0, d.at_position_rate + link.q0)
         F, omega_F, alpha_F = base.axes, base.omega, base.alpha
         arm = turn(F, p_FG)
         p, swing = add(base.origin, arm), cross(omega_F, arm)
@@ -77,22 +93,24 @@ def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
             column, rate, second = d.columns[c0 + k], d.u[c0 + k], d.du[c0 + k]
             angular, linear = turn(F, d.subspace[k].angular), turn(F, d.subspace[k].linear)
             column.angular, column.linear = angular, add(linear, cross(p, angular))
+            localise(d, c0 + k, angular, linear)
             turning, sliding = add(turning, scale(rate, angular)), add(sliding, scale(rate, linear))
             growing, speeding = add(growing, scale(second, angular)), add(speeding, scale(second, linear))
+        step(d, i, arm)
         v = add(base.velocity, add(swing, sliding))
         alpha = add(alpha_F, add(growing, cross(omega_F, turning)))
         a = add(base.acceleration, add(cross(alpha_F, arm), cross(omega_F, swing)))
         a = add(a, add(scale(2.0, cross(omega_F, sliding)), speeding))
         omega, R = add(omega_F, turning), product(F, R_FG)
         if link.flex >= 0:
-            p, R, omega, v, alpha, a = inboard(d.h, d.f, d.w, i, p, R, omega, v, alpha, a)
+            p, R, omega, v, alpha, a = inboard(d, i, p, R, omega, v, alpha, a)
         _store(d.link_frames[i], p, R, omega, v, alpha, a)
 
     @kernel
     def locate(d, s):
         """Site s from its link."""
         if d.sites[s].port >= 0:
-            port_site(d.h, d.f, d.w, s)
+            port_site(d, s)
         else:
             rigid_site(d, s)
 
@@ -105,7 +123,7 @@ def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
         """
         ground = d.link_frames[0]
         ground.acceleration = scale(-1.0, d.gravity[0].acceleration)
-        deform(d.h, d.f, d.w)
+        deform(d)
         for i in range(1, d.n_links):
             locate(d, i - 1)
             place(d, i)

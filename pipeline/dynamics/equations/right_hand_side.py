@@ -11,51 +11,21 @@ from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
-from flexclear.pipeline.dynamics.bodies.rigid import carry
-from flexclear.pipeline.dynamics.equations.envelope import backward, factor, forward
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
 from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import ZERO, add, dot
-
-#: pivots of M below this share of their diagonal mean a coordinate that moves no mass
-MASSLESS_PIVOT = 1e-15
+from flexclear.pipeline.dynamics.vectors import ZERO
 
 
 @kernel
-def nothing(h, f, w, n):
+def nothing(d):
     """Stands for the forces of parts that a mechanism does not have."""
 
 
 @kernel
-def no_modal_mass(h, f, w):
+def no_modal_rates(d, dy):
     """No modes."""
-
-
-@kernel
-def no_modal_forces(h, w):
-    """No modes."""
-
-
-@kernel
-def no_modal_rates(h, f, w, dy):
-    """No modes."""
-
-
-@kernel
-def no_link_load(h, w, i):
-    """No link is carried by a flexible one."""
-
-
-@kernel
-def no_closures(h, f, w, n):
-    """A tree needs no multipliers."""
-
-
-@kernel
-def no_known_forces(h, w):
-    """No closure loads a drive."""
 
 
 @kernel
@@ -70,60 +40,12 @@ def spread_state(d, y):
         d.internal[k] = d.w[y + d.nq + d.nv + d.n_ledger - d.n_internal + k]
 
 
-@kernel
-def copy_inertia(d):
-    """Inertia of each link's tree, to which the links beyond are still to be added."""
-    for i in range(d.n_links):
-        tree, own = d.inertia[i], d.own[i]
-        tree.mass, tree.moment = own.mass, own.moment
-        for e in range(6):
-            tree.inertia[e] = own.inertia[e]
-
-
-@kernel
-def gather(d, i):
-    """Force and momentum of link i's coordinates; then take its subtree to its parent."""
-    link, wrench = d.links[i], d.wrench[i]
-    for k in range(link.c0, link.c0 + link.n_speeds):
-        carry(d.h, d.w, i, k)
-        column = d.columns[k]
-        d.bias[k] = dot(column.angular, wrench.moment) + dot(column.linear, wrench.force)
-    above = d.wrench[link.parent]
-    above.moment = add(above.moment, wrench.moment)
-    above.force = add(above.force, wrench.force)
-    tree, branch = d.inertia[link.parent], d.inertia[i]
-    tree.mass += branch.mass
-    tree.moment = add(tree.moment, branch.moment)
-    for e in range(6):
-        tree.inertia[e] += branch.inertia[e]
-
-
-@kernel
-def assemble_mass(d):
-    """Mass matrix in its envelope, from momenta and columns."""
-    for p in range(d.n_pairs):
-        pair = d.pairs[p]
-        momentum, column = d.momenta[pair.momentum], d.columns[pair.column]
-        d.mass[pair.entry] += dot(momentum.angular, column.angular) + dot(momentum.linear, column.linear)
-
-
-@kernel
-def drive_forces(d):
-    """Forces that the prescribed coordinates need: their rows of the equations of motion."""
-    for k in range(d.n_drives):
-        d.drive_force[k] = d.bias[d.nv + k]
-    for p in range(d.n_known_pairs):
-        pair = d.known_pairs[p]
-        momentum, column = d.momenta[pair.momentum], d.columns[pair.column]
-        inertia = dot(momentum.angular, column.angular) + dot(momentum.linear, column.linear)
-        d.drive_force[pair.drive] += inertia * d.du[pair.coordinate]
-
-
 def make_forces(
     flexible: Any = None,
     contacts: Callable | None = None,
     loads: Callable | None = None,
     stops: Callable | None = None,
+    rigid_inertia: Callable = rigid.inertia,
 ) -> Callable:
     """The kernel forces(d): inertia and applied forces of all links, before the tree gathers them."""
     flexible_inertia = nothing if flexible is None else flexible.inertia
@@ -137,11 +59,11 @@ def make_forces(
         ground.moment, ground.force = ZERO, ZERO
         for i in range(1, d.n_links):
             if d.links[i].flex < 0:
-                rigid.inertia(d.h, d.f, d.w, i)
-        flexible_inertia(d.h, d.f, d.w, d.n)
-        contact_forces(d.h, d.f, d.w, d.n)
-        applied(d.h, d.f, d.w, d.n)
-        stop_forces(d.h, d.f, d.w, d.n)
+                rigid_inertia(d, i)
+        flexible_inertia(d)
+        contact_forces(d)
+        applied(d)
+        stop_forces(d)
 
     return forces
 
@@ -164,6 +86,7 @@ def make_right_hand_side(harmonics: Callable | None = None, **parts: Any) -> Cal
 
 def make_rates(
     joints: tuple[Any, ...],
+    tree: Any,
     flexible: Any = None,
     contacts: Callable | None = None,
     loads: Callable | None = None,
@@ -173,32 +96,19 @@ def make_rates(
 ) -> Callable:
     """The kernel rates(h, f, w, n, y, dy): `evaluate` at the present values of the laws of time.
 
-    joints: modules of the joint types.  flexible: kernels of the flexible bodies.  contacts, loads, stops: the kernels
-    that apply them.  closures: the module of that name.  friction: of ideal joints, on accelerations and on drives
+    joints: modules of the joint types.  tree: how the mass matrix is factored, the module `equations.articulated` or
+    `equations.composite`.  flexible: kernels of the flexible bodies.  contacts, loads, stops: the kernels that apply
+    them.  closures: kernels of all closures.  friction: of ideal joints, on accelerations and on drives
     (`equations.joint_friction`).
     """
-    kinematics = make_kinematics(joints, flexible)
-    forces = make_forces(flexible, contacts, loads, stops)
-    port_load = no_link_load if flexible is None else flexible.port_load
-    modal_mass = no_modal_mass if flexible is None else flexible.mass_matrix
+    kinematics = make_kinematics(joints, flexible, tree.localise, tree.step)
+    forces = make_forces(flexible, contacts, loads, stops, tree.rigid_inertia)
+    eliminate, backward, drive_forces = tree.make_eliminate(flexible), tree.backward, tree.drive_forces
+    modal_mass = nothing if flexible is None else flexible.mass_matrix
     modal_rates = no_modal_rates if flexible is None else flexible.modal_rates
-    modal = no_modal_forces if flexible is None else flexible.modal_forces
-    close = no_closures if closures is None else closures.close
-    known_forces = no_known_forces if closures is None else closures.known_forces
-    rub, rub_drives = (nothing, no_known_forces) if friction is None else friction
-
-    @kernel
-    def gather_forces(d):
-        """Forces of all parts, then the tree from its leaves to the ground."""
-        for k in range(d.mass_size):
-            d.mass[k] = 0.0
-        forces(d)
-        modal_mass(d.h, d.f, d.w)
-        copy_inertia(d)
-        for i in range(d.n_links - 1, 0, -1):
-            port_load(d.h, d.w, i)
-            gather(d, i)
-        modal(d.h, d.w)
+    close = nothing if closures is None else closures.close
+    known_forces = nothing if closures is None else closures.known_forces
+    rub, rub_drives = (nothing, nothing) if friction is None else friction
 
     @kernel
     def store_rates(d, dy):
@@ -209,7 +119,7 @@ def make_rates(
             d.w[dy + k] = d.position_rate[k]
         for k in range(d.nv):
             d.w[dy + d.nq + k] = d.du[k]
-        modal_rates(d.h, d.f, d.w, dy)
+        modal_rates(d, dy)
         for k in range(d.n_ledger):
             d.w[dy + d.nq + d.nv + k] = d.ledger_rate[k]
 
@@ -222,23 +132,22 @@ def make_rates(
         for k in range(d.n_ledger):
             d.ledger_rate[k] = 0.0
         kinematics(d)
-        gather_forces(d)
-        assemble_mass(d)
+        for k in range(d.mass_size):
+            d.mass[k] = 0.0
+        forces(d)
+        modal_mass(d)
         d.evaluation = m.OK
-        if not factor(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, MASSLESS_PIVOT):
+        if not eliminate(d):
             d.evaluation = m.NOT_POSITIVE
             return
-        for k in range(d.nv):
-            d.force[k] = -d.bias[k]
-        forward(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, h[m.FORCE])
-        close(h, f, w, n)
-        backward(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, h[m.FORCE])
+        close(d)
+        backward(d, h[m.FORCE])
         for k in range(d.nv):
             d.du[k] = d.force[k]
-        rub(h, f, w, n)
+        rub(d)
         drive_forces(d)
-        known_forces(h, w)
-        rub_drives(h, w)
+        known_forces(d)
+        rub_drives(d)
         store_rates(d, dy)
 
     return rates

@@ -25,6 +25,7 @@ from flexclear.pipeline.dynamics.run import observation, singular
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.run import begun, driven
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT
+from flexclear.pipeline.dynamics.run.tree_factor import bias, mass_factor
 
 #: drives reach the requested pose in strides of this fraction of the mechanism's size, or this angle
 STRIDE = 0.05
@@ -197,12 +198,13 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     """Forces, mass and closures in a state; SolverError where the equations are singular."""
     engine = bench.engine
     engine.evaluate(state(bench, q, v), bench.time)
-    if not np.all(np.isfinite(engine.view(m.BIAS)[: engine.model.nv])):
+    forces = bias(engine)
+    if not np.all(np.isfinite(forces)):
         raise SolverError(f"at t = {bench.time:.6g} s: the forces are not numbers in this pose")
     modes = modes_of(engine.model.arrays)
-    L = modes @ engine.mass_factor()
+    L = modes @ mass_factor(engine)
     return Balance(
-        modes @ engine.view(m.BIAS)[: engine.model.nv],
+        modes @ forces,
         L @ L.T,
         engine.rows(m.JACOBIAN) @ modes.T,
         engine.view(m.RESIDUAL_RATE)[selection.kept_places(engine.model, engine.h)],

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: a start further from closed than this fraction of the mechanism's size is a mistake, not rounding
 WORST_GUESS = 0.05
+#: gap [m] from which on a length may have been given in mm without a unit
+BARE = 1.0
 #: residuals, in units of the mechanism's size, below which nothing is moved, and with which a closing may end; where
 #: coordinates are large next to the mechanism, so many roundings of them if that is more
 EXACT, CLOSED = 1e-13, 1e-11
@@ -175,9 +177,10 @@ def far_apart(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequenc
         if gap > WORST_GUESS * mechanism.length:
             return InputError(
                 f"[joint.{joint.name}.between]",
-                f"'{a}' and '{b}' start {gap:.3g} m apart, where a {joint.edge.kind} joint lets them be together "
+                f"'{a}' and '{b}' start {gap:.3g} m apart, where a {joint.edge.kind} joint holds them together "
                 f"(more than {WORST_GUESS:.0%} of the mechanism's size, {mechanism.length:.3g} m)",
-                "correct the poses of the bodies, or the frames",
+                "correct the poses of the bodies, or the frames"
+                + ("; bare numbers are in metres" if gap >= BARE else ""),
             )
         if turned > WORST_GUESS:
             return InputError(

@@ -54,11 +54,12 @@ def _law(name: str, joint: IdealJoint) -> Any:
 
 
 def fill(
-    numbering: Numbering, laws: Sequence[str], closures: Sequence[Closure | Coupling], slot: int
+    numbering: Numbering, laws: Sequence[str], closures: Sequence[Closure | Coupling], slot: int, articulated: bool
 ) -> dict[Any, Any]:
     """The tables of joints with friction and their bearings.
 
     laws: names of those present.  closures: as the table CLOSURES has them.  slot: of the first loss in the ledger.
+    articulated: articulated inertias find what a joint transmits without terms of reactions.
     """
     mechanism, tables, ends = numbering.mechanism, _Tables(), closure_ends(numbering, closures)
     bristle = numbering.nq + numbering.nv + slot + len(mechanism.scene.rubbing())
@@ -69,7 +70,7 @@ def fill(
         link, reverse = _link(mechanism, name)
         closure = next((c for c, one in enumerate(closures) if isinstance(one, Closure) and one.name == name), -1)
         entries = uncommon(closure_route(numbering, *sites))
-        reaction = _terms(numbering, link, ends) if link >= 0 else _Reaction([], [], [])
+        reaction = _terms(numbering, link, ends, articulated) if link >= 0 else _Reaction([], [], [])
         ranges = tables.add(list(entries), reaction, len(BEARINGS[joint.type]))
         tables.joints.append((*sites, link, int(reverse), closure, *ranges))
         for kind, side, axis in BEARINGS[joint.type]:
@@ -127,14 +128,7 @@ def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
     axial = (friction.axial_radius or radius) / radius if joint.type == "revolute" else 0.0
     torsion = 1.0 / radius if kind == SLIDER and radius else 0.0
     lever = 1.0 / friction.length if friction.length else 0.0
-    law = _law(name, joint)
-    turning_kink = 0.0 if law.bristle(friction) is None else law.stick_speed(friction)
-    return [
-        *(radius, lever, axial, torsion, friction.preload),
-        *law.parameters(friction),
-        *law.kinks(friction),
-        turning_kink,
-    ]
+    return [radius, lever, axial, torsion, friction.preload, *_law(name, joint).parameters(friction)]
 
 
 def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
@@ -147,7 +141,7 @@ def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:
     return bearings[-1] if bearings else (-1, False)
 
 
-def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]]) -> _Reaction:
+def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]], articulated: bool) -> _Reaction:
     """What the reaction of a link's joint consists of; ends: of all closures."""
     mechanism = numbering.mechanism
     beyond = {link}
@@ -158,9 +152,9 @@ def _terms(numbering: Numbering, link: int, ends: list[tuple[int, int, int, int]
         (c, c)
         for i in sorted(beyond)
         for c in (*numbering.coordinates[i], *numbering.modal_coordinates.get(i, ()))
-        if c < numbering.nv
+        if c < numbering.nv and not articulated
     ]
-    columns: Rows = [(c, col) for c, col in numbering.route(link - 1) if c < numbering.nv]
+    columns: Rows = [(c, col) for c, col in numbering.route(link - 1) if c < numbering.nv and not articulated]
     loops: Rows = []
     for c, part, a, b in ends:
         sign = int(numbering.sites[b].link in beyond) - int(numbering.sites[a].link in beyond)

@@ -243,20 +243,23 @@ def _refuse_weightless(model: Model, poses: Sequence[Placement], twists: np.ndar
     (nv, mobility).  Flexible bodies are left to the engine, whose mass matrix knows their modes.
     """
     links, nv, L = model.links, model.nv, model.length
-    moved = np.zeros((len(links), 6, nv))
-    own, even = np.zeros((nv, nv)), np.zeros((nv, nv))
-    for i, link in enumerate(links[1:], start=1):
+    moved, momenta, even = (np.zeros((len(links), 6, nv)) for _ in range(3))
+    for i in range(1, len(links)):
         for coordinate, column in model.numbering.joint_route(i):
             if coordinate < nv:
                 moved[i, :, coordinate] = twists[column] / ([1.0] * 3 + [L] * 3)
+    moving = moved.copy()
+    for i, link in enumerate(links[1:], start=1):
         if link.inertia is not None:
             mass, com, inertia = link.inertia
             turning, R = moved[i, :3], poses[i].R
-            moving = moved[i, 3:] + np.cross(turning, poses[i].of(Placement(com)).p / L, axis=0)
+            moving[i, 3:] += np.cross(turning, poses[i].of(Placement(com)).p / L, axis=0)
             most = np.linalg.eigvalsh(inertia)[-1] / L**2 + mass * LEAST_GYRATION**2
-            own += mass * moving.T @ moving + turning.T @ (R @ inertia @ R.T / L**2) @ turning
-            even += mass * moving.T @ moving + most * turning.T @ turning
-    motion = _without_mass(free.T @ own @ free, free.T @ even @ free)
+            momenta[i, 3:] = even[i, 3:] = mass * moving[i, 3:]
+            momenta[i, :3], even[i, :3] = (R @ inertia @ R.T / L**2) @ turning, most * turning
+    ways = moving.reshape(-1, nv) @ free
+    own, even = (ways.T @ (one.reshape(-1, nv) @ free) for one in (momenta, even))
+    motion = _without_mass(own, even)
     if motion is not None:
         _refuse_motion(model, moved @ (free @ motion))
 

@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.effects import Parts, joint_frictions, load_kinks
 from flexclear.pipeline.dynamics.model import contacts as contacting
-from flexclear.pipeline.dynamics.model import flexible_bodies, laws, wiring
+from flexclear.pipeline.dynamics.model import flexible_bodies, guards, laws, wiring
 from flexclear.pipeline.dynamics.model import loads as loading
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.model.assembly import assembled
@@ -116,7 +116,7 @@ def filled(
     contact_ledger = contacting.ledger_size(mechanism)
     gravity = loading.gravity(mechanism.scene)
     ledger = loading.LEDGER if mechanism.scene.forces() else 0
-    parts = _parts(mechanism, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
+    parts = _parts(numbering, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
     contacts = contacting.fill(numbering, parts, normals, touching, gauges)
     coupling_tables = tables(coupled, numbering, gauges, [link.start for link in mechanism.links])
     wear_ledger = m.WEAR_LEDGER.size * len(mechanism.scene.worn())
@@ -146,6 +146,7 @@ def filled(
             m.LOADS: _booked(mechanism, loaded, books),
             **coupling_tables,
             **rubbing,
+            **guards.fill(mechanism, loaded),
             m.WORN: contacting.worn(mechanism),
             **_recorded(mechanism),
             m.GAUGES: gauges.rows,
@@ -206,6 +207,9 @@ def _symmetric(J: np.ndarray) -> list[float]:
     return [J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2]]
 
 
+#: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted, up to
+#: which the mass matrix is factored as a matrix: beyond it, articulated inertias take less time (docs/engine.md)
+DEEP = 9.0
 #: tables that follow from links, joints, frames and flexible bodies alone
 WIRED = (
     *(
@@ -221,7 +225,7 @@ WIRED = (
         m.KNOWN_PAIRS,
         m.ENVELOPE,
     ),
-    *(m.CLOSURES, m.CLOSURE_ROWS, m.SUPPORT, m.ENTRIES, m.KNOWN_ENTRIES, m.CLOSURE_PAIRS, m.COMMON),
+    *(m.CLOSURES, m.CLOSURE_ROWS, m.SUPPORT, m.PATHS, m.ENTRIES, m.KNOWN_ENTRIES, m.CLOSURE_PAIRS, m.COMMON),
     *(m.CLOSURE_ENVELOPE, m.FLEX_NUMBERS, m.FLEX_DATA, m.MOMENT_VALUES, m.PORT_NUMBERS, m.PORT_DATA),
     *(m.BASIS_VALUES, m.INTERFACE_DATA),
 )
@@ -234,12 +238,13 @@ def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
         m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
         m.SITE_NUMBERS: [_pose_row(s.place) for s in numbering.sites],
         **flexible_bodies.fill(numbering, [book.loss for book in books]),
-        **wiring.mass_entries(numbering),
+        **wiring.mass_entries(numbering, parts.articulated),
     }
 
 
-def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Parts:
+def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Parts:
     """The kinds of parts that there are."""
+    mechanism = numbering.mechanism
     contacts = [contact.joint for contact in mechanism.contacts]
     return Parts(
         joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
@@ -256,7 +261,21 @@ def _parts(mechanism: Mechanism, normals: tuple[Resolved, ...], harmonics: bool,
         joint_frictions=joint_frictions(mechanism.scene),
         wear=bool(mechanism.scene.worn()),
         load_kinks=load_kinks(mechanism.scene),
+        articulated=articulated(numbering),
     )
+
+
+def articulated(numbering: Numbering) -> bool:
+    """Return whether the tree is so deep that articulated inertias are faster than the mass matrix (`DEEP`)."""
+    mechanism = numbering.mechanism
+    if not mechanism.all_rigid or not numbering.nv:
+        return False
+    before, depths = [0] * len(mechanism.links), list[int]()
+    for i, link in enumerate(mechanism.links[1:], start=1):
+        own = [c for c in numbering.coordinates[i] if c < numbering.nv]
+        depths += [before[link.branch.parent] + k for k in range(1, len(own) + 1)]
+        before[i] = before[link.branch.parent] + len(own)
+    return bool(np.sqrt(np.mean(np.square(depths))) > DEEP)
 
 
 #: tables of joints with friction, where there are none
@@ -271,7 +290,7 @@ def _rubbing(numbering: Numbering, parts: Parts, closures: tuple[Closure | Coupl
         return NO_FRICTION
     from flexclear.pipeline.dynamics.model import joint_friction
 
-    return joint_friction.fill(numbering, parts.joint_frictions, closures, slot)
+    return joint_friction.fill(numbering, parts.joint_frictions, closures, slot, parts.articulated)
 
 
 def _pose_row(placement: Placement) -> np.ndarray:
@@ -281,6 +300,7 @@ def _pose_row(placement: Placement) -> np.ndarray:
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
     """Rows of the table LINKS."""
     rows: list[tuple[int, ...]] = []
+    last = {link.branch.parent: i for i, link in enumerate(numbering.mechanism.links) if i}
     for i, link in enumerate(numbering.mechanism.links):
         joint = parts.joints.index(link.kind) if i else -1
         flex = numbering.flexible.index(i) if link.flexible else -1
@@ -288,7 +308,8 @@ def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
         port = numbering.port_of(i - 1) if i else -1
         q, c = numbering.positions[i], numbering.coordinates[i]
         part = numbering.mechanism.components.of_link[i]
-        rows.append((link.branch.parent, joint, q.start, c.start, len(c), flex, inboard, port, part))
+        where = (link.branch.parent, joint, q.start, c.start, len(c), flex, inboard, port, part)
+        rows.append((*where, int(i not in last), int(last.get(link.branch.parent) == i)))
     return rows
 
 

@@ -19,8 +19,8 @@ from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.placing import opened
+from flexclear.pipeline.dynamics.model.plausibility import offsets
 from flexclear.pipeline.dynamics.model.start_table import given_coordinates
-from flexclear.pipeline.dynamics.model.stops import STOP
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,13 +103,7 @@ def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Pl
 def _loose(mechanism: Mechanism) -> list[Gap]:
     """Balls and pins that start outside of their sockets."""
     result = []
-    for contact in mechanism.contacts:
-        if contact.joint.type in (STOP, "ball-on-plane", "clearance-slot"):
-            continue
-        outer, inner = (mechanism.links[s.link].start.of(s.place) for s in (contact.outer, contact.inner))
-        away = inner.p - outer.p
-        if contact.joint.type == "clearance-revolute":  # along its axis a pin is as free as its length lets it
-            away = away - (away @ outer.R[:, 2]) * outer.R[:, 2]
+    for contact, away, inner in offsets(mechanism):
         if np.linalg.norm(away) > 2.0 * contact.joint.clearance:
             end = inner.p + mechanism.origin
             result.append(Gap(contact.name, end - away, end, 0.0))

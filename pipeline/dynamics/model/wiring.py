@@ -15,12 +15,14 @@ from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 
-def mass_entries(numbering: Numbering) -> dict[Any, Any]:
-    """The tables PAIRS, KNOWN_PAIRS and ENVELOPE.
+def mass_entries(numbering: Numbering, articulated: bool) -> dict[Any, Any]:
+    """The tables PAIRS, KNOWN_PAIRS and ENVELOPE; articulated inertias store a number per coordinate instead.
 
     A coordinate's momentum (that of all it moves) times the column of a coordinate nearer to the
     ground is their entry of the mass matrix.
     """
+    if articulated:
+        return {m.PAIRS: [], m.KNOWN_PAIRS: [], m.ENVELOPE: [(k, 0) for k in range(numbering.nv)]}
     products: list[tuple[int, int, int, int]] = []  # momentum, column, their coordinates
     for i in range(1, len(numbering.mechanism.links)):
         own, above = numbering.coordinates[i], numbering.route(i - 1)
@@ -80,6 +82,7 @@ def closures(
     entries: list[tuple[int, ...]] = []
     known: list[tuple[int, ...]] = []
     supports: list[list[int]] = []
+    paths: list[tuple[int, int]] = []
     row0 = jacobian0 = 0
     for new, old in enumerate(order):
         (a, b), coupling = ends[old][0], old - len(site_pairs) if old >= len(site_pairs) else -1
@@ -91,7 +94,9 @@ def closures(
         known += [(new, c - numbering.nv, col, sign, part) for c, col, sign, part in moved if c >= numbering.nv]
         n_entries = len(entries) - entry0
         where = (a, b, row0, len(mine), len(support), len(slots), jacobian0, entry0, n_entries)
-        closure.append((*where, row0, len(mine), threes(len(mine)), coupling))
+        path = _path(numbering, slots, [site for ends_of_part in ends[old] for site in ends_of_part])
+        closure.append((*where, row0, len(mine), threes(len(mine)), coupling, len(paths), len(path)))
+        paths += path
         rows += mine
         support += slots
         supports.append(slots)
@@ -103,9 +108,24 @@ def closures(
         m.SUPPORT: support,
         m.ENTRIES: entries,
         m.KNOWN_ENTRIES: known,
+        m.PATHS: paths,
         **_couplings(arrays.named(m.CLOSURES, closure), supports),
     }
     return tables, np.array(order, dtype=np.int64)
+
+
+def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tuple[int, int]]:
+    """Rows of the table PATHS between the ground and some sites; slots: coordinates of the closure's support."""
+    links: set[int] = set()
+    for site in sites:
+        link = numbering.sites[site].link
+        while link:
+            links.add(link)
+            link = numbering.mechanism.links[link].branch.parent
+    first = {i: numbering.coordinates[i].start for i in links if len(numbering.coordinates[i])}
+    return [
+        (i, slots.index(first[i]) if first.get(i, numbering.nv) < numbering.nv else -1) for i in sorted(links)[::-1]
+    ]
 
 
 def _rows(kind: str) -> list[tuple[int, int, int]]:

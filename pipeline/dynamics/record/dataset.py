@@ -13,7 +13,7 @@ import numpy as np
 from flexclear.pipeline.core.artifacts.coordinates import motion
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled
 from flexclear.pipeline.core.artifacts.schema import RUN, conformed
-from flexclear.pipeline.core.citations import cited
+from flexclear.pipeline.core.citations import cited, docstring
 from flexclear.pipeline.core.event_kinds import EVENT_KINDS
 from flexclear.pipeline.core.quantities import PERTURBATION
 from flexclear.pipeline.core.registry import lookup
@@ -26,6 +26,7 @@ from flexclear.pipeline.dynamics.effects import RECORDS
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.plausibility import forgotten
 from flexclear.pipeline.dynamics.model.stops import ends_an_angle
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.pipeline.dynamics.record.topology import topology
@@ -156,7 +157,7 @@ def references(scene: Scene) -> str:
         module = import_module(name)
         own = [thing for thing in vars(module).values() if getattr(thing, "__module__", None) == name]
         for thing in (module, *own):
-            sources += cited(getattr(thing, "__doc__", None))
+            sources += cited(docstring(thing))
     return "\n".join(dict.fromkeys(sources))
 
 
@@ -180,6 +181,7 @@ def warnings(run: Run) -> list[str]:
     choice = [run.model.mechanism.choice] if run.model.mechanism.choice else []
     return [
         *choice,
+        *(f"{text} ({remedy})" for _, text, remedy in forgotten(run.model.mechanism)),
         *run.mended,
         *_contact_warnings(run),
         *_flexible_warnings(run),

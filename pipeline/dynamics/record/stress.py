@@ -13,16 +13,18 @@ Source: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 11 (m
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import first_largest, skew
+from flexclear.pipeline.core.algebra import components, first_largest, matrices, principal, skew, von_mises
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.dynamics.record.acting import on_frames
+from flexclear.pipeline.dynamics.record.body_loads import Motion, motion_and_loads
 from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.record.wrenches import Wrench, joint_wrenches, path_wrenches
+from flexclear.pipeline.dynamics.record.solid_stress import factors, gauge_nodes, largest
+from flexclear.pipeline.dynamics.record.wrenches import Wrench
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,49 +33,103 @@ Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
 @dataclass(frozen=True)
-class Motion:
-    """Motion of the body frame, its own axes, and of the modal coordinates; each (time, 3) or (time, mode).
+class Gauged:
+    """Stress at the gauges of one body: names, components (time, gauge, 6) in body axes, and where (time, gauge, 3)."""
 
-    a: acceleration of the origin less gravity.
-    """
-
-    a: np.ndarray
-    omega: np.ndarray
-    alpha: np.ndarray
-    q: np.ndarray
-    u: np.ndarray
-    du: np.ndarray
+    names: list[str]
+    stress: np.ndarray
+    position: np.ndarray
 
 
 def record(motions: Motions, names: tuple[str, ...]) -> tuple[Variables, dict[str, object]]:
-    """Section forces and peak stresses of the bodies `names`: variables and coordinates of the run dataset.
+    """Stresses of the bodies `names`, rods and solids: variables and coordinates of the run dataset.
 
-    Peak stresses are left out when a body has a section without known outline. InputError for a bundle that was made
-    without what this needs.
+    InputError for a bundle that was made without what this needs.
     """
-    forces, peaks, places, owners = [], [], [], []
+    bundles = {name: motions.model.links[motions.model.mechanism.link_of[name]].bundle for name in names}
+    rods = {name: bundle for name, bundle in bundles.items() if bundle is not None and "section_place" in bundle}
+    solids = {name: bundle for name, bundle in bundles.items() if bundle is not None and "stress_field" in bundle}
     for name in names:
-        bundle = motions.model.links[motions.model.mechanism.link_of[name]].bundle
-        if bundle is None or "section_place" not in bundle:
-            raise InputError("[output] stress", f"the bundle of '{name}' has no sections", "make it with the scene")
-        force = section_forces(bundle, *_motion_and_loads(motions, name))
+        if name not in rods and name not in solids:
+            raise InputError("[output] stress", f"the bundle of '{name}' has no stresses", "make it with the scene")
+    variables, coordinates, gauged = Variables(), dict[str, object](), dict[str, Gauged]()
+    for those, made in ((rods, _of_rods), (solids, _of_solids)):
+        if those:
+            more, named = made(motions, those, gauged)
+            variables, coordinates = variables | more, coordinates | named
+    more, named = _of_gauges(gauged) if gauged else ({}, {})
+    return variables | more, coordinates | named
+
+
+def _of_gauges(gauged: Mapping[str, Gauged]) -> tuple[Variables, dict[str, object]]:
+    stress = np.concatenate([body.stress for body in gauged.values()], axis=1)
+    dims = ("time", "gauge")
+    variables: Variables = {"von_mises_stress": (dims, von_mises(stress))}
+    for rank, values in zip(("first", "second", "third"), np.moveaxis(principal(stress), -1, 0), strict=True):
+        variables[f"{rank}_principal_stress"] = (dims, values)
+    position = np.concatenate([body.position for body in gauged.values()], axis=1)
+    variables["stress_position"] = ((*dims, "axis"), position)
+    variables["stress_tensor"] = ((*dims, "tensor"), stress)
+    owners = [name for name, body in gauged.items() for _ in body.names]
+    return variables, {
+        "gauge": [name for body in gauged.values() for name in body.names],
+        "gauge_body": ("gauge", owners),
+    }
+
+
+def _of_solids(
+    motions: Motions, solids: Mapping[str, xr.Dataset], gauged: dict[str, Gauged]
+) -> tuple[Variables, dict[str, object]]:
+    """The factors of the stress fields; what follows from them into `gauged`."""
+    every, fields, owners = [], list[str](), list[str]()
+    for body, bundle in solids.items():
+        factor = factors(bundle, *motion_and_loads(motions, body))
+        gauges = gauge_nodes(bundle)
+        stress, node = largest(bundle["stress_field"].values, factor, list(gauges.values()))
+        names = [f"{body}.{name}" if name else body for name in gauges]
+        gauged[body] = Gauged(names, stress, bundle["node_position"].values[node])
+        every.append(factor)
+        fields += [f"{body}: {name}" for name in bundle["field"].values]
+        owners += [body] * factor.shape[1]
+    return {"stress_factor": (("time", "stress_field"), np.concatenate(every, axis=1))}, {
+        "stress_field": fields,
+        "stress_field_body": ("stress_field", owners),
+    }
+
+
+def _of_rods(
+    motions: Motions, rods: Mapping[str, xr.Dataset], gauged: dict[str, Gauged]
+) -> tuple[Variables, dict[str, object]]:
+    """Section forces and peak stresses; the latter are left out when a rod has a section without known outline.
+
+    The largest of all sections into `gauged`, at the centre of its section.
+    """
+    forces, peaks, owners = [], [], []
+    for name, bundle in rods.items():
+        force = section_forces(bundle, *motion_and_loads(motions, name))
         forces.append(force)
-        places.append(bundle["section_place"].values)
         owners += [name] * force.shape[1]
         if "fibre_stress" in bundle:
-            peaks.append(peak_stresses(bundle, force))
+            axial, mises, stress = peak_stresses(bundle, force)
+            peaks.append((axial, mises))
+            worst = np.argmax(mises, axis=1)
+            R = bundle["section_rotation"].values[worst]
+            turned = R @ matrices(stress[np.arange(len(worst)), worst]) @ np.swapaxes(R, 1, 2)
+            position = bundle["section_position"].values[worst]
+            gauged[name] = Gauged([name], components(turned)[:, None], position[:, None])
     every = np.concatenate(forces, axis=1)
     variables: Variables = {
         "section_force": (("time", "section", "axis"), every[..., :3]),
         "section_moment": (("time", "section", "axis"), every[..., 3:]),
     }
-    if len(peaks) == len(names):
+    if len(peaks) == len(rods):
         for k, name in enumerate(("peak_axial_stress", "peak_von_mises_stress")):
             variables[name] = (("time", "section"), np.concatenate([peak[k] for peak in peaks], axis=1))
+    places = np.concatenate([bundle["section_place"].values for bundle in rods.values()])
     return variables, {
         "section": np.arange(len(owners)),
         "section_body": ("section", owners),
-        "section_place": ("section", np.concatenate(places), {"units": "m", "long_name": "position along the rod"}),
+        "section_place": ("section", places, {"units": "m", "long_name": "position along the rod"}),
     }
 
 
@@ -93,26 +149,41 @@ def section_forces(bundle: xr.Dataset, motion: Motion, moment: np.ndarray, force
     return np.concatenate([np.einsum("tsij,tsi->tsj", R_BS, part) for part in (F, M)], axis=-1)
 
 
-def peak_stresses(bundle: xr.Dataset, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def peak_stresses(bundle: xr.Dataset, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Axial stress that is largest in size, and largest von Mises stress [Pa], shape (time, section) each.
 
+    And the six components of stress at the fibre of the latter, axes of the section, (time, section, 6).
     forces: as `section_forces` returns them.  A round section is turned so that a fibre lies in the plane of bending.
-    Of axial stresses that are equally large that of the first fibre counts.
+    Of stresses that are equally large that of the first fibre counts.
     """
-    axial, mises = np.empty(forces.shape[:2]), np.empty(forces.shape[:2])
+    axial, mises, stress = np.empty(forces.shape[:2]), np.empty(forces.shape[:2]), np.zeros(forces.shape)
     maps, is_round = bundle["fibre_stress"].values, bundle["section_round"].values
     for s, fibres in enumerate(maps):
-        loads = _in_plane_of_bending(forces[:, s]) if is_round[s] else forces[:, s]
+        angle = _bending(forces[:, s]) * is_round[s]
+        loads = _turned(forces[:, s], angle) if is_round[s] else forces[:, s]
         sigma, tau_y, tau_z = np.moveaxis(np.einsum("fcl,tl->tfc", fibres, loads, optimize=True), -1, 0)
-        worst = first_largest(np.abs(sigma), axis=1)
-        axial[:, s] = np.take_along_axis(sigma, worst[:, None], axis=1)[:, 0]
-        mises[:, s] = np.sqrt(sigma**2 + 3.0 * (tau_y**2 + tau_z**2)).max(axis=1)
-    return axial, mises
+        axial[:, s] = _at(sigma, first_largest(np.abs(sigma), axis=1))
+        size = np.sqrt(sigma**2 + 3.0 * (tau_y**2 + tau_z**2))
+        worst, c, d = np.argmax(size, axis=1), np.cos(angle), np.sin(angle)
+        mises[:, s] = _at(size, worst)
+        along, y, z = (_at(values, worst) for values in (sigma, tau_y, tau_z))
+        stress[:, s, 0], stress[:, s, 4], stress[:, s, 5] = along, d * y + c * z, c * y - d * z
+    return axial, mises, stress
 
 
-def _in_plane_of_bending(forces: np.ndarray) -> np.ndarray:
-    """Forces (time, 6) with y turned to the fibre that bending stretches most."""
-    angle = np.arctan2(forces[:, 4], -forces[:, 5])
+def _at(values: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """One value of each row."""
+    result: np.ndarray = values[np.arange(len(values)), column]
+    return result
+
+
+def _bending(forces: np.ndarray) -> np.ndarray:
+    """Angle from y to the fibre that bending stretches most, of forces (time, 6)."""
+    return np.arctan2(forces[:, 4], -forces[:, 5])
+
+
+def _turned(forces: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Forces (time, 6) in axes turned about x by an angle."""
     c, s = np.cos(angle), np.sin(angle)
     turned = forces.copy()
     for k in (1, 4):
@@ -148,31 +219,3 @@ def _turn(v: np.ndarray) -> np.ndarray:
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     X = skew(v)
     return np.eye(3) + np.sinc(angle / np.pi) * X + 0.5 * np.sinc(0.5 * angle / np.pi) ** 2 * (X @ X)
-
-
-def _motion_and_loads(motions: Motions, name: str) -> tuple[Motion, np.ndarray, np.ndarray]:
-    """What `section_forces` takes of a flexible body."""
-    model = motions.model
-    link = model.mechanism.link_of[name]
-    frame, state = motions.link(link), motions.modal(link)
-    R_BW = np.swapaxes(frame.R, 1, 2)
-    a, omega, alpha = (np.einsum("tij,tj->ti", R_BW, x) for x in (frame.a - model.gravity, frame.omega, frame.alpha))
-    names = [frame for frame in model.mechanism.frames if frame.startswith(f"{name}.")]
-    moment, force = np.zeros((len(a), len(names), 3)), np.zeros((len(a), len(names), 3))
-    for at, n, f in _loads(motions, name):
-        k = names.index(at)
-        moment[:, k] += np.einsum("tij,tj->ti", R_BW, n - np.cross(frame.p, f))
-        force[:, k] += np.einsum("tij,tj->ti", R_BW, f)
-    return Motion(a, omega, alpha, state.q, state.u, state.du), moment, force
-
-
-def _loads(motions: Motions, name: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """What joints, paths and loads do to a body: its frame, moment about the kernels' origin, force, world axes."""
-    model, seen, acting = motions.model, motions.seen, list[tuple[str, np.ndarray, np.ndarray]]()
-    for joint, (n, f) in joint_wrenches(motions).items():
-        between = model.scene.joint[joint].between
-        about_origin = n + np.cross(motions.frame_positions[between[1]], f)
-        acting += [(at, sign * about_origin, sign * f) for at, sign in zip(between, (-1.0, 1.0), strict=True)]
-    acting += path_wrenches(model, seen)
-    acting += on_frames(model, seen, name)
-    return [load for load in acting if model.mechanism.frames[load[0]].body == name]

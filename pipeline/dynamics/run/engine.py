@@ -22,6 +22,7 @@ from flexclear.pipeline.dynamics.model.driving import coordinate_of
 from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.plausibility import refuse_missed
 from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroup, Place
 from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
@@ -181,14 +182,6 @@ class Engine:
         if self.n[m.ABRIDGED]:
             self.entry.evaluate(self.h, self.model.arrays.f, self.w, self.n, float(self.control[m.TIME]))
 
-    def mass_factor(self) -> np.ndarray:
-        """L of the mass matrix M = L L^T that the last evaluation left in its envelope, shape (nv, nv)."""
-        L, entries = np.zeros((self.model.nv,) * 2), self.view(m.MASS)
-        for i, (first, origin) in enumerate(self.model.arrays.table(m.ENVELOPE)):
-            L[i, first : i + 1] = entries[origin + first : origin + i + 1]
-            L[i, i] = 1.0 / L[i, i]
-        return L
-
     def independence(self) -> np.ndarray:
         """How far each selected closure row is from depending on those before it, at the last evaluated state."""
         envelope = self.model.arrays.table(m.CLOSURE_ENVELOPE, self.h)[: self.h[m.N_KEPT_ROWS]]
@@ -203,6 +196,7 @@ class Engine:
 def prepare(model: Model, progress: Progress) -> Engine:
     """The engine of a model, its kernels compiled or fetched from disk; SolverError for a start that cannot
     continue."""
+    refuse_missed(model.mechanism)
     solver, mobility = model.scene.solver, analyse(model)
     progress(None, mobility.text())
     if mobility.singular_start and not may_start_singular(model):

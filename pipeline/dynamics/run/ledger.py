@@ -9,8 +9,10 @@ import numpy as np
 
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.loads import Pid, SampledPid
 from flexclear.pipeline.core.scene.solver import Solver
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.drives.pieces import pieces_of, size
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.mechanism import Site
 from flexclear.pipeline.dynamics.model.model import Model
@@ -28,6 +30,10 @@ CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 0.1
 DOUBTFUL = 1e-2
 #: speed above which a run diverges [m/s]: a hundredth of that of light, where Newton's mechanics is off by 1e-4
 DIVERGED = 3e6
+#: a coordinate is out of control at so many times the largest of its reference, its start, a turn or the mechanism
+LOST = 100.0
+#: what keeps a motion bounded
+REMEDY = "a controller with a smaller gain or a shorter period, or a longer time constant of a load, keeps it bounded"
 #: steps of many vibrations leave up to half of this in the work of forces that swing while the drives' speeds change
 LONG, LONG_PER_RTOL = 2e-2, 50.0
 
@@ -145,6 +151,7 @@ def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
 
 def require_closed(model: Model, trajectory: Trajectory, seen: Observed) -> None:
     """SolverError when the run diverges, or its ledger is off by more than the scene's tolerance."""
+    _require_controlled(model, trajectory, seen)
     _require_bounded(model, trajectory, seen)
     for energies in balances(model, seen):
         _require(model, trajectory, energies)
@@ -182,11 +189,28 @@ def _require_bounded(model: Model, trajectory: Trajectory, seen: Observed) -> No
     if len(beyond):
         k = int(beyond[0])
         name = model.mechanism.moving_bodies[int(np.argmax(np.linalg.norm(seen.body_velocity[k], axis=1)))]
-        raise SolverError(
-            f"at t = {trajectory.time[k]:.6g} s: the motion diverges: body {name} moves at {speeds[k]:.3g} m/s; "
-            "a controller with a smaller gain or a shorter sampling period, or a longer time constant of a load, "
-            "keeps it bounded"
-        )
+        text = f"the motion diverges: body {name} moves at {speeds[k]:.3g} m/s"
+        raise SolverError(f"at t = {trajectory.time[k]:.6g} s: {text}; {REMEDY}")
+
+
+def _require_controlled(model: Model, trajectory: Trajectory, seen: Observed) -> None:
+    """SolverError for a controlled coordinate beyond all that its reference and the mechanism have of size."""
+    wiring, gauges = model.arrays.table(m.LOADS), model.arrays.table(m.GAUGES)
+    for k, (name, _) in enumerate(model.loads):
+        load = model.scene.load.get(name)
+        if not isinstance(load, (Pid, SampledPid)):
+            continue
+        looked_at = wiring[k]["measured"] if wiring[k]["measured"] >= 0 else wiring[k]["gauge"]
+        turning = bool(gauges[int(looked_at)]["turning"])
+        law = pieces_of(load.reference, "angle" if turning else "length")
+        asked = size(law, float(trajectory.time[0]), float(trajectory.time[-1]), 0)
+        value = np.abs(seen.loads["value"][:, k])
+        bound = LOST * max(asked, float(value[0]), 2.0 * np.pi if turning else model.length)
+        beyond = np.flatnonzero(~(value <= bound))
+        if len(beyond):
+            text = f"the motion diverges: controller {name} has its coordinate at {value[beyond[0]]:.3g} "
+            text += f"{'rad' if turning else 'm'}, beyond {LOST:g} times its reference and the mechanism's size"
+            raise SolverError(f"at t = {trajectory.time[beyond[0]]:.6g} s: {text}; {REMEDY}")
 
 
 def _losses(model: Model, totals: dict[str, np.ndarray], t: int) -> str:

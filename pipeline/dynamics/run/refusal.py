@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexclear.pipeline.core.scene.plausibility import negative_gains
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.bushings import overturned
 from flexclear.pipeline.dynamics.run import singular
@@ -66,7 +67,10 @@ def text(engine: Engine, rows: np.ndarray) -> str:
 
 
 def _doubts(engine: Engine) -> str:
-    """What flexible bodies are doubted for where the run ended, which may well be why; or nothing."""
+    """What may well be why the run ended: negative gains, else what flexible bodies are doubted for; or nothing."""
+    gains = [f"load.{name}.{key}" for name, key in negative_gains(engine.model.scene)]
+    if gains:
+        return f"; a negative gain pushes away from the reference: {', '.join(gains)}"
     if not engine.model.numbering.flexible:
         return ""
     from flexclear.pipeline.dynamics.run.validity import doubts

@@ -14,6 +14,7 @@ from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.mobility import INFINITE
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.numbering import Numbering
+from flexclear.pipeline.dynamics.run.tree_factor import mass_factor
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.engine import Engine
@@ -45,7 +46,7 @@ def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:
 
 def _natural_lengths(engine: Engine) -> np.ndarray:
     columns, points = engine.table(m.COLUMNS), engine.table(m.SITE_FRAMES)["origin"]
-    return selection.natural_lengths(engine.model, columns, points, engine.mass_factor())
+    return selection.natural_lengths(engine.model, columns, points, mass_factor(engine))
 
 
 def improve(engine: Engine, t: float, requested: float = BETTER) -> bool:

@@ -6,12 +6,11 @@ import numpy as np
 
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.drives import PathDrive
-from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model.given_start import moved
 from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.model.stops import End
+from flexclear.pipeline.dynamics.model.plausibility import refuse_depth
 from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.jamming import explanation
@@ -121,22 +120,4 @@ def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
 
 def _refuse_penetration(engine: Engine, y: np.ndarray) -> None:
     for c, depth in overlapping(engine, y).items():
-        contact = engine.model.contacts[c]
-        joint = contact.joint
-        if joint.initial_approach_speed is not None:
-            continue
-        problem, remedy = f"its surfaces start {depth:.3g} m deep in each other", "enlarge the clearance"
-        problem += f" (clearance {joint.clearance:.3g} m)"
-        if isinstance(joint, End):
-            unit = "rad" if joint.coordinate.turning else "m"
-            problem, remedy = (
-                f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}",
-                "move the end",
-            )
-        elif contact.name in loose(engine.model.scene):
-            remedy = "begin where the joint would be without clearance ([start] at = 'ideal'), " + remedy
-        raise InputError(
-            f"[{contact.place}]",
-            problem,
-            f"move a body, {remedy}, or declare the speed at which this contact began as initial_approach_speed",
-        )
+        refuse_depth(engine.model.scene, engine.model.contacts[c], depth)

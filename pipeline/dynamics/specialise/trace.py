@@ -116,7 +116,7 @@ class Trace:
             values = []
             for block, (_, stores) in zip(branch.blocks, (first, second), strict=True):
                 with self.tape.inside(block):
-                    values.append(stores.get((memory, index), memory[index]))
+                    values.append(stores[memory, index] if (memory, index) in stores else memory[index])
             memory[index] = self.tape.join(branch, *values)
         return self._joined_results(branch, first[0], second[0])
 
@@ -160,7 +160,7 @@ class Trace:
 
     def _functions(self) -> SimpleNamespace:
         made = {name: self._function(name) for name in FUNCTIONS}
-        return SimpleNamespace(pi=np.pi, **made)
+        return SimpleNamespace(pi=np.pi, inf=np.inf, **made)
 
     def _function(self, name: str) -> Callable:
         def apply(*arguments: Any) -> Any:

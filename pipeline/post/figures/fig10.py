@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.text import Text
 
 from flexclear.pipeline.post.models import FAR_CSJ_CB
 from flexclear.pipeline.post.plotting import style
@@ -28,23 +31,26 @@ LOOP = (
     ("closures beyond the tolerance?\nthen projected", "4"),
 )
 BLUE, GREEN, ORANGE = "#0072B2", "#009E73", "#E69F00"
+#: where the boxes of the three parts are, from above, as fractions of the height; (b) is below (a)
+ROWS = ((0.92, 0.72, 0.52), (0.28, 0.08), (0.92, 0.71, 0.49, 0.27, 0.08))
 
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig10.png and fig10.svg, with the counts of the paper's full model."""
     attributes = data[f"{FAR_CSJ_CB.scene}:run"].attrs
     with style.style():
-        figure, axes = style.grid(1, 3, (12.0, 4.9))
-        for panel, boxes, color, title in zip(
-            axes.flat,
-            (STRUCTURE, START, LOOP),
-            (BLUE, GREEN, ORANGE),
-            ("(a) once per flexible body", "(b) once per run", "(c) step after step"),
-            strict=True,
+        figure, axes = style.grid(1, 2, (9.0, 5.2))
+        left, right = axes.flat
+        for panel, boxes, rows, color in zip(
+            (left, left, right), (STRUCTURE, START, LOOP), ROWS, (BLUE, GREEN, ORANGE), strict=True
         ):
-            _column(panel, boxes, color)
-            panel.set_title(title)
-        _back(axes[0, 2])
+            drawn = _column(panel, boxes, rows, color)
+        _arrow(right, drawn[-1], drawn[0], "bar,fraction=0.6")
+        left.set_title("(a) once per flexible body")
+        right.set_title("(c) step after step")
+        left.text(
+            0.0, 0.385, "(b) once per run", fontsize=left.title.get_fontsize(), fontweight="bold", color=style.INK
+        )
         style.heading(
             figure,
             "Figure 10: contacts end steps where they begin and end; "
@@ -55,31 +61,24 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         return style.files("fig10", figure)
 
 
-def _column(axes: Axes, boxes: tuple[tuple[str, str], ...], color: str) -> None:
+def _column(axes: Axes, boxes: tuple[tuple[str, str], ...], rows: tuple[float, ...], color: str) -> list[Text]:
     """Boxes below each other, joined by arrows."""
-    height = 1.0 / len(boxes)
-    for k, (text, step) in enumerate(boxes):
-        y = 1.0 - (k + 0.5) * height
-        axes.text(
-            0.47, y, text, ha="center", va="center", fontsize=9.0, color=style.INK,
-            bbox={"boxstyle": "round,pad=0.55", "fc": "white", "ec": color, "lw": 1.5},
-        )  # fmt: skip
+    drawn = []
+    for (text, step), y in zip(boxes, rows, strict=True):
+        box = {"boxstyle": "round,pad=0.45", "fc": "white", "ec": color, "lw": 1.5}
+        drawn.append(axes.text(0.5, y, text, ha="center", va="center", fontsize=9.0, color=style.INK, bbox=box))
         if step:
             message = f"step {step}" if step.isdigit() else f"steps {step}"
             axes.text(0.0, y, message, ha="left", va="center", fontsize=7.2, color=color, fontweight="bold")
-        if k + 1 < len(boxes):
-            axes.annotate(
-                "", (0.47, y - height + 0.062), (0.47, y - 0.062),
-                arrowprops={"arrowstyle": "-|>", "color": style.SOFT, "lw": 1.3},
-            )  # fmt: skip
+    for first, second in pairwise(drawn):
+        _arrow(axes, first, second, "arc3")
     axes.set(xlim=(0.0, 1.0), ylim=(0.0, 1.0))
     axes.set_axis_off()
+    return drawn
 
 
-def _back(axes: Axes) -> None:
-    """From the last box to the first, along the side."""
-    height = 1.0 / len(LOOP)
-    axes.annotate(
-        "", (0.86, 1.0 - 0.5 * height), (0.86, 0.5 * height),
-        arrowprops={"arrowstyle": "-|>", "color": style.SOFT, "lw": 1.3, "connectionstyle": "bar,fraction=0.13"},
-    )  # fmt: skip
+def _arrow(axes: Axes, first: Text, second: Text, way: str) -> None:
+    """From the rim of a box to that of another."""
+    look = {"arrowstyle": "-|>", "color": style.SOFT, "lw": 1.3, "connectionstyle": way, "shrinkA": 2, "shrinkB": 2}
+    patches = {"patchA": first.get_bbox_patch(), "patchB": second.get_bbox_patch()}
+    axes.annotate("", second.get_position(), first.get_position(), arrowprops=look | patches)

@@ -92,7 +92,8 @@ def _title(runs: Sequence[xr.Dataset], quantity: Quantity) -> str:
         return quantity.name.replace("_", " ") if not quantity.steps else quantity.name
     turns = any(quantities.has(run, quantity) and quantities.unit(run, quantity) == "N m" for run in runs)
     kind = quantity.kind.replace("force", "torque") if turns else quantity.kind
-    return f"{quantity.owner}: {kind.replace('_', ' ')}{f' along {c}' if (c := quantity.component) else ''}"
+    words = kind.replace("_", " ").replace("von mises", "von Mises")
+    return f"{quantity.owner}: {words}{f' along {c}' if (c := quantity.component) else ''}"
 
 
 def _drawn(values: np.ndarray, quantity: Quantity, component: int) -> np.ndarray:

@@ -93,6 +93,7 @@
       const mesh = { ...told, base, place, index, tint, now: place.slice(), normal: told.normals ? floats(told.normals) : new Float32Array(place.length) };
       mesh.fields = (told.fields || []).map(scaled);
       mesh.weights = told.weights ? floats(told.weights) : null;
+      mesh.levels = told.levels ? bytes(told.levels) : null;
       mesh.buffers = Object.fromEntries(["place", "normal", "tint"].map((n) => [n, gl.createBuffer()]));
       mesh.order = gl.createBuffer();
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, mesh.order); gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, index, gl.STATIC_DRAW);
@@ -115,7 +116,7 @@
         for (const at of [a, b, c]) for (let i = 0; i < 3; i++) n[at + i] += w[i];
       }
     }
-    // points = rest + sum of fields times weights; colour tells how far each point has moved
+    // points = rest + sum of fields times weights; colours show levels, or how far each point has moved
     bend(mesh, weights, factor, largest) {
       const { place, now, fields, tint } = mesh;
       now.set(place);
@@ -123,7 +124,9 @@
         const w = factor * weights[k];
         if (w) for (let i = 0; i < now.length; i++) now[i] += w * field[i];
       });
-      if (largest > 0 && !mesh.plain) for (let i = 0; i < now.length; i += 3) {
+      const points = now.length / 3, first = this.frame * points;
+      if (mesh.levels) for (let i = 0; i < points; i++) tint.set(colour(mesh.levels[first + i] / 255), 3 * i);
+      else if (largest > 0 && !mesh.plain) for (let i = 0; i < now.length; i += 3) {
         const size = Math.hypot(now[i] - place[i], now[i + 1] - place[i + 1], now[i + 2] - place[i + 2]);
         tint.set(colour(size / (factor * largest)), i);
       }
@@ -224,7 +227,7 @@
       const bent = this.meshes.find((mesh) => mesh.fields.length && !mesh.plain);
       if (bar) {
         bar.hidden = !bent;
-        bar.querySelector("span").textContent = told.shapes ? "largest displacement" : `${shown(1e6 * (bent ? bent.largest : 0))} µm`;
+        bar.querySelector("span").textContent = told.shapes ? "largest displacement" : bent && bent.top ? bent.top : `${shown(1e6 * (bent ? bent.largest : 0))} µm`;
       }
       this.update();
     }

@@ -22,9 +22,19 @@ from flexclear.pipeline.post.render.mechanism import (
     Mechanism,
     part_pose,
     placed,
+    shade,
 )
 from flexclear.pipeline.post.render.panel import panel
-from flexclear.pipeline.post.render.ruler import exaggeration, pixels_per_metre, round_length, words
+from flexclear.pipeline.post.render.ruler import (
+    BAR,
+    STRESS_COLORS,
+    color_bar,
+    exaggeration,
+    pixels_per_metre,
+    round_length,
+    with_color_bar,
+    words,
+)
 from flexclear.pipeline.post.render.stage import SOFT, image, plotter, polydata, shading, skin
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import ANGLE, eye
@@ -85,13 +95,15 @@ def _frames(
     steps = np.clip(np.searchsorted(time, shown.times - 1e-12 * (time[-1] - time[0])), 0, time.size - 1)
     scene = plotter((VIEW, HEIGHT))
     actors = _build(scene, drawn)
-    look(scene, drawn)
+    margin = 0 if drawn.stress is None else BAR
+    look(scene, drawn, margin)
     # words are drawn by matplotlib below: a text in the scene costs as much as the mechanism
     caption = pace.Caption((VIEW, 26), SOFT)
     larger = "".join(f", {text}" for text in exaggeration(drawn))
-    scale = pixels_per_metre(drawn, (VIEW, HEIGHT))
+    scale = pixels_per_metre(drawn, (VIEW, HEIGHT), margin)
     bar = round_length(0.2 * VIEW / scale)
     long = round(bar * scale)
+    legend = None if drawn.stress is None else color_bar(drawn.stress, HEIGHT)
     with style.style():
         plots = panel(drawn.run, post, (SIDE, HEIGHT), watched, curves)
         for k, step in enumerate(steps):
@@ -100,6 +112,8 @@ def _frames(
             picture = image(scene)
             caption.onto(picture, f"{pace.speed_text(float(shown.slower[k]))}{larger}, bar: {words(bar)}")
             picture[-36:-33, VIEW - 16 - long : VIEW - 16] = INK
+            if legend is not None:
+                with_color_bar(picture, legend)
             yield np.concatenate([picture, plots.frame(int(step))], axis=1)
             if k % 15 == 0:
                 progress((k + 1) / steps.size, "film")
@@ -126,16 +140,20 @@ def solid(scene: pv.Plotter, surface: Surface, color: str, opacity: float, mesh:
 
 
 def _flexible(scene: pv.Plotter, drawn: Mechanism, body: Flexible) -> pv.PolyData:
-    points, size = placed(drawn.run, body, 0)
+    mesh = skin(placed(drawn.run, body, 0)[0], faces(body.bundle))
+    mesh["shade"] = shade(drawn.run, body, 0)
     q = np.abs(drawn.run.modal_coordinate.values[:, body.columns]).max(axis=1)
-    largest = max(float(placed(drawn.run, body, int(np.argmax(q)))[1].max()), 1e-12)
-    mesh = skin(points, faces(body.bundle))
-    mesh["deflection"] = size
+    largest = drawn.stress or max(float(placed(drawn.run, body, int(np.argmax(q)))[1].max()), 1e-12)
     if body.color is not None:
         scene.add_mesh(mesh, color=body.color, **shading(body.bundle))
         return mesh
     scene.add_mesh(
-        mesh, scalars="deflection", cmap="viridis", clim=(0.0, largest), show_scalar_bar=False, **shading(body.bundle)
+        mesh,
+        scalars="shade",
+        cmap=STRESS_COLORS if body.stressed else "viridis",
+        clim=(0.0, largest),
+        show_scalar_bar=False,
+        **shading(body.bundle),
     )
     return mesh
 
@@ -147,7 +165,7 @@ def _place(drawn: Mechanism, actors: Actors, step: int, glow: bool) -> None:
         if part.contact is not None:
             actor.prop.color = IMPACT_COLOR if glow else CLEARANCE_COLOR
     for bent, mesh in zip(drawn.flexible, actors.flexible, strict=True):
-        mesh.points, mesh["deflection"] = placed(drawn.run, bent, step)
+        mesh.points, mesh["shade"] = placed(drawn.run, bent, step)[0], shade(drawn.run, bent, step)
 
 
 def floor(scene: pv.Plotter, drawn: Mechanism) -> None:

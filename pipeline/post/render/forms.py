@@ -133,12 +133,35 @@ def _arm(point: np.ndarray, com: np.ndarray, solid: Solid | None, width: float) 
     return surfaces.merged([surfaces.bar(point, com, 0.7 * width), surfaces.moved(surfaces.sphere(radius), com)])
 
 
+def wheel_of_gear(seat: Seat, radius: float, size: float, *, inner: bool) -> Surface:
+    """A gear's wheel in its body's axes [m], as large as its pitch circle; inner: a ring whose teeth point inwards."""
+    width, axes = WIDTH * size, surfaces.along(seat.axes[:, 2])
+    if not inner:
+        return surfaces.moved(_disc(radius, width), seat.origin, axes)
+    turn, half = np.linspace(0.0, 2.0 * np.pi, 4 * surfaces.ROUND + 1), 0.5 * width
+    # a rectangle that is turned about z, inner side first
+    profile = np.array(
+        [[radius, -half], [radius, half], [radius + width, half], [radius + width, -half], [radius, -half]]
+    )
+    around = np.column_stack([np.cos(turn), np.sin(turn)])
+    points = np.concatenate(
+        [profile[None, :, :1] * around[:, None], np.broadcast_to(profile[:, 1:], (len(turn), len(profile), 1))], axis=2
+    )
+    ring = surfaces.shaded(points.reshape(-1, 3), surfaces.grid(len(turn), len(profile))[:, ::-1], sharp=True)
+    mark = surfaces.moved(surfaces.box((0.8 * width, 0.5 * width, 1.3 * width)), np.array([radius + half, 0.0, 0.0]))
+    return surfaces.moved(surfaces.merged([ring, mark]), seat.origin, axes)
+
+
 def _wheel(solid: Solid | None, axis: np.ndarray, size: float) -> Surface:
     """A disc about z with a mark that shows how it turns."""
     width = WIDTH * size
     radius = 3.0 * width
     if solid is not None and solid.round and abs(solid.axes[:, 2] @ axis) > 0.99:
         radius = float(np.clip(solid.half[0], 2.4 * width, LARGEST * size))
+    return _disc(radius, width)
+
+
+def _disc(radius: float, width: float) -> Surface:
     mark = surfaces.moved(surfaces.box((0.7 * radius, 0.5 * width, 1.3 * width)), np.array([0.55 * radius, 0.0, 0.0]))
     return surfaces.merged([surfaces.cylinder(radius, width), mark])
 

@@ -11,13 +11,16 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.fields import Pose
-from flexclear.pipeline.post.body_shape import faces, is_rod, scale_to, surface
+from flexclear.pipeline.post import body_stress
+from flexclear.pipeline.post.body_shape import faces, has_edges, scale_to, surface
 from flexclear.pipeline.post.render import forms, surfaces
 from flexclear.pipeline.post.render.forms import Seat
-from flexclear.pipeline.post.render.solids import equivalent
+from flexclear.pipeline.post.render.solids import Solid, equivalent
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View, view
+from flexclear.pipeline.post.render.wheels import Wheel, wheels
 from flexclear.pipeline.post.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
@@ -55,13 +58,17 @@ class Part:
 
 @dataclass(frozen=True, slots=True)
 class Flexible:
-    """A flexible body: its bundle, index in the run, columns of its modal coordinates, drawn exaggeration, colour."""
+    """A flexible body: its bundle, index in the run, columns of its modal coordinates, drawn exaggeration, colour.
+
+    stressed: whether its colours show von Mises stress, and not displacement.
+    """
 
     index: int
     bundle: xr.Dataset
     columns: np.ndarray
     scale: float
     color: str | None = None
+    stressed: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,12 +99,27 @@ class Mechanism:
     size: float  #: diagonal of the box of all frames and of the flexible bodies at the start [m]
     cloud: np.ndarray  #: points that represent all that is drawn over the run, world axes [m], shape (n, 3)
     looks: Looks
+    stress: float | None = None  #: the stress at the upper end of the colours [Pa], where they show stress
 
 
-def mechanism(run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None) -> Mechanism:
-    """The drawn mechanism of a run; bundles by name of the flexible body."""
+def mechanism(
+    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None, *, stressed: bool = False
+) -> Mechanism:
+    """The drawn mechanism of a run; bundles by name of the flexible body.
+
+    stressed: whether the colours of flexible bodies show von Mises stress.  InputError for a run that has none.
+    """
     looks, given = looks or Looks(), parameters(run)
-    flexible = tuple(_flexible(run, name, bundle, looks) for name, bundle in bundles.items() if name in run.body.values)
+    if stressed and not body_stress.recorded(run):
+        problem = "the run records no von Mises stress"
+        raise InputError(
+            "--what stress", problem, 'ask for it: [output] stress = ["BODY"], a rod of known section or a solid'
+        )
+    flexible = tuple(
+        _flexible(run, name, bundle, looks, stressed=stressed)
+        for name, bundle in bundles.items()
+        if name in run.body.values
+    )
     places = run.frame_position.values if run.sizes.get("frame", 0) else run.position.values
     shown = np.concatenate([places.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
     low, high = shown.min(axis=0), shown.max(axis=0)
@@ -105,7 +127,8 @@ def mechanism(run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks |
     seats = _seats(given, bundles)
     parts = (*_bodies(run, given, bundles, seats, looks, size), *_joints(run, given, bundles, size))
     seen = view(run, given, looks.direction, looks.up)
-    return Mechanism(run, parts, flexible, seen, size, _cloud(run, parts, flexible), looks)
+    top = max(body_stress.largest(run), 1e-9) if stressed else None
+    return Mechanism(run, parts, flexible, seen, size, _cloud(run, parts, flexible), looks, top)
 
 
 def _cloud(run: xr.Dataset, parts: Sequence[Part], flexible: Sequence[Flexible]) -> np.ndarray:
@@ -145,9 +168,16 @@ def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.n
     return (points - _centre(body.bundle, q)) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
 
 
+def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
+    """What the colours of a body show at the points of `placed`: von Mises stress [Pa], or displacement [m]."""
+    if body.stressed:
+        return body_stress.on_surface(run, body.bundle, _names(run, "body")[body.index], step)
+    return placed(run, body, step)[1]
+
+
 def skin(body: Flexible, points: np.ndarray) -> Surface:
     """The surface of a flexible body through points as of `placed`; empty for bare nodes."""
-    return surfaces.shaded(points, surfaces.triangulated(faces(body.bundle)), sharp=not is_rod(body.bundle))
+    return surfaces.shaded(points, surfaces.triangulated(faces(body.bundle)), sharp=has_edges(body.bundle))
 
 
 def _centre(bundle: xr.Dataset, q: np.ndarray) -> np.ndarray:
@@ -193,6 +223,7 @@ def _bodies(
 ) -> Iterator[Part]:
     """Rigid bodies and the ground, as their scene draws them or as links between their joints."""
     names, kinds = _names(run, "body"), dict[tuple[Any, ...], str]()
+    geared = wheels(given, lambda frame: _at_start(run, given, bundles, frame))
     for name, body in given.get("body", {}).items():
         look = looks.bodies.get(name, {})
         own = None if "geometry" not in look else forms.shapes(look["geometry"], looks.folder)
@@ -215,9 +246,39 @@ def _bodies(
         key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
         color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
         solid = equivalent(body["mass"], inertia) if np.any(inertia) else None
-        drawn = own if own is not None else forms.link(seats.get(name, []), com, solid, size, names.index(name))
+        drawn = own
+        if drawn is None:
+            drawn = _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, names.index(name))
         if len(drawn.points):
             yield Part(names.index(name), surfaces.moved(drawn, -com), color)
+
+
+def _with_wheels(
+    geared: Sequence[Wheel], seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: float, layer: int
+) -> Surface:
+    """A body between its joints, with the wheels of its gears."""
+    discs = [
+        forms.wheel_of_gear(
+            next(seat for seat in seats if seat.frame == wheel.frame), wheel.radius, size, inner=wheel.inner
+        )
+        for wheel in geared
+    ]
+    if discs and all(np.linalg.norm(seat.origin - seats[0].origin) < 1e-9 for seat in seats):
+        return surfaces.merged(discs)  # the body is the wheel
+    return surfaces.merged([*discs, forms.link(seats, com, solid, size, layer)])
+
+
+def _at_start(
+    run: xr.Dataset, given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], frame: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Origin [m] and axes of a named frame, in the world, at the first output."""
+    origin, axes = frame_pose(given, bundles, frame)
+    names, frames, body = _names(run, "body"), _names(run, "frame"), frame.partition(".")[0]
+    if body not in names:
+        return origin, axes
+    matrix = pose(run, names.index(body), 0)
+    where = run.frame_position.values[0, frames.index(frame)] if frame in frames else matrix[:3, 3]
+    return where, matrix[:3, :3] @ axes
 
 
 def _centre_at_rest(bundle: xr.Dataset) -> np.ndarray:
@@ -327,7 +388,7 @@ def _seated(
     return Part(bodies.index(body), surfaces.moved(part, origin - com, axes), color, opacity, contact=contact)
 
 
-def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks) -> Flexible:
+def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, stressed: bool) -> Flexible:
     owners = (
         run.mode_body.values
         if "mode_body" in run.coords
@@ -339,4 +400,8 @@ def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks) -> F
     q = run.modal_coordinate.values[:, columns]
     largest = q[int(np.argmax(np.abs(q).max(axis=1)))]
     scale = looks.exaggeration or max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
-    return Flexible(_names(run, "body").index(name), bundle, columns, scale, looks.bodies.get(name, {}).get("color"))
+    color = looks.bodies.get(name, {}).get("color")
+    shown = stressed and name in body_stress.recorded(run)
+    if stressed:  # grey does not look like a stress
+        color = None if shown else GROUND_COLOR
+    return Flexible(_names(run, "body").index(name), bundle, columns, scale, color, shown)

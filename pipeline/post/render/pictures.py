@@ -41,10 +41,10 @@ class Shown:
     title: str = ""
     progress: Progress = silent
 
-    def mechanism(self) -> Mechanism:
-        """The run as moving solids."""
+    def mechanism(self, *, stressed: bool = False) -> Mechanism:
+        """The run as moving solids; stressed: coloured by von Mises stress."""
         assert self.run is not None
-        return mechanism(self.run, self.bundles, self.looks)
+        return mechanism(self.run, self.bundles, self.looks, stressed=stressed)
 
     def name(self, what: str) -> str:
         """A title of a page."""
@@ -63,7 +63,7 @@ def formats(what: str) -> tuple[str, ...]:
 
 def needs_gl(what: str, kind: str) -> bool:
     """Whether the machine must be able to draw solids for that."""
-    return what in ("motion", "vibrations") and kind in ("png", "gif", "mp4")
+    return what in ("motion", "stress", "vibrations") and kind in ("png", "gif", "mp4")
 
 
 def png(pixels: np.ndarray) -> bytes:
@@ -84,14 +84,24 @@ def _still(shown: Shown) -> dict[str, bytes]:
     return {"mechanism.png": png(picture)}
 
 
-def _film(kind: str) -> Callable[[Shown], dict[str, bytes]]:
+def _stress_still(shown: Shown) -> dict[str, bytes]:
+    """When the largest stress of the run is largest."""
+    _must_draw()
+    from flexclear.pipeline.post.render import film, ruler
+
+    drawn = shown.mechanism(stressed=True)
+    step = int(np.argmax(drawn.run["von_mises_stress"].values.max(axis=1)))
+    return {"stress.png": png(ruler.annotated(film.still(drawn, step, margin=ruler.BAR), drawn, ruler.BAR))}
+
+
+def _film(kind: str, *, stressed: bool = False) -> Callable[[Shown], dict[str, bytes]]:
     def make_film(shown: Shown) -> dict[str, bytes]:
         _must_draw()
         from flexclear.pipeline.post.render import film
 
-        drawn = shown.mechanism()
+        drawn = shown.mechanism(stressed=stressed)
         suffix, content = film.film(drawn, derive(drawn.run), shown.watched, shown.progress, kind, shown.curves)
-        return {f"film.{suffix}": content}
+        return {f"{'stress' if stressed else 'film'}.{suffix}": content}
 
     return make_film
 
@@ -104,6 +114,11 @@ def _must_draw() -> None:
 
 def _motion_page(shown: Shown) -> dict[str, bytes]:
     return {"motion.html": viewer_page(shown.name("motion"), [viewer(player.motion(shown.mechanism()), "Motion")])}
+
+
+def _stress_page(shown: Shown) -> dict[str, bytes]:
+    view = viewer(player.motion(shown.mechanism(stressed=True)), "Von Mises stress")
+    return {"stress.html": viewer_page(shown.name("stress"), [view])}
 
 
 def _motion_gltf(shown: Shown) -> dict[str, bytes]:
@@ -276,6 +291,12 @@ MAKERS: dict[str, dict[str, Callable[[Shown], dict[str, bytes]]]] = {
         "html": _motion_page,
         "gltf": _motion_gltf,
         "pvd": _motion_series,
+    },
+    "stress": {
+        "png": _stress_still,
+        "gif": _film("gif", stressed=True),
+        "mp4": _film("mp4", stressed=True),
+        "html": _stress_page,
     },
     "modes": {
         "png": _mode_sheets,

@@ -13,7 +13,9 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.algebra import matrix_to_quaternion
+from flexclear.pipeline.post import body_stress
 from flexclear.pipeline.post.body_shape import box, faces, scale_to, surface
+from flexclear.pipeline.post.overview.curves import scaled
 from flexclear.pipeline.post.render import joint_view, pace, surfaces
 from flexclear.pipeline.post.render.fields import field, hertz, linear_fields
 from flexclear.pipeline.post.render.mechanism import (
@@ -54,8 +56,15 @@ def motion(drawn: Mechanism, frames: int = FRAMES) -> dict[str, Any]:
         "times": _rounded(run, steps),
         "rate": len(steps) / (drawn.looks.duration or pace.SECONDS),
         "exaggeration": max((body.scale for body in drawn.flexible), default=1.0),
+        **({"readings": [_largest_stress(drawn, steps)]} if drawn.stress else {}),
         **_camera(drawn.view, drawn.cloud, drawn.looks.zoom),
     }
+
+
+def _largest_stress(drawn: Mechanism, steps: np.ndarray) -> dict[str, Any]:
+    factor, unit = scaled(drawn.stress or 0.0, "Pa")
+    values = factor * body_stress.of_bodies(drawn.run)[steps].max(axis=1)
+    return {"label": "largest stress", "unit": unit, "values": [float(f"{v:.4g}") for v in values]}
 
 
 def joint(run: xr.Dataset, contact: int, looks: Looks, frames: int = FRAMES) -> dict[str, Any]:
@@ -167,6 +176,13 @@ def _bent(run: xr.Dataset, body: Flexible, steps: np.ndarray) -> dict[str, Any]:
         "weights": _floats(q[steps]),
         "largest": largest,
     }
+    if body.stressed:  # one byte a point and frame
+        top = body_stress.largest(run) or 1.0
+        name = str(run["body"].values[body.index])
+        levels = np.array([body_stress.on_surface(run, bundle, name, int(step)) for step in steps]) / top
+        data = np.round(255.0 * np.clip(levels, 0.0, 1.0)).astype(np.uint8)
+        factor, unit = scaled(top, "Pa")
+        content |= {"levels": base64.b64encode(data.tobytes()).decode(), "top": f"{factor * top:.3g} {unit}"}
     return content | ({"color": body.color, "plain": True} if body.color else {})
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from flexclear.pipeline.post.overview.curves import rounded, scaled
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render.mechanism import SOCKET, Mechanism
 from flexclear.pipeline.post.render.view import ANGLE, eye
@@ -13,6 +14,8 @@ from flexclear.pipeline.post.series import parameters
 
 #: longest bar [pixels]
 LONGEST = 190.0
+#: colours of stress, and the width at either side of a picture that the bar of these colours takes [pixels]
+STRESS_COLORS, BAR = "turbo", 100
 
 
 def project(drawn: Mechanism, points: np.ndarray, size: tuple[int, int], margin: int = 0) -> np.ndarray:
@@ -43,7 +46,8 @@ def round_length(most: float) -> float:
 
 def exaggeration(drawn: Mechanism) -> list[str]:
     """What is drawn larger than it is, and by which factor."""
-    said = [f"deformation {max(body.scale for body in drawn.flexible):.3g} times larger"] if drawn.flexible else []
+    scale = max((body.scale for body in drawn.flexible), default=0.0)
+    said = [f"deformation {rounded(scale, 3)} times larger"] if drawn.flexible else []
     factors = []
     for joint in parameters(drawn.run).get("joint", {}).values():
         radius = joint.get("ball_radius", joint.get("pin_radius"))
@@ -55,19 +59,42 @@ def exaggeration(drawn: Mechanism) -> list[str]:
     return said
 
 
-def annotated(pixels: np.ndarray, drawn: Mechanism) -> np.ndarray:
+def annotated(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarray:
     """A picture as of `film.still` with a bar and the factors of exaggeration, same shape."""
     height, width = pixels.shape[:2]
+    if drawn.stress is not None:
+        pixels = with_color_bar(pixels.copy(), color_bar(drawn.stress, height))
     canvas = FigureCanvasAgg(Figure(figsize=(width / 100, height / 100), dpi=100))
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.imshow(pixels, extent=(0, width, height, 0), aspect="auto", interpolation="nearest")
     text = " · ".join(exaggeration(drawn))
     axes.text(20, height - 26, text, fontsize=10.5, color=style.SOFT, va="center", parse_math=False)
-    ruler(axes, drawn, (width, height))
+    ruler(axes, drawn, (width, height), margin)
     axes.set(xlim=(0, width), ylim=(height, 0))
     canvas.draw()
     return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+
+
+def color_bar(largest: float, height: int) -> np.ndarray:
+    """The colours of stress from zero to the largest [Pa], with numbers: pixels (height, BAR, 3), black on white."""
+    factor, unit = scaled(largest, "Pa")
+    canvas = FigureCanvasAgg(Figure(figsize=(BAR / 100, height / 100), dpi=100))
+    axes = canvas.figure.add_axes((0.16, 0.25, 0.16, 0.5))
+    axes.imshow(np.linspace(1.0, 0.0, 256)[:, None], aspect="auto", cmap=STRESS_COLORS, extent=(0.0, 1.0, 0.0, 1.0))
+    ticks = np.linspace(0.0, 1.0, 5)
+    axes.yaxis.tick_right()
+    axes.set(xticks=[], yticks=ticks, yticklabels=[f"{t * factor * largest:.3g}" for t in ticks])
+    axes.tick_params(labelsize=9, length=2)
+    canvas.figure.text(0.16, 0.77, f"von Mises\nstress ({unit})", fontsize=9, va="bottom")
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+
+
+def with_color_bar(pixels: np.ndarray, bar: np.ndarray) -> np.ndarray:
+    """A picture with a bar at its left edge, in place, where nothing else is drawn."""
+    pixels[:, : bar.shape[1]] = np.minimum(pixels[:, : bar.shape[1]], bar)
+    return pixels
 
 
 def words(value: float) -> str:

@@ -9,7 +9,7 @@ import pyvista as pv
 import xarray as xr
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from flexclear.pipeline.post.body_shape import is_rod
+from flexclear.pipeline.post.body_shape import has_edges
 from flexclear.pipeline.post.render.surfaces import Surface
 
 BACKGROUND, BACKGROUND_TOP = "#ffffff", "#e6ecf2"
@@ -46,7 +46,7 @@ def shading(bundle: xr.Dataset) -> dict[str, Any]:
     """How a body's skin is shaded: rods smoothly, solids with their edges, bare nodes as dots."""
     if bundle.sizes["corner"] == 1:
         return {"style": "points", "point_size": 9.0, "render_points_as_spheres": True}
-    return {"smooth_shading": True, "split_sharp_edges": not is_rod(bundle)}
+    return {"smooth_shading": True, "split_sharp_edges": has_edges(bundle)}
 
 
 def image(scene: pv.Plotter) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.algebra import quaternion_to_matrix
-from flexclear.pipeline.post.body_shape import faces, is_rod, surface
+from flexclear.pipeline.post.body_shape import faces, has_edges, surface
 from flexclear.pipeline.post.render import forms, player, surfaces
 from flexclear.pipeline.post.render.mechanism import (
     COLORS,
@@ -104,7 +104,7 @@ def _still(body: Flexible, opacity: float) -> Part:
     bundle = body.bundle
     points, _ = surface(bundle, np.zeros(1))
     shown = surfaces.shaded(
-        points - bundle["com"].values, surfaces.triangulated(faces(bundle)), sharp=not is_rod(bundle)
+        points - bundle["com"].values, surfaces.triangulated(faces(bundle)), sharp=has_edges(bundle)
     )
     return Part(body.index, shown, body.color or COLORS[body.index % len(COLORS)], opacity)
 

@@ -130,7 +130,7 @@ def tube(places: np.ndarray, radius: float, corners: int = 6) -> Surface:
     turn = np.linspace(0.0, 2.0 * np.pi, corners + 1)[None, :, None]
     normals = across[:, None] * np.cos(turn) + other[:, None] * np.sin(turn)
     points = places[:, None] + radius * normals
-    return Surface(points.reshape(-1, 3), normals.reshape(-1, 3), grid(len(places), corners + 1))
+    return Surface(points.reshape(-1, 3), normals.reshape(-1, 3), grid(len(places), corners + 1)[:, ::-1])
 
 
 def grid(rows: int, columns: int) -> np.ndarray:

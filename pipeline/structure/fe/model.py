@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -65,6 +66,7 @@ class Drawn:
 
     position: [m], shape (nodes, 3).  cell: shape (cells, corners).  radius: of line cells [m], else zero, (cells,).
     translation, rotation: shape (3 nodes, ndof), node by node.
+    outline: of line cells that are not round: from the line to points around it [m], closed, (cells, points, 3).
     """
 
     position: np.ndarray
@@ -72,6 +74,16 @@ class Drawn:
     radius: np.ndarray
     translation: sp.csr_array
     rotation: sp.csr_array
+    outline: np.ndarray | None = None
+
+    def variables(self) -> dict[str, Any]:
+        """What is drawn of the body at rest, as variables of a bundle."""
+        shown: dict[str, Any] = {
+            "node_position": (("node", "axis"), self.position),
+            "cell_node": (("cell", "corner"), self.cell),
+            "radius": (("cell",), self.radius),
+        }
+        return shown | ({} if self.outline is None else {"outline": (("cell", "around", "axis"), self.outline)})
 
 
 @dataclass(frozen=True)

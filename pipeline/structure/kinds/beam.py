@@ -16,6 +16,7 @@ from flexclear.pipeline.structure.fe import mesh as meshes
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
 from flexclear.pipeline.structure.fe.inertia_integrals import integrate
 from flexclear.pipeline.structure.fe.model import Drawn, Families, Interface, Model
+from flexclear.pipeline.structure.fe.section import rectangle_torsion
 from flexclear.pipeline.structure.fe.slices import slices
 from flexclear.pipeline.structure.kinds.kind import Kind
 
@@ -76,13 +77,48 @@ def _families(beam: Beam) -> Families:
     return Families(tuple(FAMILIES), local, member, main, along)
 
 
+#: points of a drawn outline, corners of a rectangle among them; how near to a type's torsion constant one is of it
+AROUND, SAME = 24, 1e-6
+_SIDE = np.linspace(-1.0, 1.0, AROUND // 4, endpoint=False)
+_ONE = np.ones_like(_SIDE)
+#: around the square with corners at (+-1, +-1), anticlockwise, the first point again last
+_SQUARE = np.concatenate(
+    [
+        np.column_stack(side)
+        for side in ((_ONE, _SIDE), (-_SIDE, _ONE), (-_ONE, -_SIDE), (_SIDE, -_ONE), (_ONE[:1], _SIDE[:1]))
+    ]
+)
+
+
 def _drawn(mesh: xr.Dataset, beam: Beam) -> Drawn:
     nodal = np.arange(beam.nodal_size).reshape(-1, N_DOFS)
     unit = sp.eye_array(beam.size, format="csr")
-    # drawn as a round rod of the true area, whatever the section
-    radius = np.sqrt(mesh["area"].values / np.pi)
     translation, rotation = (sp.csr_array(unit[nodal[:, part].ravel()]) for part in (slice(0, 3), slice(3, 6)))
-    return Drawn(beam.node_position, mesh["cell_node"].values, radius, translation, rotation)
+    cells = mesh["cell_node"].values
+    radius, outline = _sections(mesh, beam)
+    return Drawn(beam.node_position, cells, radius, translation, rotation, outline)
+
+
+def _sections(mesh: xr.Dataset, beam: Beam) -> tuple[np.ndarray, np.ndarray | None]:
+    """Radius of each cell, and outlines (cell, point, 3) where one is a rectangle: the section's own, as its constants
+    say; a general section as a circle of its area."""
+    types = set(mesh.attrs["section"].split())
+    area, (torsion, about_y, about_z) = mesh["area"].values, mesh["second_moment"].values.T
+    full = np.sqrt(area / np.pi)
+    # of a tube, and of a circle: A = pi (R^2 - r^2) and I = A (R^2 + r^2) / 4
+    radius = (
+        np.sqrt(2.0 * about_y / area + 0.5 * area / np.pi) if "tube" in types and types <= {"circle", "tube"} else full
+    )
+    if "rectangle" not in types:
+        return radius, None
+    ratio = np.sqrt(about_z / about_y)
+    width, height = np.sqrt(area * ratio), np.sqrt(area / ratio)
+    square = np.isclose(rectangle_torsion(width, height), torsion, rtol=SAME) if len(types) > 1 else np.ones(len(area))
+    half = 0.5 * np.stack([width, height], axis=1)
+    angle = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
+    ring = full[:, None, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+    flat = np.where(square[:, None, None].astype(bool), half[:, None, :] * _SQUARE, ring)
+    return radius, flat @ beam.axes[:, 1:].T
 
 
 def _build(recipe: Mapping[str, Any], folder: Path) -> xr.Dataset:

@@ -56,29 +56,30 @@ def build(body: Body, requested: ModeRequest) -> Basis:
         # all normal modes of a free body span what its attachment modes could add
         body = replace(body, condition=replace(body.condition, loaded=body.condition.loaded[:0]))
     static = _static(body)
-    available = _available(body)
+    free = available(body.model, body.condition)
     if requested.count is not None or requested == ModeRequest():
-        request = select.request(requested.count, available, static.shape[1])
+        request = select.request(requested.count, free, static.shape[1])
         modes = body.normal(request.solve) if request.normal else _none(body.model)
         return _joined(body, static, modes, select.whole(modes.values, request))
     tried = FIRST
     while True:
-        modes = body.normal(min(tried, available))
+        modes = body.normal(min(tried, free))
         # static shapes alone are a basis, no shape at all is none
         ends = [0] * bool(static.shape[1]) + [stop for _, stop in select.clusters(modes.values)]
         _check_first(modes, static, requested)
         # the last cluster may continue beyond what was computed
-        for stop in ends if tried >= available else ends[:-1]:
+        for stop in ends if tried >= free else ends[:-1]:
             if _enough(body, static, modes, stop, requested):
                 return _joined(body, static, modes, stop)
-        if tried >= available:
+        if tried >= free:
             raise _unreachable(body, static, modes, requested)
         tried *= 2
 
 
-def _available(body: Body) -> int:
-    held = body.condition.held.shape[0]
-    return body.model.size - (held or 6) - (0 if held else body.condition.loaded.shape[0])
+def available(model: Model, condition: Condition) -> int:
+    """Number of normal modes of a mesh under a reference condition."""
+    held = condition.held.shape[0]
+    return model.size - (held or 6) - (0 if held else condition.loaded.shape[0])
 
 
 def _none(model: Model) -> Normal:

@@ -59,9 +59,7 @@ def _frames(model: Model, vectors: np.ndarray) -> dict[str, Any]:
 def _drawn(model: Model, vectors: np.ndarray) -> dict[str, Any]:
     drawn, n = model.drawn, vectors.shape[1]
     return {
-        "node_position": (("node", "axis"), drawn.position),
-        "cell_node": (("cell", "corner"), drawn.cell),
         "shape_translation": (("node", "axis", "mode"), (drawn.translation @ vectors).reshape(-1, 3, n)),
         "shape_rotation": (("node", "axis", "mode"), (drawn.rotation @ vectors).reshape(-1, 3, n)),
-        "radius": (("cell",), drawn.radius),
+        **drawn.variables(),
     }

@@ -69,7 +69,9 @@ def functional(frames: tuple[Interface, ...], name: str) -> sp.csr_array:
     if frame_name not in known:
         raise InputError("modes.held", f"the mesh has no frame called '{frame_name}'", suggestion(frame_name, known))
     if direction not in DIRECTIONS:
-        raise InputError("modes.held", f"'{name}' names no direction", f"frame.{{{', '.join(DIRECTIONS)}}}")
+        raise InputError(
+            "modes.held", f"'{name}' names no direction", f"after the frame comes one of {', '.join(DIRECTIONS)}"
+        )
     return sp.csr_array(in_own_axes(known[frame_name])[[DIRECTIONS.index(direction)]])
 
 

@@ -14,7 +14,12 @@ from flexclear.pipeline.structure.kinds.kind import of_mesh
 
 def build(mesh: xr.Dataset) -> xr.Dataset:
     """Mass [kg], centre of mass [m], inertia about it [kg m^2] and frames of a mesh (schema RIGID), in its frame."""
-    return conform(xr.Dataset(*_rigid(of_mesh(mesh).assemble(mesh))), RIGID, title=_title(mesh))
+    return of_model(of_mesh(mesh).assemble(mesh), mesh.attrs["title"])
+
+
+def of_model(model: Model, title: str) -> xr.Dataset:
+    """The same of an assembled mesh with this title."""
+    return conform(xr.Dataset(*_rigid(model)), RIGID, title=f"Rigid body made of the mesh: {title}")
 
 
 def drawn(mesh: xr.Dataset) -> xr.Dataset:
@@ -25,17 +30,11 @@ def drawn(mesh: xr.Dataset) -> xr.Dataset:
     data |= {
         "first_moment": (("axis",), float(data["mass"][1]) * data["com"][1]),
         "modal_first_moment": (("axis", "mode"), np.zeros((3, 1))),
-        "node_position": (("node", "axis"), shown.position),
-        "cell_node": (("cell", "corner"), shown.cell),
         "shape_translation": (("node", "axis", "mode"), still),
         "shape_rotation": (("node", "axis", "mode"), still),
-        "radius": (("cell",), shown.radius),
+        **shown.variables(),
     }
     return xr.Dataset(data, coordinates)
-
-
-def _title(mesh: xr.Dataset) -> str:
-    return f"Rigid body made of the mesh: {mesh.attrs['title']}"
 
 
 def _rigid(model: Model) -> tuple[dict[str, Any], dict[str, Any]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -15,10 +15,13 @@ from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.registry import lookup, suggestion
 from flexclear.pipeline.structure.fe.model import Interface, Model
 from flexclear.pipeline.structure.kinds.kind import Kind, of_mesh
-from flexclear.pipeline.structure.modes import basis, deficits, eigen, orient
+from flexclear.pipeline.structure.modes import basis, deficits, eigen, orient, select
 from flexclear.pipeline.structure.modes.condition import Condition, Given, check
 from flexclear.pipeline.structure.modes.select import ModeRequest
 from flexclear.pipeline.structure.modes.statics import Flexibility, support
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.scene.parts import Modes
 
 REFERENCES = "flexclear.pipeline.structure.modes.reference"
 CARRIED = ("title", "section", "inertia_section")
@@ -44,14 +47,11 @@ def solve(
     Raises InputError for an unknown reference or frame, a count beyond the mesh, or one that cuts a cluster
     of equal frequencies (with the two nearest whole counts).
     """
-    find = lookup(REFERENCES, reference, where="modes.reference")
     kind = of_mesh(mesh)
     progress(None, "assembling")
     model = kind.assemble(mesh)
     names = tuple(mesh.attrs["interfaces"].split()) if interfaces is None else tuple(interfaces)
-    given = Given(tuple(_frame(model, name) for name in names), tuple(held), of)
-    condition: Condition = find(model, given)
-    check(model, condition)
+    given, condition = _held(model, reference, names, held, of)
 
     @cache
     def flexibility() -> Flexibility:
@@ -74,6 +74,27 @@ def solve(
     attributes |= {"reference": reference, "count": len(values), "interfaces": " ".join(names)}
     attributes["rigid_motion"] = condition.note
     return conform(xr.Dataset(data | lacks), MODES, **attributes)
+
+
+def _held(
+    model: Model, reference: str, names: Sequence[str], held: Sequence[str], of: str | None
+) -> tuple[Given, Condition]:
+    """What a scene says of a reference condition, and the condition; InputError as of `solve`."""
+    given = Given(tuple(_frame(model, name) for name in names), tuple(held), of)
+    condition: Condition = lookup(REFERENCES, reference, where="modes.reference")(model, given)
+    check(model, condition)
+    return given, condition
+
+
+def require_possible(model: Model, modes: Modes, names: Sequence[str]) -> None:
+    """InputError for modes that `solve` would refuse before it computes one; nothing is factorised.
+
+    names: interfaces of the mesh, for modes that name none.
+    """
+    _, condition = _held(model, modes.reference, modes.interfaces or names, modes.held, modes.of)
+    if isinstance(modes.count, int) and modes.count:
+        static = len(condition.moved) or condition.loaded.shape[0]
+        select.request(modes.count, basis.available(model, condition), static)
 
 
 def _frame(model: Model, name: str) -> Interface:

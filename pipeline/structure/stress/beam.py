@@ -11,11 +11,13 @@ Source: Craig & Kurdila, *Fundamentals of Structural Dynamics* (2006), ch. 11 (m
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.structure.fe import beam as beams
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
 from flexclear.pipeline.structure.fe.quadrature import POINTS
@@ -26,8 +28,14 @@ from flexclear.pipeline.structure.stress.outline import Outline, outline
 CONSTANTS = ("area", "second_moment")
 
 
-def recover(mesh: xr.Dataset, modes: xr.Dataset) -> dict[str, Any]:
-    """Variables STRESS of a bundle; without `fibre_stress` where some section has no known outline."""
+def recover(mesh: xr.Dataset, modes: xr.Dataset, gauges: Mapping[str, Any]) -> dict[str, Any]:
+    """Variables STRESS of a bundle; without `fibre_stress` where some section has no known outline.
+
+    InputError for gauges, which are on solids.
+    """
+    for name in gauges:
+        problem = f"'{gauges[name]['body']}' is a rod, which has sections and no surface of nodes"
+        raise InputError(f"[output.gauges.{name}]", problem, "take the gauge out; each end of a cell is recorded")
     beam, vectors = beams.assemble(mesh), modes["vector"].values
     nodes = mesh["cell_node"].values.ravel()
     return _sections(mesh, beam, vectors, nodes) | _slices(mesh, beam, vectors, nodes) | _fibres(mesh)

@@ -54,8 +54,8 @@ def stiffness(solid: Solid) -> sp.csr_array:
     pattern, n = _pattern(solid), len(solid.nodes)
     pairs = solid.cells.shape[1] ** 2
     data = np.zeros((len(pattern.indices), 3, 3))
-    for part in _chunks(solid, at):
-        weight, gradient = _gradients(solid, part, at)
+    for part in chunks(solid, at):
+        weight, gradient = gradients(solid, part, at)
         c, q, a, _ = gradient.shape
         flat = gradient.reshape(c, q, 3 * a)
         D = (flat * weight[..., None]).transpose(0, 2, 1) @ flat
@@ -80,7 +80,7 @@ def mass(solid: Solid) -> sp.csr_array:
     products = np.einsum("qa,qb->qab", at.value, at.value).reshape(len(at.weight), -1)
     data = np.zeros(len(pattern.indices))
     pairs = solid.cells.shape[1] ** 2
-    for part in _chunks(solid, at):
+    for part in chunks(solid, at):
         weight = _jacobian(solid, part, at)[0] * at.weight * solid.density[part][:, None]
         index = pattern.index[part.start * pairs : part.stop * pairs]
         data += np.bincount(index, (weight @ products).ravel(), minlength=len(data))
@@ -93,7 +93,7 @@ def check_cells(element: str, nodes: np.ndarray, cells: np.ndarray, where: str) 
     solid = Solid(element, nodes, cells, blank, blank, blank)
     for order in {ELEMENTS[element].stiffness_order, ELEMENTS[element].mass_order}:
         at = sampled(element, order)
-        low = np.concatenate([_jacobian(solid, part, at)[0].min(axis=1) for part in _chunks(solid, at)])
+        low = np.concatenate([_jacobian(solid, part, at)[0].min(axis=1) for part in chunks(solid, at)])
         wrong = np.flatnonzero(~(low > 0.0))
         if wrong.size:
             shown = ", ".join(str(k) for k in wrong[:5]) + (" ..." if wrong.size > 5 else "")
@@ -111,15 +111,16 @@ def _jacobian(solid: Solid, part: slice, at: Sampled) -> tuple[np.ndarray, np.nd
     return np.linalg.det(J), J
 
 
-def _gradients(solid: Solid, part: slice, at: Sampled) -> tuple[np.ndarray, np.ndarray]:
+def gradients(solid: Solid, part: slice, at: Sampled) -> tuple[np.ndarray, np.ndarray]:
     """Weights times volume (c, q) and gradients in space (c, q, nodes, 3)."""
     volume, J = _jacobian(solid, part, at)
     return volume * at.weight, at.gradient[None] @ np.linalg.inv(J)
 
 
-def _chunks(solid: Solid, at: Sampled) -> Iterator[slice]:
+def chunks(solid: Solid, at: Sampled, fields: int = 0) -> Iterator[slice]:
+    """Cells by so many that their matrices, or the gradients of so many fields, stay within `AT_ONCE` numbers."""
     a = solid.cells.shape[1]
-    step = max(1, AT_ONCE // (9 * a * a + 6 * a * len(at.weight)))
+    step = max(1, AT_ONCE // (9 * a * a + 6 * a * len(at.weight) + 24 * fields * max(a, len(at.weight))))
     for start in range(0, len(solid.cells), step):
         yield slice(start, min(start + step, len(solid.cells)))
 

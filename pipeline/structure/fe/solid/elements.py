@@ -29,6 +29,8 @@ class Element:
     cell: meshio's name.  local: positions of its nodes in the reference cell, shape (nodes, 3).
     faces: corner nodes of each face.  between: corners whose mean is close to a node that is no corner, by node.
     stiffness_order, mass_order: degrees that the quadrature integrates; the mass of cells with curved sides is exact.
+    stress_order: degree of the quadrature at whose points stress is taken, eight in a hexahedron, one or four in a
+        tetrahedron.
     """
 
     cell: str
@@ -38,6 +40,7 @@ class Element:
     between: dict[int, tuple[int, ...]]
     stiffness_order: int
     mass_order: int
+    stress_order: int
 
     @property
     def face_nodes(self) -> np.ndarray:
@@ -71,7 +74,7 @@ def _element(
     corners: np.ndarray,
     faces: tuple[tuple[int, ...], ...],
     inner: tuple[tuple[int, ...], ...],
-    orders: tuple[int, int],
+    orders: tuple[int, int, int],
 ) -> Element:
     between = {len(corners) + k: part for k, part in enumerate(inner)}
     local = np.vstack([corners, *(corners[list(part)].mean(axis=0) for part in inner)])
@@ -80,13 +83,13 @@ def _element(
 
 #: by the recipe's name
 ELEMENTS = {
-    "hex8": _element("hexahedron", ElementHex1(), HEX_CORNERS, HEX_FACES, (), (3, 5)),
-    "hex20": _element("hexahedron20", ElementHexS2(), HEX_CORNERS, HEX_FACES, HEX_EDGES, (5, 9)),
+    "hex8": _element("hexahedron", ElementHex1(), HEX_CORNERS, HEX_FACES, (), (3, 5, 3)),
+    "hex20": _element("hexahedron20", ElementHexS2(), HEX_CORNERS, HEX_FACES, HEX_EDGES, (5, 9, 3)),
     "hex27": _element(
-        "hexahedron27", ElementHex2(), HEX_CORNERS, HEX_FACES, (*HEX_EDGES, *HEX_FACES, tuple(range(8))), (5, 9)
+        "hexahedron27", ElementHex2(), HEX_CORNERS, HEX_FACES, (*HEX_EDGES, *HEX_FACES, tuple(range(8))), (5, 9, 3)
     ),
-    "tet4": _element("tetra", ElementTetP1(), TET_CORNERS, TET_FACES, (), (1, 2)),
-    "tet10": _element("tetra10", ElementTetP2(), TET_CORNERS, TET_FACES, TET_EDGES, (5, 7)),
+    "tet4": _element("tetra", ElementTetP1(), TET_CORNERS, TET_FACES, (), (1, 2, 1)),
+    "tet10": _element("tetra10", ElementTetP2(), TET_CORNERS, TET_FACES, TET_EDGES, (5, 7, 2)),
 }
 
 
@@ -96,6 +99,23 @@ def sampled(name: str, order: int) -> Sampled:
     element = ELEMENTS[name]
     points, weight = get_quadrature(element.basis.refdom, order)
     return Sampled(*shape_functions(name, points), weight)
+
+
+@cache
+def from_stress_points(name: str) -> np.ndarray:
+    """Values at the nodes from those at the points where stress is taken, shape (nodes, points).
+
+    By the polynomial through these points: trilinear in a hexahedron, linear or constant in a tetrahedron.
+    """
+    element = ELEMENTS[name]
+    points, _ = get_quadrature(element.basis.refdom, element.stress_order)
+
+    def powers(x: np.ndarray) -> np.ndarray:
+        one, (a, b, c) = np.ones(len(x)), x.T
+        return np.column_stack([one, a, b, c, a * b, b * c, c * a, a * b * c][: points.shape[1]])
+
+    result: np.ndarray = powers(element.local) @ np.linalg.inv(powers(points.T))
+    return result
 
 
 @cache

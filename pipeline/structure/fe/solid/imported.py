@@ -23,6 +23,7 @@ FACES = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
 BESIDES = ("vertex", "line", "line3", *FACES)
 #: an integer array of cell data with more values than this numbers the cells and names no regions
 MOST_REGIONS = 1000
+HDF5 = "MED and other formats in HDF5 need h5py: pip install 'flexclear[med]'"
 REWRITE = "write it again, only its solid cells and named sets, or as VTU or Gmsh"
 
 
@@ -46,7 +47,8 @@ def _read(path: Path, where: str) -> Mesh:
     try:
         return foreign_mesh.read(path)
     except UnreadableError as error:
-        raise InputError(where, f"meshio cannot read '{path.name}': {error}", REWRITE) from None
+        remedy = HDF5 if "'h5py'" in str(error) else REWRITE
+        raise InputError(where, f"meshio cannot read '{path.name}': {error}", remedy) from None
 
 
 def _cell_type(mesh: Mesh, where: str) -> str:

@@ -37,7 +37,7 @@ def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
     }
     for name in ("youngs_modulus", "poisson", "density"):
         data[name] = (("region",), np.array([getattr(material, name) for material in materials]))
-    data |= _frames(recipe, geometry, path)
+    data |= _frames(recipe, geometry, path) | _regions(geometry)
     return conform(
         xr.Dataset(data),
         SOLID,
@@ -70,6 +70,18 @@ def _materials(recipe: SolidRecipe, geometry: Geometry, path: str) -> tuple[list
     if bare:
         raise InputError(f"{path} [materials]", f"{bare} of {len(region)} cells belong to none of {names}", "add them")
     return names, region
+
+
+def _regions(geometry: Geometry) -> dict[str, Any]:
+    """The nodes of each named region that are on the boundary."""
+    outside = geometries.boundary_nodes(geometry)
+    regions = {name: np.intersect1d(nodes, outside) for name, nodes in ties.regions(geometry).items()}
+    names = list(regions)
+    return {
+        "surface_region": (("surface_region",), names),
+        "patch_node": (("patch",), np.concatenate([regions[name] for name in names] or [np.zeros(0, dtype=np.int64)])),
+        "patch_region": (("patch",), np.repeat(np.arange(len(names)), [len(regions[name]) for name in names])),
+    }
 
 
 def _frames(recipe: SolidRecipe, geometry: Geometry, path: str) -> dict[str, Any]:

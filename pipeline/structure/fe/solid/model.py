@@ -22,7 +22,7 @@ MEMBER = {"y": (1, 5), "z": (2, 4), "x": (0, 3)}
 
 
 @dataclass(frozen=True)
-class _Unknowns:
+class Unknowns:
     """From the model's vector to the displacements of all nodes, shape (3 n, ndof), and what the vector is made of."""
 
     spread: sp.csr_array
@@ -33,8 +33,8 @@ class _Unknowns:
 
 def assemble(mesh: xr.Dataset) -> Model:
     """The model of a solid mesh (schema SOLID)."""
-    solid = _solid(mesh)
-    unknowns = _unknowns(mesh)
+    solid = solid_of(mesh)
+    unknowns = unknowns_of(mesh)
     T = unknowns.spread
     line = elasticity.mass(solid)
     K = T.T @ elasticity.stiffness(solid) @ T
@@ -78,14 +78,16 @@ def integrals(line: sp.csr_array, nodes: np.ndarray, spread: sp.csr_array, vecto
     )
 
 
-def _solid(mesh: xr.Dataset) -> Solid:
+def solid_of(mesh: xr.Dataset) -> Solid:
+    """Nodes, cells and materials of a mesh."""
     region = mesh["cell_region"].values
     E, nu, rho = (mesh[name].values[region] for name in ("youngs_modulus", "poisson", "density"))
     lame, shear = E * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)), E / (2.0 * (1.0 + nu))
     return Solid(mesh.attrs["element"], mesh["node_position"].values, mesh["cell_node"].values, lame, shear, rho)
 
 
-def _unknowns(mesh: xr.Dataset) -> _Unknowns:
+def unknowns_of(mesh: xr.Dataset) -> Unknowns:
+    """The model's vector: displacements of the free nodes, then six unknowns of each rigid frame."""
     x, n = mesh["node_position"].values, mesh.sizes["node"]
     tie_node, tie_frame = mesh["tie_node"].values, mesh["tie_frame"].values
     rigid = np.flatnonzero(mesh["frame_tie"].values == "rigid")
@@ -109,10 +111,10 @@ def _unknowns(mesh: xr.Dataset) -> _Unknowns:
     where = (np.concatenate(rows), np.concatenate(columns))
     spread = sp.csr_array(sp.coo_array((np.concatenate(values), where), shape=(3 * n, size)))
     spread.eliminate_zeros()
-    return _Unknowns(spread, np.vstack(positions), np.concatenate(component), first)
+    return Unknowns(spread, np.vstack(positions), np.concatenate(component), first)
 
 
-def _interfaces(mesh: xr.Dataset, unknowns: _Unknowns) -> tuple[Interface, ...]:
+def _interfaces(mesh: xr.Dataset, unknowns: Unknowns) -> tuple[Interface, ...]:
     size, interfaces = len(unknowns.position), []
     for k, name in enumerate(mesh["frame"].values):
         position, rotation = mesh["frame_position"].values[k], mesh["frame_rotation"].values[k]
@@ -128,7 +130,7 @@ def _interfaces(mesh: xr.Dataset, unknowns: _Unknowns) -> tuple[Interface, ...]:
     return tuple(interfaces)
 
 
-def _families(unknowns: _Unknowns) -> Families:
+def _families(unknowns: Unknowns) -> Families:
     size = len(unknowns.position)
     member = np.empty(size, dtype=np.int64)
     for rank, name in enumerate(FAMILIES):
@@ -139,17 +141,24 @@ def _families(unknowns: _Unknowns) -> Families:
     return Families(FAMILIES, sp.eye_array(size, format="csr"), member, main, (along - along.min()) / extent.max())
 
 
-def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
-    """The boundary: faces with nodes between their corners are cut into several."""
+def surface(mesh: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes of the boundary, ascending, and the corners of its faces among them, shape (faces, corners).
+
+    Faces with nodes between their corners are cut into several, where these nodes can be corners of all pieces.
+    """
     geometry = Geometry(mesh.attrs["element"], mesh["node_position"].values, mesh["cell_node"].values, {}, {})
     faces = face_nodes(geometry, *boundary(geometry))
     pieces = faces[:, _cut(ELEMENTS[geometry.element].face_nodes.shape[1])].reshape(-1, len(_cut(faces.shape[1])[0]))
     used, cell = np.unique(pieces, return_inverse=True)
+    return used, cell.reshape(pieces.shape)
+
+
+def _drawn(mesh: xr.Dataset, spread: sp.csr_array) -> Drawn:
+    used, cell = surface(mesh)
     translation = sp.csr_array(spread[(3 * used[:, None] + np.arange(3)).ravel()])
     # a solid has no rotations of its own
     rotation = sp.csr_array(translation.shape)
-    cell = cell.reshape(pieces.shape)
-    return Drawn(geometry.nodes[used], cell, np.zeros(len(cell)), translation, rotation)
+    return Drawn(mesh["node_position"].values[used], cell, np.zeros(len(cell)), translation, rotation)
 
 
 def _cut(nodes: int) -> list[list[int]]:

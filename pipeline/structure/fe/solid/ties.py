@@ -29,11 +29,11 @@ TOLERANCE = 1e-6
 def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
     """Nodes that a rule selects, ascending; InputError when there are none or no such region."""
     if on.region is not None:
-        regions = _regions(geometry)
-        if on.region not in regions:
-            hint = suggestion(on.region, regions) if regions else "the mesh names none; choose by plane or cylinder"
-            raise InputError(f"{where}.region", f"no region is called '{on.region}'", hint)
-        nodes = regions[on.region]
+        named = regions(geometry)
+        if on.region not in named:
+            hint = suggestion(on.region, named) if named else "the mesh names none; choose by plane or cylinder"
+            raise InputError(f"{where[:-1]}.region]", f"no region is called '{on.region}'", hint)
+        nodes = named[on.region]
     else:
         nodes = _on_surface(geometry, on)
     if nodes.size == 0:
@@ -43,7 +43,8 @@ def chosen(geometry: Geometry, on: On, where: str) -> np.ndarray:
     return nodes
 
 
-def _regions(geometry: Geometry) -> dict[str, np.ndarray]:
+def regions(geometry: Geometry) -> dict[str, np.ndarray]:
+    """Nodes of each named region; where a region has faces and cells, those of its faces."""
     of_cells = {name: np.unique(geometry.cells[cells]) for name, cells in geometry.cell_regions.items()}
     return of_cells | geometry.node_regions
 

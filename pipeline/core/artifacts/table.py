@@ -1,0 +1,45 @@
+"""Datasets as tables: a row per value of some dimensions, a column per component of each variable."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from itertools import product
+from math import prod
+from typing import Any
+
+import pandas as pd
+import xarray as xr
+
+
+class Recorded(xr.Dataset):
+    """The dataset of a run. Its table has a row per recorded time, not one per combination of all dimensions."""
+
+    __slots__ = ()
+
+    def to_dataframe(self, dim_order: Sequence[Hashable] | None = None) -> pd.DataFrame:
+        """What is recorded over time, as `table` gives it; with `dim_order`, what xarray makes of all dimensions."""
+        return table(self) if dim_order is None else super().to_dataframe(dim_order)
+
+
+def recorded(data: xr.Dataset) -> Recorded:
+    """The dataset of a run with its table."""
+    return Recorded(data.data_vars, coords=data.coords, attrs=data.attrs)
+
+
+def table(dataset: xr.Dataset, rows: Sequence[Hashable] = ("time",)) -> pd.DataFrame:
+    """Every variable with the dimensions `rows`, a column per component: ``position platform x [m]``."""
+    columns = {}
+    for name, variable in dataset.data_vars.items():
+        if not set(rows) <= set(variable.dims) or not variable.size:
+            continue
+        ordered = variable.transpose(*rows, ...)
+        labels = product(*(dataset[dim].values.tolist() for dim in ordered.dims[len(rows) :]))
+        values = ordered.values.reshape(-1, prod(ordered.shape[len(rows) :]))
+        for column, label in zip(values.T, labels, strict=True):
+            columns[" ".join(map(str, (name, *label))) + f" [{variable.attrs.get('units', '1')}]"] = column
+    units = [dataset[dim].attrs.get("units", "") for dim in rows]
+    names = [f"{dim} [{unit}]" if unit else str(dim) for dim, unit in zip(rows, units, strict=True)]
+    values_of: list[Any] = [dataset[dim].values for dim in rows]
+    if len(rows) == 1:
+        return pd.DataFrame(columns, index=pd.Index(values_of[0], name=names[0]))
+    return pd.DataFrame(columns, index=pd.MultiIndex.from_product(values_of, names=names))

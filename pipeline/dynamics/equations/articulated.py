@@ -1,0 +1,308 @@
+r"""Elimination along the tree by articulated inertias: linear cost, and rounding that does not grow with its depth.
+
+From the leaves to the ground, each link has the inertia that it offers while everything beyond it moves freely.
+Coordinate after coordinate is taken out of it: with a column s of coordinate k and the inertia I there,
+
+.. math:: g = I s, \quad D_k = s\cdot g, \quad K_k = g/\sqrt{D_k}, \qquad I \leftarrow I - K_k K_k^T ,
+
+and what is left joins the parent's inertia. This is the Cholesky factor of the mass matrix, M = LL^T with
+:math:`L_{jk} = s_j\cdot K_k` for k beyond j, without the matrix: it never adds up the inertia of all that a coordinate
+moves, which loses the digits of M's condition number. All vectors of a link refer to its own origin.
+
+Source: Rodriguez, Jain & Kreutz-Delgado (1991), International Journal of Robotics Research 10, 371-381 (innovations
+factorisation); Featherstone (2008), *Rigid Body Dynamics Algorithms*, ch. 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies import rigid
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import (
+    ZERO,
+    add,
+    add6,
+    add9,
+    at,
+    at6,
+    cross,
+    dot,
+    product,
+    put,
+    put6,
+    scale,
+    sub,
+    turn,
+    turn_back,
+    turn_symmetric,
+)
+
+#: pivots at most this fraction of the largest that all inertia beyond could give mean a coordinate that moves no mass;
+#: rounding leaves a few times 1e-16 of it
+MASSLESS_PIVOT = 1e-14
+
+NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+#: what gives `forces` the inertia of a rigid link: about its own origin
+rigid_inertia = rigid.inertia_about_itself
+
+
+@kernel
+def skewed(v):
+    """Return the matrix of v x."""
+    return (0.0, -v[2], v[1], v[2], 0.0, -v[0], -v[1], v[0], 0.0)
+
+
+@kernel
+def outer(s, a, b):
+    """Return the matrix s a b^T."""
+    x, y, z = scale(s, a)
+    return (x * b[0], x * b[1], x * b[2], y * b[0], y * b[1], y * b[2], z * b[0], z * b[1], z * b[2])
+
+
+@kernel
+def outer_symmetric(s, a):
+    """Return the matrix s a a^T as (xx, yy, zz, xy, xz, yz)."""
+    x, y, z = scale(s, a)
+    return (x * a[0], y * a[1], z * a[2], x * a[1], x * a[2], y * a[2])
+
+
+@kernel
+def less(a, b):
+    """Return a - b of symmetric matrices of six entries."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2], a[3] - b[3], a[4] - b[4], a[5] - b[5])
+
+
+@kernel
+def less9(a, b):
+    """Return a - b of matrices of nine entries."""
+    return (
+        *(a[0] - b[0], a[1] - b[1], a[2] - b[2]),
+        *(a[3] - b[3], a[4] - b[4], a[5] - b[5]),
+        *(a[6] - b[6], a[7] - b[7], a[8] - b[8]),
+    )
+
+
+@kernel
+def localise(d, k, angular, linear):
+    """Store a column about the origin of its link."""
+    d.local[k].angular, d.local[k].linear = angular, linear
+
+
+@kernel
+def step(d, i, arm):
+    """Store the way from the origin of link i's parent to its own; as a difference of positions it loses digits."""
+    d.articulated[i].arm = add(turn(d.link_frames[d.links[i].parent].axes, d.site_numbers[i - 1].origin), arm)
+
+
+@kernel
+def weigh(d, i):
+    """Return mass and polar moment about its origin of link i and all beyond, and add them to its parent's."""
+    link, own, body = d.links[i], d.own[i], d.articulated[i]
+    mass, centre, polar = own.mass, own.moment, 0.5 * (own.inertia[0] + own.inertia[1] + own.inertia[2])
+    if link.leaf == 0:
+        mass, centre, polar = mass + body.mass, add(centre, body.centre), polar + body.polar
+    if link.parent > 0:
+        above, moved = d.articulated[link.parent], add(centre, scale(mass, body.arm))
+        whole, there = mass, polar + dot(body.arm, add(centre, moved))
+        if link.first == 0:
+            whole, moved, there = whole + above.mass, add(moved, above.centre), there + above.polar
+        above.mass, above.centre, above.polar = whole, moved, there
+    return mass, polar
+
+
+@kernel
+def reduce(d, i):
+    """Take the coordinates of link i's joint out of its inertia and pass the rest to its parent.
+
+    Stores the factor's part of each coordinate (MASS: 1/sqrt(D), GAIN: K) and L^-1 of minus the bias (FORCE).  Returns
+    whether all pivots are sound.
+    """
+    link, own, body, p, sound = d.links[i], d.own[i], d.articulated[i], d.link_frames[i].origin, True
+    mass, polar = weigh(d, i)
+    A, B, C, wrench = (
+        at6(own.inertia, 0),
+        skewed(own.moment),
+        (own.mass, own.mass, own.mass, 0.0, 0.0, 0.0),
+        d.wrench[i],
+    )
+    M = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
+    F = add(body.own_force, wrench.force)
+    if link.leaf == 0:
+        A, B, C = add6(A, at6(body.turning, 0)), add9(B, body.mixed), add6(C, at6(body.moving, 0))
+        M, F = add(M, body.moment), add(F, body.force)
+    if link.c0 < d.nv:
+        for k in range(link.c0, link.c0 + link.n_speeds):
+            gain, angular, linear = d.gain[k], d.local[k].angular, d.local[k].linear
+            moment = add(turn_symmetric(A, angular), turn(B, linear))
+            force = add(turn_back(B, angular), turn_symmetric(C, linear))
+            pivot = dot(angular, moment) + dot(linear, force)
+            least = MASSLESS_PIVOT * (polar * dot(angular, angular) + mass * dot(linear, linear))
+            sound = sound & (pivot > least)  # not so of NaN
+            inverse = 1.0 / pivot
+            root, rest = np.sqrt(inverse), -dot(angular, M) - dot(linear, F)
+            d.mass[k], d.force[k] = root, root * rest
+            gain.moment, gain.force = scale(root, moment), scale(root, force)
+            M, F = add(M, scale(inverse * rest, moment)), add(F, scale(inverse * rest, force))
+            A = less(A, outer_symmetric(inverse, moment))
+            B = less9(B, outer(inverse, moment, force))
+            C = less(C, outer_symmetric(inverse, force))
+    if link.parent > 0:
+        # about the parent's origin, from which a leads to the link's
+        a = body.arm
+        x, y, z = cross(a, (B[0], B[1], B[2])), cross(a, (B[3], B[4], B[5])), cross(a, (B[6], B[7], B[8]))
+        A = add6(A, (x[0], y[1], z[2], x[1], x[2], y[2]))
+        x, y, z = cross(a, (C[0], C[3], C[4])), cross(a, (C[3], C[1], C[5])), cross(a, (C[4], C[5], C[2]))
+        B = add9(B, (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2]))
+        x, y, z = cross(a, (B[0], B[1], B[2])), cross(a, (B[3], B[4], B[5])), cross(a, (B[6], B[7], B[8]))
+        A = add6(A, (x[0], y[1], z[2], y[0], z[0], z[1]))
+        M = add(M, cross(a, F))
+        above = d.articulated[link.parent]
+        if link.first == 0:
+            A, B, C = add6(A, at6(above.turning, 0)), add9(B, above.mixed), add6(C, at6(above.moving, 0))
+            M, F = add(M, above.moment), add(F, above.force)
+        put6(above.turning, 0, A)
+        above.mixed = B
+        put6(above.moving, 0, C)
+        above.moment, above.force = M, F
+    return sound
+
+
+@kernel
+def forward(d, b):
+    """L^-1 applied to the generalised forces in w from index b."""
+    for i in range(d.n_links - 1, 0, -1):
+        link, body = d.links[i], d.articulated[i]
+        moment, force = ZERO, ZERO
+        if link.leaf == 0:
+            moment, force = body.moment, body.force
+        if link.c0 < d.nv:
+            for k in range(link.c0, link.c0 + link.n_speeds):
+                local, gain = d.local[k], d.gain[k]
+                value = d.mass[k] * (d.w[b + k] - dot(local.angular, moment) - dot(local.linear, force))
+                d.w[b + k] = value
+                moment, force = add(moment, scale(value, gain.moment)), add(force, scale(value, gain.force))
+        if link.parent > 0:
+            above, moment = d.articulated[link.parent], add(moment, cross(body.arm, force))
+            if link.first == 0:
+                moment, force = add(moment, above.moment), add(force, above.force)
+            above.moment, above.force = moment, force
+
+
+@kernel
+def backward(d, b):
+    """L^-T applied to the vector in w from index b; leaves the accelerations of all links, about their origins."""
+    for i in range(1, d.n_links):
+        link, body = d.links[i], d.articulated[i]
+        angular, linear = ZERO, ZERO
+        if link.parent > 0:
+            above = d.articulated[link.parent]
+            angular, linear = above.angular, add(above.linear, cross(above.angular, body.arm))
+        if link.c0 < d.nv:
+            for k in range(link.c0 + link.n_speeds - 1, link.c0 - 1, -1):
+                local, gain = d.local[k], d.gain[k]
+                value = d.mass[k] * (d.w[b + k] - dot(gain.moment, angular) - dot(gain.force, linear))
+                d.w[b + k] = value
+                angular, linear = add(angular, scale(value, local.angular)), add(linear, scale(value, local.linear))
+        body.angular, body.linear = angular, linear
+
+
+@kernel
+def spread(d, c):
+    """L^-1 J^T of closure c, laid out like J^T: along the way of its two sides to the ground."""
+    closure = d.closures[c]
+    for t in range(closure.threes):
+        start = closure.jacobian0 + 3 * t * closure.n_support
+        for e in range(closure.path0, closure.path0 + closure.n_path):
+            none = d.transmitted[d.paths[e].link]
+            none.moments, none.forces = NONE, NONE
+        for e in range(closure.path0, closure.path0 + closure.n_path):
+            path = d.paths[e]
+            link, moments, forces = (
+                d.links[path.link],
+                d.transmitted[path.link].moments,
+                d.transmitted[path.link].forces,
+            )
+            if path.slot >= 0:
+                for k in range(link.n_speeds):
+                    local, gain, place = d.local[link.c0 + k], d.gain[link.c0 + k], start + 3 * (path.slot + k)
+                    against = add(turn_back(moments, local.angular), turn_back(forces, local.linear))
+                    values = scale(d.mass[link.c0 + k], sub(at(d.jacobian, place), against))
+                    put(d.spread, place, values)
+                    moments = add9(moments, outer(1.0, gain.moment, values))
+                    forces = add9(forces, outer(1.0, gain.force, values))
+            if link.parent > 0:
+                above, lever = d.transmitted[link.parent], product(skewed(d.articulated[path.link].arm), forces)
+                above.moments = add9(above.moments, add9(moments, lever))
+                above.forces = add9(above.forces, forces)
+
+
+@kernel
+def transmit(d, b, biased):
+    """What each link needs through its joint, about its origin, for accelerations in w from index b.
+
+    biased: 1.0 with the forces that act and what the present motion needs, 0.0 for the accelerations alone.
+    """
+    for i in range(1, d.n_links):
+        link, body = d.links[i], d.articulated[i]
+        angular, linear = ZERO, ZERO
+        if link.parent > 0:
+            above = d.articulated[link.parent]
+            angular, linear = above.angular, add(above.linear, cross(above.angular, body.arm))
+        if link.c0 < d.nv:
+            for k in range(link.c0, link.c0 + link.n_speeds):
+                local = d.local[k]
+                angular = add(angular, scale(d.w[b + k], local.angular))
+                linear = add(linear, scale(d.w[b + k], local.linear))
+        body.angular, body.linear = angular, linear
+        own, wrench, p = d.own[i], d.wrench[i], d.link_frames[i].origin
+        moment = add(turn_symmetric(at6(own.inertia, 0), angular), cross(own.moment, linear))
+        force = add(scale(own.mass, linear), cross(angular, own.moment))
+        needed = add(body.own_moment, sub(wrench.moment, cross(p, wrench.force)))
+        body.moment = add(moment, scale(biased, needed))
+        body.force = add(force, scale(biased, add(body.own_force, wrench.force)))
+    for i in range(d.n_links - 1, 0, -1):
+        link, body = d.links[i], d.articulated[i]
+        if link.parent > 0:
+            above = d.articulated[link.parent]
+            above.moment = add(above.moment, add(body.moment, cross(body.arm, body.force)))
+            above.force = add(above.force, body.force)
+
+
+@kernel
+def demand(d, j, b, biased):
+    """What the links beyond joint j with friction need through it, about the kernels' origin; after `transmit`."""
+    i = d.rubbing[j].link
+    moment, force = d.articulated[i].moment, d.articulated[i].force
+    return add(moment, cross(d.link_frames[i].origin, force)), force
+
+
+@kernel
+def drive_forces(d):
+    """Forces that the prescribed coordinates need: what their joints transmit at the accelerations in DU."""
+    if d.n_drives == 0:
+        return
+    transmit(d, d.h[m.DU], 1.0)
+    for i in range(1, d.n_links):
+        link, body = d.links[i], d.articulated[i]
+        if link.c0 >= d.nv:
+            for k in range(link.c0, link.c0 + link.n_speeds):
+                local = d.local[k]
+                d.drive_force[k - d.nv] = dot(local.angular, body.moment) + dot(local.linear, body.force)
+
+
+def make_eliminate(flexible: Any = None) -> Callable:
+    """The kernel eliminate(d): factor of the mass matrix and L^-1 of minus the bias (FORCE); whether it is sound."""
+
+    @kernel
+    def eliminate(d):
+        sound = True
+        for i in range(d.n_links - 1, 0, -1):
+            sound = reduce(d, i) & sound
+        return sound
+
+    return eliminate

@@ -1,0 +1,160 @@
+"""Elimination by the mass matrix itself: composite inertias give its entries, an envelope Cholesky its factor.
+
+The composite rigid body algorithm (Featherstone, *Rigid Body Dynamics Algorithms*, ch. 6); for shallow trees, where it
+takes fewer operations than articulated inertias do (`equations.articulated`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies import rigid
+from flexclear.pipeline.dynamics.bodies.rigid import carry
+from flexclear.pipeline.dynamics.equations import envelope
+from flexclear.pipeline.dynamics.equations.kinematics import no_arm, no_column
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at6, cross, dot, put, scale, sub, turn_symmetric
+
+#: pivots of M below this fraction of their diagonal mean a coordinate that moves no mass
+MASSLESS_PIVOT = 1e-15
+
+localise, step = no_column, no_arm
+#: what gives `forces` the inertia of a rigid link: about the kernels' origin
+rigid_inertia = rigid.inertia
+
+
+@kernel
+def no_modal_forces(d):
+    """No modes."""
+
+
+@kernel
+def no_link_load(d, i):
+    """No link is carried by a flexible one."""
+
+
+@kernel
+def copy_inertia(d):
+    """Inertia of each link's tree, to which the links beyond are still to be added."""
+    for i in range(d.n_links):
+        tree, own = d.inertia[i], d.own[i]
+        tree.mass, tree.moment = own.mass, own.moment
+        for e in range(6):
+            tree.inertia[e] = own.inertia[e]
+
+
+@kernel
+def gather(d, i):
+    """Force and momentum of link i's coordinates; then take its subtree to its parent."""
+    link, wrench = d.links[i], d.wrench[i]
+    for k in range(link.c0, link.c0 + link.n_speeds):
+        carry(d, i, k)
+        column = d.columns[k]
+        d.bias[k] = dot(column.angular, wrench.moment) + dot(column.linear, wrench.force)
+    above = d.wrench[link.parent]
+    above.moment = add(above.moment, wrench.moment)
+    above.force = add(above.force, wrench.force)
+    tree, branch = d.inertia[link.parent], d.inertia[i]
+    tree.mass += branch.mass
+    tree.moment = add(tree.moment, branch.moment)
+    for e in range(6):
+        tree.inertia[e] += branch.inertia[e]
+
+
+@kernel
+def assemble_mass(d):
+    """Mass matrix in its envelope, from momenta and columns."""
+    for p in range(d.n_pairs):
+        pair = d.pairs[p]
+        momentum, column = d.momenta[pair.momentum], d.columns[pair.column]
+        d.mass[pair.entry] += dot(momentum.angular, column.angular) + dot(momentum.linear, column.linear)
+
+
+@kernel
+def forward(d, b):
+    """L^-1 applied to the generalised forces in w from index b."""
+    envelope.forward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, b)
+
+
+@kernel
+def backward(d, b):
+    """L^-T applied to the vector in w from index b."""
+    envelope.backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, b)
+
+
+@kernel
+def spread(d, c):
+    """L^-1 J^T of closure c, laid out like J^T."""
+    closure = d.closures[c]
+    for t in range(closure.threes):
+        start = closure.jacobian0 + 3 * t * closure.n_support
+        for a in range(closure.n_support):
+            i = d.support[closure.support0 + a].coordinate
+            first, row, value = d.envelope[i].first, d.envelope[i].origin, at(d.jacobian, start + 3 * a)
+            for b in range(a - 1, -1, -1):
+                k = d.support[closure.support0 + b].coordinate
+                if k < first:
+                    break  # in increasing order
+                value = sub(value, scale(d.mass[row + k], at(d.spread, start + 3 * b)))
+            put(d.spread, start + 3 * a, scale(d.mass[row + i], value))
+
+
+@kernel
+def transmit(d, b, biased):
+    """`demand` has all that it needs: momenta, and wrenches that have been passed to the ground."""
+
+
+@kernel
+def demand(d, j, b, biased):
+    """What the links beyond joint j with friction need through it for accelerations in w from index b.
+
+    biased: 1.0 with the forces that act and what the present motion needs, 0.0 for the accelerations alone.
+    """
+    joint, moment, force, angular, linear = d.rubbing[j], ZERO, ZERO, ZERO, ZERO
+    for k in range(joint.momentum0, joint.momentum0 + joint.n_momenta):
+        momentum, size = d.momenta[d.reaction_terms[k].column], d.w[b + d.reaction_terms[k].coordinate]
+        moment, force = add(moment, scale(size, momentum.angular)), add(force, scale(size, momentum.linear))
+    for k in range(joint.column0, joint.column0 + joint.n_columns):
+        column, size = d.columns[d.reaction_terms[k].column], d.w[b + d.reaction_terms[k].coordinate]
+        angular, linear = add(angular, scale(size, column.angular)), add(linear, scale(size, column.linear))
+    tree, wrench = d.inertia[joint.link], d.wrench[joint.link]
+    turned = add(turn_symmetric(at6(tree.inertia, 0), angular), cross(tree.moment, linear))
+    moved = add(scale(tree.mass, linear), cross(angular, tree.moment))
+    moment, force = add(moment, turned), add(force, moved)
+    return add(moment, scale(biased, wrench.moment)), add(force, scale(biased, wrench.force))
+
+
+@kernel
+def drive_forces(d):
+    """Forces that the prescribed coordinates need: their rows of the equations of motion."""
+    for k in range(d.n_drives):
+        d.drive_force[k] = d.bias[d.nv + k]
+    for p in range(d.n_known_pairs):
+        pair = d.known_pairs[p]
+        momentum, column = d.momenta[pair.momentum], d.columns[pair.column]
+        inertia = dot(momentum.angular, column.angular) + dot(momentum.linear, column.linear)
+        d.drive_force[pair.drive] += inertia * d.du[pair.coordinate]
+
+
+def make_eliminate(flexible: Any = None) -> Callable:
+    """The kernel eliminate(d): factor of the mass matrix and L^-1 of minus the bias (FORCE); whether it is sound."""
+    port_load = no_link_load if flexible is None else flexible.port_load
+    modal = no_modal_forces if flexible is None else flexible.modal_forces
+
+    @kernel
+    def eliminate(d):
+        copy_inertia(d)
+        for i in range(d.n_links - 1, 0, -1):
+            port_load(d, i)
+            gather(d, i)
+        modal(d)
+        assemble_mass(d)
+        sound = envelope.factor(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, MASSLESS_PIVOT)
+        for k in range(d.nv):
+            d.force[k] = -d.bias[k]
+        forward(d, d.h[m.FORCE])
+        return sound
+
+    return eliminate

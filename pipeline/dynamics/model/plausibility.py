@@ -1,0 +1,158 @@
+"""Plausibility of an assembled mechanism: pins that start outside of their joints, joints that were forgotten."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.ideal import loose
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism
+from flexclear.pipeline.dynamics.model.merge import Placement
+from flexclear.pipeline.dynamics.model.stops import STOP, End
+
+#: surfaces whose inner part is a pin or a ball within a hollow one
+ROUND = ("clearance-revolute", "clearance-spherical")
+#: frames that are closer than this fraction of the mechanism's size are at one point; surfaces that are less deep in
+#: each other than this fraction of their clearance or radius may only touch
+SAME = 1e-3
+
+
+def offsets(mechanism: Mechanism) -> Iterator[tuple[Contact, np.ndarray, Placement]]:
+    """Of every pin and ball: its contact, the way from the middle of its hollow to it [m] and its pose at the start.
+
+    Along its axis a pin may be anywhere; that part is left out.
+    """
+    for contact in mechanism.contacts:
+        if contact.joint.type == STOP or contact.joint.type not in ROUND:
+            continue
+        outer, inner = (mechanism.links[s.link].start.of(s.place) for s in (contact.outer, contact.inner))
+        away = inner.p - outer.p
+        if contact.joint.type == "clearance-revolute":
+            away = away - (away @ outer.R[:, 2]) * outer.R[:, 2]
+        yield contact, away, inner
+
+
+def refuse_missed(mechanism: Mechanism) -> None:
+    """InputError for a pin or ball that starts outside of its hollow, with its distance."""
+    for contact, away, _ in offsets(mechanism):
+        joint, distance = contact.joint, float(np.linalg.norm(away))
+        if distance <= joint.clearance + joint.radius:
+            continue
+        names = ("socket", "ball") if joint.type == "clearance-spherical" else ("journal", "pin")
+        raise InputError(
+            f"[{contact.place}.between]",
+            f"the {names[1]} ('{joint.between[1]}') starts {length(distance)} from the middle of its {names[0]} "
+            f"('{joint.between[0]}'), where the clearance allows {length(joint.clearance)}",
+            "correct poses or frames; a bare number is in metres: 50 is 50 m",
+        )
+
+
+def refuse_overlap(mechanism: Mechanism) -> None:
+    """InputError for a ball or pin of a rigid mechanism that starts within its hollow's or plane's material.
+
+    What rounding of poses may explain is left to the run, which closes the loops exactly.
+    """
+    scene = mechanism.scene
+    if scene.start is not None and scene.start.at is not None:
+        return
+    for contact, away, _ in offsets(mechanism):
+        depth = float(np.linalg.norm(away)) - contact.joint.clearance
+        if depth > SAME * contact.joint.clearance:
+            refuse_depth(scene, contact, depth)
+    for contact in mechanism.contacts:
+        if contact.joint.type == "ball-on-plane":
+            plane, ball = (mechanism.links[s.link].start.of(s.place) for s in (contact.outer, contact.inner))
+            depth = contact.joint.radius - float((ball.p - plane.p) @ plane.R[:, 2])
+            if depth > SAME * contact.joint.radius:
+                refuse_depth(scene, contact, depth)
+
+
+def refuse_depth(scene: Scene, contact: Contact, depth: float) -> None:
+    """InputError for surfaces that start so deep in each other [m or rad], unless the scene says how that began."""
+    joint = contact.joint
+    if joint.initial_approach_speed is not None:
+        return
+    problem, remedy = f"its surfaces start {length(depth)} deep in each other", "enlarge the clearance"
+    problem += f" (clearance {length(joint.clearance)})"
+    if joint.type == "ball-on-plane":
+        problem, remedy = f"the ball starts {length(depth)} deep in the plane", "lower the plane"
+    elif isinstance(joint, End):
+        unit = "rad" if joint.coordinate.turning else "m"
+        problem, remedy = f"the coordinate starts {depth:.3g} {unit} beyond {joint.limit:.6g} {unit}", "move the end"
+    elif contact.name in loose(scene):
+        remedy = "begin where the joint would be without clearance ([start] at = 'ideal'), " + remedy
+    raise InputError(
+        f"[{contact.place}]",
+        problem,
+        f"move a body, {remedy}, or declare the speed at which this contact began as initial_approach_speed",
+    )
+
+
+def length(metres: float) -> str:
+    """A length in m, mm or um."""
+    for factor, unit in ((1.0, "m"), (1e3, "mm")):
+        if metres * factor >= 1.0:
+            return f"{metres * factor:.4g} {unit}"
+    return f"{metres * 1e6:.4g} um"
+
+
+def unused_frames(mechanism: Mechanism) -> list[str]:
+    """Frames that the scene names nowhere outside of its bodies."""
+    named = _named(mechanism.scene)
+    return [name for name in mechanism.frames if name not in named]
+
+
+def forgotten(mechanism: Mechanism) -> list[tuple[str, str, str]]:
+    """Unused frames at one point of two bodies that nothing connects, as without a joint: body, text and remedy."""
+    connected = {frozenset(_links(mechanism, pair)) for pair in _pairs(mechanism.scene)}
+    result = []
+    for a, b in combinations(unused_frames(mechanism), 2):
+        links = _links(mechanism, (a, b))
+        if links[0] == links[1] or frozenset(links) in connected:
+            continue
+        if np.linalg.norm(_position(mechanism, a) - _position(mechanism, b)) <= SAME * mechanism.length:
+            text = f"nothing uses the frames '{a}' and '{b}', which start at the same point: is a joint missing?"
+            remedy = f'add a joint with between = ["{a}", "{b}"], or remove the frames'
+            result.append((mechanism.frames[a].body, text, remedy))
+    return result
+
+
+def _named(scene: Scene) -> str:
+    """All texts of a scene outside of its bodies, which name what is used."""
+    table = scene.model_dump(mode="json", exclude={"body", "title", "description"}, exclude_none=True)
+    return " ".join(_texts(table))
+
+
+def _texts(node: Any) -> Iterator[str]:
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield key
+            yield from _texts(value)
+    elif isinstance(node, list):
+        for value in node:
+            yield from _texts(value)
+    elif isinstance(node, str):
+        yield node
+
+
+def _pairs(scene: Scene) -> Iterator[tuple[str, str]]:
+    for part in (*scene.joint.values(), *scene.load.values()):
+        if hasattr(part, "between"):
+            yield part.between
+
+
+def _links(mechanism: Mechanism, frames: tuple[str, str]) -> list[int]:
+    return [mechanism.link_of[mechanism.frames[frame].body] for frame in frames]
+
+
+def _position(mechanism: Mechanism, frame: str) -> np.ndarray:
+    """Where a frame starts, from the kernels' origin [m]."""
+    there = mechanism.frames[frame]
+    link = mechanism.links[mechanism.link_of[there.body]]
+    position: np.ndarray = link.start.of(link.places[there.body]).point(there.place.p)
+    return position

@@ -1,0 +1,181 @@
+"""Articulated inertias give what the mass matrix gives, in linear time and without its loss of digits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.compile import sources
+from flexclear.pipeline.dynamics.effects import Scheme
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline.dynamics.run.tree_factor import bias, mass_factor
+from tests.analytic.mechanism_runs import TREE
+from tests.properties.articulated_chains import Evaluated, evaluated, rods, tabulated
+from tests.properties.mechanisms import Table
+from tests.properties.test_closure_rows import dense_factor
+
+#: of the largest; the mass matrix of the chains here has a condition of 1e5 at most, of which 2e-12 was left
+ROUNDING = 1e-9
+#: of joints, with one to three coordinates
+MIXED = ("spherical", "revolute", "prismatic", "universal", "cylindrical", "planar")
+TREES: dict[str, Table] = {
+    "plane chain": rods(5, plane=True),
+    "chain": rods(10),
+    "branches": rods(13, children=3),
+    "joints of all kinds": rods(12, MIXED),
+    "free": rods(6, ("free", "revolute", "fixed")),
+    "driven joints": rods(9, ("revolute", "prismatic"), driven=(0, 3, 4)),
+    "driven hinges among balls": rods(7, ("spherical", "revolute"), driven=(1, 3)),
+}
+#: loops, couplings, redundant rows, contacts that are closed, stops, friction in joints
+SCENES = (
+    *("checks/andrews_squeezer", "checks/bennett", "checks/bricard", "checks/gears", "checks/four_bars_2"),
+    *("checks/universal_shaft", "checks/governor", "checks/clearance_slider_crank", "checks/sarrus", "sps4/ideal"),
+    *("sps4/csj", "checks/rubbing_slider_crank"),
+)
+
+
+def apart(one: np.ndarray, other: np.ndarray) -> float:
+    """Largest difference, as fraction of the largest entry."""
+    return float(np.abs(one - other).max(initial=0.0) / (np.abs(other).max(initial=0.0) or 1.0))
+
+
+def both(monkeypatch: pytest.MonkeyPatch, scene: Scene) -> tuple[Evaluated, Evaluated]:
+    one, other = (evaluated(tabulated(monkeypatch, scene, way)) for way in (True, False))
+    assert one.report == other.report == m.OK
+    assert one.model.parts.articulated
+    return one, other
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_trees_move_as_with_the_mass_matrix(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    one, other = both(monkeypatch, Scene.model_validate(TREES[name]))
+    assert apart(one.rates, other.rates) < ROUNDING
+    assert apart(one.drives, other.drives) < ROUNDING
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_scenes_move_as_with_the_mass_matrix(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half-solved closure rows, accelerations, powers and drives."""
+    one, other = both(monkeypatch, load_scene(TREE / f"scenes/{name}.toml"))
+    speeds = one.model.speeds
+    for part in (speeds, slice(speeds.stop, None)):
+        assert apart(one.rates[part], other.rates[part]) < ROUNDING
+    assert apart(one.drives, other.drives) < ROUNDING
+    spread = [way.space.w[way.space.h[m.SPREAD] :][: way.space.h[m.JACOBIAN_SIZE]] for way in (one, other)]
+    assert apart(*spread) < ROUNDING
+
+
+def plane_accelerations(angles: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """Second rates of a plane chain's joint angles, from the mass matrix in absolute angles, in extended precision.
+
+    Links of 1 m and 1 kg on a fixed hinge; angles about y, from the x axis towards -z.  In absolute angles the matrix
+    has a condition of 1e4.
+    """
+    turned, spin = (np.cumsum(one.astype(np.longdouble)) for one in (angles, rates))
+    number = np.arange(len(angles))
+    beyond = len(angles) - number - np.longdouble(0.5)  # mass times lever of what follows, in m kg
+    weight = np.minimum.outer(beyond, beyond)
+    difference = np.subtract.outer(turned, turned)
+    M = weight * np.cos(difference)
+    M[number, number] = np.longdouble(1.0) / 12 + beyond - np.longdouble(0.25)
+    force = np.longdouble(9.81) * beyond * np.cos(turned) - (weight * np.sin(difference)) @ spin**2
+    for k in number:  # Gauss, of a positive definite matrix
+        factor = M[k + 1 :, k] / M[k, k]
+        M[k + 1 :] -= np.outer(factor, M[k])
+        force[k + 1 :] -= factor * force[k]
+    for k in number[::-1]:
+        force[k] = (force[k] - M[k, k + 1 :] @ force[k + 1 :]) / M[k, k]
+    return np.diff(force, prepend=np.longdouble(0.0)).astype(float)
+
+
+def test_a_plane_chain_has_its_closed_form(monkeypatch: pytest.MonkeyPatch) -> None:
+    """40 links, whose mass matrix has a condition of 1e7: it alone would leave 1e-10."""
+    model = tabulated(monkeypatch, Scene.model_validate(rods(40, plane=True)), True)
+    found = evaluated(model, speeds=0.5, turns=0.3)
+    y, order = found.space.h[m.Y], [c.start for c in model.numbering.coordinates[1:]]
+    angles, rates = found.space.w[y : y + model.nq], found.space.w[y + model.nq : y + model.nq + model.nv]
+    expected = plane_accelerations(angles, rates[order])
+    assert apart(found.rates[model.speeds][order], expected) < 1e-12  # measured 4e-14
+
+
+@pytest.mark.parametrize("plane", [True, False])
+def test_rounding_does_not_grow_with_the_length(plane: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """300 links, against the same kernels in extended precision."""
+    model = tabulated(monkeypatch, Scene.model_validate(rods(300, plane=plane)), True)
+    found, exact = (evaluated(model, 0.5, 0.3, number) for number in (float, np.longdouble))
+    assert np.finfo(np.longdouble).eps < 1e-18
+    assert apart(found.rates[model.speeds], exact.rates[model.speeds].astype(float)) < 1e-12  # measured 3e-14
+
+
+def massless(coaxial: bool) -> Table:
+    """A deep chain with a link without mass, between hinges about one axis or about two."""
+    table = rods(12)
+    table["body"]["rod5"] |= {"mass": 1e-40, "inertia": [1e-40] * 3}
+    if coaxial:
+        table["body"]["rod5"]["frames"]["end6"] = dict(table["body"]["rod5"]["frames"]["foot"])
+        for k in range(6, 12):
+            position = np.array(table["body"][f"rod{k}"]["pose"]["position"]) - [1.0, 0.0, 0.0]
+            table["body"][f"rod{k}"]["pose"]["position"] = position.tolist()
+        table["body"]["rod6"]["frames"]["foot"]["axes"] = table["body"]["rod5"]["frames"]["foot"]["axes"]
+    return table
+
+
+@pytest.mark.parametrize("articulated", [True, False])
+def test_coordinates_that_move_no_mass_are_noticed(articulated: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of both coaxial hinges one turns nothing; a light link that others follow is no such thing."""
+    reports = []
+    for coaxial in (True, False):
+        model = tabulated(monkeypatch, Scene.model_validate(massless(coaxial)), articulated)
+        reports.append(evaluated(model).report)
+    assert reports == [m.NOT_POSITIVE, m.OK]
+
+
+def engine(count: int) -> Engine:
+    made = engine_of(Scene.model_validate(rods(count, plane=True)), {}, silent)
+    assert made.model.parts.articulated
+    return made
+
+
+def test_a_long_chain_takes_as_many_steps_as_a_short_one() -> None:
+    """0.2 s from the horizontal; and energies balance as the tolerance of 1e-10 lets them."""
+    counts = []
+    for count in (40, 150):
+        one = engine(count)
+        run = integrate(one, consistent_start(one), silent)
+        assert run.time[-1] == pytest.approx(0.2)
+        counts.append(int(one.n[m.EVALUATIONS]))
+    assert counts[1] < 1.2 * counts[0]
+
+
+def test_factor_and_bias_in_full_are_those_of_the_mass_matrix(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What equilibria, vibrations and the choice of closure rows read."""
+    scene = Scene.model_validate(rods(20, plane=True))
+    known = evaluated(tabulated(monkeypatch, scene, False), 0.0)
+    one, h, w = engine(20), known.space.h, known.space.w
+    y = w[h[m.Y] :][: one.model.ny]
+    one.evaluate(y, 0.0)
+    L = dense_factor(known.model.arrays.table(m.ENVELOPE), w[h[m.MASS] :])
+    found = mass_factor(one)
+    assert apart(found @ found.T, L @ L.T) < 1e-13  # some hundred products of numbers of that size
+    assert apart(bias(one), w[h[m.BIAS] :][: one.model.nv]) < 1e-13
+
+
+def test_the_depth_of_the_tree_decides() -> None:
+    """Only the way that a mechanism takes is composed."""
+    for count, articulated in ((10, False), (20, True)):
+        parts = tabulate(build(Scene.model_validate(rods(count)), {})).parts
+        assert parts.articulated == articulated
+        for source in sources.sources(parts, Scheme("dop853")).values():
+            assert ("articulated" in source) <= articulated
+            assert ("composite" in source) <= (not articulated)
