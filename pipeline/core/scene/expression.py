@@ -67,7 +67,7 @@ def _combined(operator: str, operands: list[Measure]) -> Measure:
         sign = 1.0 if operator == "*" else -1.0
         return _sum(a or NUMBER, b or NUMBER, sign), first or second, None
     if operator in "+-" or operator in SEVERAL:
-        if None not in (a, b) and not _same(a, b):
+        if a is not None and b is not None and not _same(a, b):
             verb = "added or subtracted" if operator in "+-" else "compared"
             raise ValueError(f"{units.si(a)} and {units.si(b)} are not {verb}; numbers need their unit")
         if first != second:
