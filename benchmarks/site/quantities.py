@@ -24,8 +24,9 @@ fc.quantity(run, "force(pin) - force(main)")
   The second word of the table says which one is meant: `guide.joint_position`.
 - `force(A1)` is another way to write `A1.force`.
 - What belongs to the whole mechanism has no owner: `kinetic`.
-- Expressions have `+ - * /`, parentheses, numbers with units and `norm(...)`, the magnitude, with spaces around + and
-  -: `slider.position.x - 10 mm`, `norm(slider.velocity) * 2 kg`. Units are checked.
+- Expressions have `+ - * / ^`, parentheses, numbers with units, the time `t` and the functions `max`, `min`, `abs`,
+  `sqrt`, `sin`, `cos`, `tan`, `exp`, `log`, `sign`, `step` (1 from zero on) and `norm`, the magnitude, with spaces
+  around + and -: `max(0, slider.position.x - 10 mm)^1.5`. Units are checked; a bare 0 fits every unit.
   As keys of `[accuracy]` they are quoted.
 - A relative accuracy refers to the largest change since the start (lengths and angles) or to the largest magnitude (all
   others). An absolute one has the unit of the quantity.

@@ -5,7 +5,7 @@ Series are compared at the regular output times that both runs have, never inter
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from flexclear.pipeline.core.algebra import rotation_between
 from flexclear.pipeline.core.artifacts.coordinates import ROTATION
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.expression import fold
 from flexclear.pipeline.core.scene.quantity import COMPONENTS, KINDS, Quantity, as_written, parse
 from flexclear.pipeline.core.scene.run_schema import RUN
 
@@ -54,23 +55,26 @@ def series(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
     """Values over time, shape (time, components); only of quantities that have a value at every time [SI]."""
     if not quantity.steps:
         return _of_part(run, quantity)
-    stack: list[np.ndarray] = []
-    for step in quantity.steps:
-        if isinstance(step, Quantity):
-            stack.append(_of_part(run, step))
-        elif isinstance(step, tuple):
-            stack.append(np.full((1, 1), step[0]))
-        elif step == "norm":
-            stack.append(np.linalg.norm(stack.pop(), axis=1, keepdims=True))
-        elif step == "minus":
-            stack.append(-stack.pop())
-        else:
-            b, a = stack.pop(), stack.pop()
-            stack.append(_OPERATORS[step](a, b))
-    return stack[0]
+
+    def leaf(step: Quantity | tuple[float, str]) -> np.ndarray:
+        return _of_part(run, step) if isinstance(step, Quantity) else np.full((1, 1), step[0])
+
+    return fold(quantity.steps, leaf, lambda operator, operands: _OPERATORS[operator](*operands))
 
 
-_OPERATORS = {"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide}
+_OPERATORS: dict[str, Callable[..., np.ndarray]] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+    "^": np.power,
+    "minus": np.negative,
+    "norm": lambda a: np.linalg.norm(a, axis=1, keepdims=True),
+    "max": np.maximum,
+    "min": np.minimum,
+    "step": lambda a: np.heaviside(a, 1.0),
+    **{name: getattr(np, name) for name in ("abs", "sqrt", "sin", "cos", "tan", "exp", "log", "sign")},
+}
 
 
 def _of_part(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -315,3 +316,32 @@ def test_what_contacts_have_per_event_is_the_events() -> None:
     data = run("scotch_yoke")
     for kind in OF_CONTACTS:
         assert evaluate(data, f"slot.{kind}").attrs["units"] in ("N", "N s", "s")
+
+
+def test_functions_of_quantities_are_evaluated_and_their_units_checked() -> None:
+    times = np.array([0.0, 0.5, 2.0])
+    run = xr.Dataset({"kinetic": ("time", np.array([3.0, 1.0, 4.0])), "time": times})
+    by_hand = {
+        "max(0, kinetic - 2 J)^1.5": np.maximum(0.0, run.kinetic.values - 2.0) ** 1.5,
+        "min(kinetic, 2 J, 3.5 J) * sin(2 rad/s * t)": np.minimum(run.kinetic.values, 2.0) * np.sin(2.0 * times),
+        "-sqrt(kinetic)^2 + abs(-1 J)": 1.0 - run.kinetic.values,
+        "step(t - 0.5 s) * exp(-t / 1 s)": np.array([0.0, np.exp(-0.5), np.exp(-2.0)]),
+        "step(kinetic - 2 J) * abs(log(kinetic / 1 J))^(-1/2 + 1)": [np.log(3.0) ** 0.5, 0.0, np.log(4.0) ** 0.5],
+        "sign(kinetic - 2 J) * cos(0 rad * t / 1 s) + tan(0 * t / 1 s)": [1.0, -1.0, 1.0],
+    }
+    for text, expected in by_hand.items():
+        # the same operations on numbers of order one: rounding of some ten of them
+        assert evaluate(run, text).values == pytest.approx(expected, rel=1e-14, abs=1e-14)
+    assert evaluate(run, "sqrt(kinetic)^2").attrs["units"] == "J"
+    refused = {
+        "sin(kinetic)": "a number or an angle",
+        "exp(t)": "takes a number",
+        "max(kinetic, t)": "not compared",
+        "kinetic^t": "an exponent is a number",
+        "max(kinetic)": "two values or more",
+        "abs(kinetic, t)": "one value",
+        "kinetic + 1": "numbers need their unit",
+    }
+    for text, why in refused.items():
+        with pytest.raises(InputError, match=re.escape(why)):
+            evaluate(run, text)

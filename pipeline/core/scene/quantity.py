@@ -4,9 +4,10 @@ A quantity is ``<owner>.<word>``, as ``platform.position`` or ``A1.peak_force``;
 and ``kinetic`` belongs to the whole mechanism. The words are the names of the run's variables over time, as
 ``slider.acceleration`` or ``hinge.joint_velocity``; the kind of part in front may be left out (``hinge.velocity``), and
 means the first of `OWNERS` that has such a part. ``force(A1)`` is another way to write ``A1.force``.
-Expressions combine quantities and numbers with units by ``+ - * /``, parentheses and ``norm(...)``, the magnitude:
-``force(A1) - force(A2)``. How runs hold quantities is known to `pipeline.core.quantities`, which needs NumPy; a command
-that finds everything fresh does not.
+Expressions combine quantities and numbers with units (`pipeline.core.scene.expression`): ``force(A1) - force(A2)``,
+``max(0, slider.position.x - 10 mm)``; ``t`` is the time, ``norm(...)`` the magnitude.
+How runs hold quantities is known to `pipeline.core.quantities`, which needs NumPy; a command that finds everything
+fresh does not.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any, NamedTuple
 
 from flexclear.pipeline.core import units
 from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.expression import FUNCTIONS, SEVERAL, Reader, measure
 from flexclear.pipeline.core.scene.run_schema import RUN
 
 #: dimension of a run -> what its entries are; a word that several have means the first. Sections are named by bodies
@@ -87,6 +89,7 @@ def _kinds() -> dict[str, Kind]:
             known[_RENAMED.get(name, name)] = Kind(owner, name, both, dim, variable.long_name)
     known["orientation"] = known["orientation"]._replace(units=("rad", "rad"))
     known["peak_force"] = Kind("contact", "event_peak_force", ("N", "N m"), "", "largest normal force of the contact")
+    known["t"] = Kind("", "time", ("s", "s"), "", "time of the run")
     known["impact_times"] = Kind("contact", "event_time", ("s", "s"), "", "times of closings faster than 1e-4 m/s")
     return dict(sorted(known.items(), key=lambda item: list(OWNERS).index(item[1].owner)))
 
@@ -174,18 +177,7 @@ class Quantity:
 
     def _measured(self) -> tuple[units.Exponents, str]:
         """Exponents of the unit, and the dimension of the components; ValueError where the parts do not go together."""
-        stack: list[tuple[units.Exponents, str]] = []
-        for step in self.steps:
-            if isinstance(step, Quantity):
-                stack.append((units.measured(step.unit), step.dim))
-            elif isinstance(step, tuple):
-                stack.append((units.measured(step[1]), ""))
-            elif step == "norm":
-                stack.append((stack.pop()[0], ""))
-            elif step != "minus":
-                (b, second), (a, first) = stack.pop(), stack.pop()
-                stack.append(_combined(step, (a, first), (b, second)))
-        return stack[-1]
+        return measure(self.steps)
 
 
 def _step(step: Any) -> Any:
@@ -194,30 +186,8 @@ def _step(step: Any) -> Any:
     return Quantity.read(step) if len(step) > 2 else tuple(step)
 
 
-def _combined(
-    operator: str, left: tuple[units.Exponents, str], right: tuple[units.Exponents, str]
-) -> tuple[units.Exponents, str]:
-    (a, first), (b, second) = left, right
-    if operator in "+-":
-        if a != b:
-            raise ValueError(f"{units.si(a)} and {units.si(b)} are not added or subtracted; numbers need their unit")
-        if first != second:
-            raise ValueError("a vector and a number are not added or subtracted; take a component, or norm(...)")
-        return a, first
-    if second and (first or operator == "/"):
-        raise ValueError("one of two vectors that are multiplied, or a divisor, must be a component, or norm(...)")
-    sign = 1.0 if operator == "*" else -1.0
-    kg, m, s, rad = (x + sign * y for x, y in zip(a, b, strict=True))
-    return (kg, m, s, rad), first or second
-
-
-_CALL = re.compile(r"(?<![\w.-])(?!norm\b)(\w+)\(\s*([\w.-]+)\s*\)")
+_CALL = re.compile(rf"(?<![\w.-])(?!(?:{'|'.join((*FUNCTIONS, *SEVERAL))})\b)(\w+)\(\s*([\w.-]+)\s*\)")
 _PLAIN = re.compile(r"\w[\w.-]*")
-_TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?![\w.])(?:\s*(?P<unit>"
-    + "|".join(re.escape(u) for u in sorted(units.UNITS, key=len, reverse=True))
-    + r")(?![\w.^]))?|(?P<name>[^\W\d][\w-]*(?:\.[\w-]+)*)|(?P<operator>[-+*/()]))\s*"
-)
 
 
 def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
@@ -230,7 +200,7 @@ def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     if _PLAIN.fullmatch(plain):
         quantity = _term(plain, owners)
     else:
-        quantity = Quantity("", EXPRESSION, steps=tuple(_Reader(plain, owners).whole()))
+        quantity = Quantity("", EXPRESSION, steps=tuple(Reader(plain, lambda name: _term(name, owners)).whole()))
         if not quantity.terms():
             raise ValueError(f"'{text}' is a number, and no quantity")
         _ = quantity.dim
@@ -268,81 +238,6 @@ def _nearest(owner: str, word: str, owners: Mapping[str, Collection[str]]) -> st
     if "did you mean" in near:
         return re.sub("'(.+?)'", lambda match: f"'{pieces[match[1]]}'", near, count=1)
     return suggestion("", list(pieces.values()) or [f"{o}.{w}".lstrip(".") for o, w in every])
-
-
-class _Reader:
-    """Reads an expression into postfix order."""
-
-    def __init__(self, text: str, owners: Mapping[str, Collection[str]]) -> None:
-        self.text, self.owners, self.place = text, owners, 0
-        self.token = self._next()
-
-    def whole(self) -> list[Any]:
-        steps = self._sum()
-        if self.token is not None:
-            raise self._misread()
-        return steps
-
-    def _misread(self) -> ValueError:
-        return ValueError(
-            f"'{self.text}' is no quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or an expression of "
-            "them with + - * /, parentheses, norm(...) and numbers with units, spaces around + and -"
-        )
-
-    def _next(self) -> re.Match[str] | None:
-        if self.place == len(self.text):
-            return None
-        match = _TOKEN.match(self.text, self.place)
-        if match is None:
-            raise self._misread()
-        self.place = match.end()
-        return match
-
-    def _take(self, *operators: str) -> str:
-        """The operator that is next, where it is one of these; or nothing."""
-        if self.token is None or self.token["operator"] not in operators:
-            return ""
-        taken: str = self.token["operator"]
-        self.token = self._next()
-        return taken
-
-    def _sum(self) -> list[Any]:
-        steps = self._product()
-        while operator := self._take("+", "-"):
-            steps += [*self._product(), operator]
-        return steps
-
-    def _product(self) -> list[Any]:
-        steps = self._one()
-        while operator := self._take("*", "/"):
-            steps += [*self._one(), operator]
-        return steps
-
-    def _one(self) -> list[Any]:
-        if self._take("-"):
-            return [*self._one(), "minus"]
-        if self._take("("):
-            steps = self._sum()
-            if not self._take(")"):
-                raise self._misread()
-            return steps
-        token = self.token
-        if token is None or token["operator"]:
-            raise self._misread()
-        self.token = self._next()
-        if token["number"]:
-            written = token["unit"]
-            factor, unit = (units.UNITS[written][0], units.si(units.measured(written))) if written else (1.0, "1")
-            return [(factor * float(token["number"]), unit)]
-        if token["name"] == "norm" and self._take("("):
-            steps = self._sum()
-            if not self._take(")"):
-                raise self._misread()
-            return [*steps, "norm"]
-        term = _term(token["name"], self.owners)
-        if not term.over_time or term.dim == "quat":
-            raise ValueError(f"'{token['name']}' cannot be part of an expression: it is no number or vector over time")
-        return [term]
 
 
 def usual(joints: Mapping[str, Collection[str]], contacts: Collection[str]) -> list[Quantity]:

@@ -68,10 +68,10 @@ def recorded(run: Run) -> LabelledArrays:
     return conformed(labelled(variables, coordinates), RUN, title=title, **facts)
 
 
-def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity]) -> LabelledArrays:
+def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np.ndarray) -> LabelledArrays:
     """What of a run these quantities are read from (`core.quantities.series`), and little else.
 
-    terms: no expressions, but what they consist of.
+    terms: no expressions, but what they consist of.  time: of the rows [s].
     """
     names: dict[str, list[str]] = {}
     for term in terms:
@@ -91,6 +91,7 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity]) -> Label
         places = shifted(motions.positions(frames), model.mechanism.origin)
         parts.append(({"frame_position": (("time", "frame", "axis"), places)}, {"frame": frames}))
     parts += [made() for makes, made in _makers(scene, motions) if any(name.startswith(makes) for name in wanted)]
+    parts.append(({"time": (("time",), time)}, {}))
     variables = {name: values for part in parts for name, values in part[0].items() if name in wanted}
     return labelled(variables, {name: values for part in parts for name, values in part[1].items()})
 

@@ -164,7 +164,7 @@ def _kept(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[R
     require_shallow(engine.model, trajectory, seen)
     require_closed(engine.model, trajectory, seen)
     terms = {t for k in kept if k.quantity.over_time for t in k.quantity.terms()}
-    arrays, series = chosen(scene, Motions(engine.model, seen), terms), dict[str, np.ndarray]()
+    arrays, series = chosen(scene, Motions(engine.model, seen), terms, trajectory.time), dict[str, np.ndarray]()
     values: Values = {}
     for one in kept:
         if not one.quantity.over_time:
@@ -194,7 +194,8 @@ def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive:
         if done.number >= requested.transient:
             here = done.parts[sampled_at]
             motions = Motions(engine.model, observed(parts[sampled_at], replace(here, rows=here.rows[:1])))
-            arrays = chosen(scene, motions, {term for one in recorded for term in one.quantity.terms()})
+            terms = {term for one in recorded for term in one.quantity.terms()}
+            arrays = chosen(scene, motions, terms, here.time[:1])
             for one in recorded:
                 row = quantities.series(arrays, one.quantity)[0]
                 values.setdefault(one.name, []).append(row if one.quantity.dim else row[0])
