@@ -160,7 +160,7 @@ def test_every_quantity_of_a_run_can_be_evaluated_compared_and_drawn(name: str) 
 def test_a_sweep_keeps_of_every_quantity_what_the_run_holds(name: str) -> None:
     """But for rounding, which the code of long runs has in another order: of all that is measured in the same unit.
 
-    Steps whose lengths differ by rounding end with states that differ by what the tolerance of 1e-10 leaves, and impacts
+    Steps whose lengths differ by rounding end with states that differ by what the tolerance of 1e-10 leaves.  Impacts
     make a difference up to a thousand times larger.
     """
     data, asked = run(name), scene(name)
