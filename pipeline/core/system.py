@@ -109,29 +109,6 @@ def keep_memory() -> None:
         change(M_TRIM_THRESHOLD, KEPT)
 
 
-def limit_itself(memory: float, seconds: float) -> None:
-    """Let this process take so much more memory [B] and processor time [s], and write no file, where systems do that.
-
-    Beyond its time it is ended by SIGXCPU; memory is limited on Linux alone.
-    """
-    resource = _module("resource")
-    if resource is None:
-        return
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    limits = {
-        "RLIMIT_CPU": int(used.ru_utime + used.ru_stime + seconds) + 1,
-        "RLIMIT_FSIZE": 0,
-        "RLIMIT_CORE": 0,
-    }
-    pages = _text("/proc/self/statm").split()
-    if pages:
-        limits["RLIMIT_AS"] = int(int(pages[0]) * os.sysconf("SC_PAGE_SIZE") + memory)
-    for name, soft in limits.items():
-        kind = getattr(resource, name)
-        _, hard = resource.getrlimit(kind)
-        resource.setrlimit(kind, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
-
-
 def share_blocks(source: Any, target: Any) -> bool:
     """Whether an open file could be made to share the bytes of another (Linux, on file systems that can)."""
     fcntl = _module("fcntl")

@@ -54,11 +54,6 @@ class Opened:
             finally:
                 self.busy = False
 
-    def learn(self, name: str, then: str) -> None:
-        """Note a file that another process has read, with the digest that it found."""
-        if name not in self.written and not self._left_out(name) and self.read.setdefault(name, then) != then:
-            raise changed(name)
-
     def _left_out(self, name: str) -> bool:
         if name.endswith(CODE) or name.startswith(self.outside) or f"{os.sep}flexclear_kernels_" in name:
             return True
@@ -78,16 +73,6 @@ def note(path: Path) -> None:
     """A file is about to be read in a way that Python does not report."""
     if _current is not None:
         _current.see(path, writing=False)
-
-
-def add(read: Mapping[str, str], base: Path) -> None:
-    """Files that another process has read for this one, as its `watched` found them.
-
-    Raises ResourceError where such a file was another one when this process read it itself.
-    """
-    if _current is not None:
-        for file, then in read.items():
-            _current.learn(os.path.normpath(base / file), then)
 
 
 @contextmanager
@@ -129,13 +114,8 @@ def watched(base: Path, outside: Iterable[Path] = ()) -> Iterator[dict[str, str]
         if name in seen.written or (now == ABSENT and name.startswith(temporary)):
             continue  # the process's own: made by a task, or by a library for itself
         if now != then:
-            raise changed(name)
+            raise ResourceError(f"{name} changed while it was read; run again")
         watched_files[_place(name, base)] = then
-
-
-def changed(name: str) -> ResourceError:
-    """Message about a file that was not the same all the time."""
-    return ResourceError(f"{name} changed while it was read; run again")
 
 
 def _place(name: str, base: Path) -> str:

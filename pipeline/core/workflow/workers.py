@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -13,10 +16,13 @@ from typing import TYPE_CHECKING, Any
 from flexclear.pipeline.core import system
 from flexclear.pipeline.core.errors import ResourceError
 from flexclear.pipeline.core.workflow import cores, stopping
-from flexclear.pipeline.core.workflow.family import follow
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
+
+
+#: where the system sends no signal at a parent's end, the parent is searched for so often [s]
+LOOK = 1.0
 
 
 @dataclass(frozen=True)
@@ -56,10 +62,26 @@ def pool(width: int, bell: Bell | None = None) -> ProcessPoolExecutor:
 
 
 def _begin(parent: int, bell: Bell | None) -> None:
-    follow(parent)
+    _follow(parent)
     system.keep_memory()
     if bell is not None:
         stopping.obey(bell.rung.wait, lambda: bell.why.value.decode(errors="replace"), bell.count_deaf)
+
+
+def _follow(parent: int) -> None:
+    """In a process that the main thread of `parent` started: end when it does; Ctrl-C is left to it.
+
+    parent: its number, as it says itself: by now the system may have given this process another one.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    system.end_with_parent()
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+
+
+def _watch(parent: int) -> None:
+    while system.is_parent(parent):
+        time.sleep(LOOK)
+    os._exit(1)
 
 
 def _context() -> Any:
@@ -103,7 +125,7 @@ class Team:
         from multiprocessing.managers import SyncManager
 
         server, bell = SyncManager(ctx=_context()), Bell.made()
-        server.start(follow, (os.getpid(),))
+        server.start(_follow, (os.getpid(),))
         return Team(width, pool(width, bell), bell, server, server.Queue())
 
     def end(self) -> None:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.external_files import mesh as foreign_mesh
-from flexclear.pipeline.core.external_files.checks import require_mesh
-from flexclear.pipeline.core.external_files.isolated import UnreadableError
-from flexclear.pipeline.core.external_files.mesh import Mesh
+from flexclear.pipeline.core.external_files import read_mesh
 from flexclear.pipeline.core.units import UNITS
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
+
+if TYPE_CHECKING:
+    from meshio import Mesh
 
 #: names of types by meshio's
 NAMES = {element.cell: name for name, element in ELEMENTS.items()}
@@ -28,7 +29,8 @@ REWRITE = "write it again, only its solid cells and named sets, or as VTU or Gms
 
 def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
     """The mesh in a file; InputError when it cannot be read, has no solid cells or several types of them."""
-    mesh = _read(folder / shape.file, where)
+    path = folder / shape.file
+    mesh = read_mesh(path, where, f"meshio cannot read '{path.name}'", REWRITE)
     name = _cell_type(mesh, where)
     scale = UNITS[shape.length_unit][0]
     solid = [k for k, block in enumerate(mesh.cells) if block.type == name]
@@ -39,14 +41,6 @@ def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
     cell_regions, node_regions = _regions(mesh, solid, renumber)
     nodes = scale * _points(mesh, where)[used]
     return Geometry(NAMES[name], nodes, inverse.reshape(cells.shape), node_regions, cell_regions)
-
-
-def _read(path: Path, where: str) -> Mesh:
-    require_mesh(path, where)
-    try:
-        return foreign_mesh.read(path)
-    except UnreadableError as error:
-        raise InputError(where, f"meshio cannot read '{path.name}': {error}", REWRITE) from None
 
 
 def _cell_type(mesh: Mesh, where: str) -> str:
