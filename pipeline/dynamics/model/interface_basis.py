@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.sparse_graphs import components
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, named_frames
 
@@ -82,12 +81,20 @@ def basis(motions: np.ndarray, stiffness: np.ndarray) -> InterfaceBasis:
     Modes that move frames in different ways, as in bending and in torsion, are not mixed.
     """
     held, moving, n = list[np.ndarray](), list[np.ndarray](), len(stiffness)
-    for modes in components((np.abs(motions).T @ np.abs(motions)) > 0.0):
+    for modes in _families((np.abs(motions).T @ np.abs(motions)) > 0.0):
         for kind, columns in zip((held, moving), _family(motions[:, modes], stiffness[modes]), strict=True):
             for column in columns.T:
                 kind.append(np.zeros(n))
                 kind[-1][modes] = column
     return InterfaceBasis(np.array([*held, *moving]).T, len(held))
+
+
+def _families(common: np.ndarray) -> list[list[int]]:
+    """Modes that are connected by common motions, ascending; common: symmetric (modes, modes), true for such pairs."""
+    reached = common | np.eye(len(common), dtype=bool)
+    for _ in range(len(common).bit_length()):
+        reached = reached @ reached
+    return [np.flatnonzero(reached[first]).tolist() for first in np.unique(reached.argmax(axis=1))]
 
 
 def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
