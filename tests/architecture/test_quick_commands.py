@@ -18,7 +18,7 @@ from flexclear.stages.workplace import Workplace
 
 #: what such a command may import: its own code, and what checks scenes
 ALLOWED = {"flexclear", "pydantic", "pydantic_core", "annotated_types", "typing_extensions"}
-ALLOWED |= {"typing_inspection"}
+ALLOWED |= {"typing_inspection", "psutil"}
 #: what takes a tenth of a second or more, and what it brings
 SLOW = {"numpy", "xarray", "pandas", "scipy", "numba", "matplotlib", "pyvista", "skfem", "meshio", "netCDF4"}
 #: the command, and what it has imported at its end
