@@ -6,6 +6,7 @@ They are read in this process. A reader that fails, in whatever way of its own, 
 from __future__ import annotations
 
 import contextlib
+import glob
 import io
 import re
 from collections.abc import Mapping
@@ -28,12 +29,21 @@ MOST_POINTS = 2_000_000
 _GRID = re.compile(rb"^DATASET\s+(?:STRUCTURED|RECTILINEAR)\w*\s+DIMENSIONS((?:\s+\d{1,12}){3})\s", re.MULTILINE)
 #: bytes of the header of a VTK file that are examined
 HEADER = 2000
+#: where a file names others, by its suffix
+_NAMED = {
+    ".inp": re.compile(r"^\*INCLUDE\b.*=(.+)$", re.IGNORECASE | re.MULTILINE),
+    ".xdmf": re.compile(r"<DataItem[^>]*Format=\"(?:HDF|Binary)\"[^>]*>\s*([^<:]+)"),
+}
+_NAMED[".xmf"] = _NAMED[".xdmf"]
 #: what meshio puts among the sets of cells of a Gmsh 4 file, but numbers of curves and points
 NO_CELLS = "gmsh:bounding_entities"
 
 
 def require_file(path: Path, where: str) -> None:
-    """InputError unless an ordinary file is there: reading a device may never end, a pipe waits for a writer."""
+    """Note a file that will be read; InputError unless it is an ordinary one.
+
+    Reading a device may never end, a pipe waits for a writer.
+    """
     try:
         there, ordinary = path.exists(), path.is_file()
     except (OSError, ValueError) as error:
@@ -42,6 +52,7 @@ def require_file(path: Path, where: str) -> None:
         raise InputError(where, f"there is no file {path}", "paths are relative to the file that names them")
     if not ordinary:
         raise InputError(where, f"'{path}' is no ordinary file")
+    file_dependencies.note(path)
 
 
 @contextlib.contextmanager
@@ -67,7 +78,11 @@ def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | 
     memory for.  Raises ResourceError for what is too large.
     """
     _require_mesh(path, where, largest)
-    with reading(path, where, problem, remedy), file_dependencies.ordinary_only():
+    with reading(path, where, problem, remedy):
+        waiting = companions(path)
+        for companion in waiting:  # grows by what these include
+            require_file(companion, where)
+            waiting += [file for file in companions(companion) if file not in (path, *waiting)]
         return _parsed(path)
 
 
@@ -91,7 +106,6 @@ def _parsed(path: Path) -> meshio.Mesh:
     import meshio  # slow to import, and only meshes from files need it
     import numpy as np
 
-    _note_companions(path)
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), np.errstate(over="ignore"):
@@ -126,9 +140,14 @@ def _integers(data: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _note_companions(path: Path) -> None:
-    """XDMF keeps its numbers in HDF5 files, which a library in C opens."""
-    if path.suffix in (".xdmf", ".xmf"):
-        words = re.split(r"[\s<>]+", path.read_text(encoding="utf-8", errors="replace"))
-        for name in {word.partition(".h5:")[0] for word in words if ".h5:" in word}:
-            file_dependencies.note(path.parent / f"{name}.h5")
+def companions(path: Path) -> list[Path]:
+    """Files that meshio reads besides this one: of TetGen, DOLFIN, XDMF, and includes of Abaqus."""
+    if path.suffix in (".ele", ".node"):
+        return [path.with_suffix(".node" if path.suffix == ".ele" else ".ele")]
+    if path.suffix == ".xml":
+        return sorted(path.parent.glob(f"{glob.escape(path.stem)}_*.xml"))
+    if path.suffix not in _NAMED:
+        return []
+    named = [Path(name.strip()) for name in _NAMED[path.suffix].findall(path.read_text("utf-8", errors="replace"))]
+    # as meshio finds them: from the folder of the process, if they are there
+    return [name if name.exists() and path.suffix == ".inp" else path.parent / name for name in dict.fromkeys(named)]

@@ -22,6 +22,7 @@ from flexclear.pipeline.core.scene.limits import check_parts
 from flexclear.pipeline.core.scene.not_toml import not_toml
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.validation_errors import input_errors
+from flexclear.pipeline.core.workflow.file_dependencies import note
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
@@ -227,6 +228,7 @@ def _require_tables(table: dict[str, Any], path: Path) -> None:
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as a table; InputError when it cannot be read or parsed."""
     try:
+        note(path)
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             raise InputError(str(path), "cannot be read: it is no ordinary file", "name a TOML file")
