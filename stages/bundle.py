@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
+from flexclear.pipeline.core import file_dependencies
 from flexclear.pipeline.core.artifacts.disk import digest_of, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import TREE, kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError, InputError
@@ -21,7 +22,6 @@ from flexclear.pipeline.core.external_files import require_file
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import compose, is_file
 from flexclear.pipeline.core.version import version
-from flexclear.pipeline.core.workflow import file_dependencies
 from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.stages import run, s1_mesh
 from flexclear.stages.sweep_points import source_digest

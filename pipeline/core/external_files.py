@@ -14,9 +14,8 @@ from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core import machine
+from flexclear.pipeline.core import file_dependencies, machine
 from flexclear.pipeline.core.errors import FlexclearError, InputError, ResourceError, shown
-from flexclear.pipeline.core.workflow import file_dependencies
 
 if TYPE_CHECKING:
     import meshio

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from flexclear.pipeline.core.workflow.file_dependencies import note
+from flexclear.pipeline.core.file_dependencies import note
 from flexclear.pipeline.post import figures
 from flexclear.pipeline.post.discrepancies import DISCREPANCIES
 from flexclear.pipeline.post.page import Content, html_page

@@ -10,12 +10,12 @@ import meshio
 import numpy as np
 import pytest
 
+from flexclear.pipeline.core import file_dependencies
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.errors import ResourceError
 from flexclear.pipeline.core.external_files import companions, read_mesh
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow import file_dependencies
 from flexclear.pipeline.core.workflow.execute import execute, find, states
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
 from flexclear.pipeline.core.workflow.task import Task, facts

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from flexclear.pipeline.core import portable
 from flexclear.pipeline.core.errors import InputError, ResourceError, shown
+from flexclear.pipeline.core.file_dependencies import note
 from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.fields import LONGEST_NAME
 from flexclear.pipeline.core.scene.file_kinds import SCENE, require_kind
@@ -22,7 +23,6 @@ from flexclear.pipeline.core.scene.limits import check_parts
 from flexclear.pipeline.core.scene.not_toml import not_toml
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.validation_errors import input_errors
-from flexclear.pipeline.core.workflow.file_dependencies import note
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.paths import TREE
-from flexclear.pipeline.core.workflow.file_dependencies import note
+from flexclear.pipeline.core.file_dependencies import note
 from flexclear.pipeline.post.figures import measured
 from flexclear.pipeline.post.figures.measured import SEPARATION, SLIGHT, Data, difference, mode_set
 from flexclear.pipeline.post.figures.table10 import ratios

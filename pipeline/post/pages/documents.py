@@ -7,7 +7,7 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from flexclear.pipeline.core.workflow.file_dependencies import note
+from flexclear.pipeline.core.file_dependencies import note
 
 #: what generated pages put around what they measured
 COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
