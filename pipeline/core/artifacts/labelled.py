@@ -16,6 +16,9 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
+    #: what stages read, of which names, dimensions and values are asked alone
+    Labelled = xr.Dataset | "LabelledArrays"
+
 
 @dataclass(frozen=True)
 class LabelledArray:

@@ -11,8 +11,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, named_frames
 
 if TYPE_CHECKING:
-    import xarray as xr
-
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.dynamics.model.arrays import Arrays
 
 #: a shape or moment below this fraction of the largest of its kind is rounding, not coupling
@@ -59,13 +58,13 @@ def interface_basis(mechanism: Mechanism, link: int) -> InterfaceBasis:
     return basis(_motions(bundle, sorted(used)), np.diag(bundle["modal_stiffness"].values))
 
 
-def mass_coupled(bundle: xr.Dataset) -> bool:
+def mass_coupled(bundle: Labelled) -> bool:
     """Whether modes have common entries of the modal mass."""
     mass = bundle["modal_mass"].values
     return bool(np.any(np.abs(mass - np.diag(np.diag(mass))) > UNCOUPLED))
 
 
-def _motions(bundle: xr.Dataset, frames: list[str]) -> np.ndarray:
+def _motions(bundle: Labelled, frames: list[str]) -> np.ndarray:
     """Displacements and turns of frames per mode, each in units of the largest, shape (6 frames, mode)."""
     shapes = [frame_shapes(bundle, frame.partition(".")[2])[1:] for frame in frames]
     kinds = []
@@ -114,9 +113,14 @@ def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.
     return still @ axes, moving @ turns_first
 
 
-def frame_shapes(bundle: xr.Dataset, frame: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def frame_index(bundle: Labelled, frame: str) -> int:
+    """Return the index of a named frame of a bundle; ValueError when there is none."""
+    return [str(name) for name in bundle["frame"].values].index(frame)
+
+
+def frame_shapes(bundle: Labelled, frame: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Undeformed pose row (12), translation and rotation shapes (3, n) of a named frame."""
-    k = list(bundle["frame"].values).index(frame)
+    k = frame_index(bundle, frame)
     pose = np.concatenate([bundle["frame_position"].values[k], bundle["frame_rotation"].values[k].ravel()])
     shapes = [bundle[name].values[k].copy() for name in ("frame_translation_shape", "frame_rotation_shape")]
     for name, shape in zip(("frame_translation_shape", "frame_rotation_shape"), shapes, strict=True):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from threading import Lock
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -32,8 +33,11 @@ from flexclear.pipeline.dynamics.run.specialised import abreast
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, output_times
 
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+
+def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     """All members (schema ENSEMBLE) of a scene with clearance joints."""
     requested = scene.ensemble or Ensemble()
     if not scene.contacts() and not scene.stop:

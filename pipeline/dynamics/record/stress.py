@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import Wrench, joint_wrenches, path_wrenches
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
@@ -77,7 +77,7 @@ def record(motions: Motions, names: tuple[str, ...]) -> tuple[Variables, dict[st
     }
 
 
-def section_forces(bundle: xr.Dataset, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
+def section_forces(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
     """N, Qy, Qz [N], T, My, Mz [N m] of every section, in axes of the deformed section, shape (time, section, 6).
 
     moment, force: of joints and loads at every named frame, body axes, moments about the body's origin [N m, N],
@@ -93,7 +93,7 @@ def section_forces(bundle: xr.Dataset, motion: Motion, moment: np.ndarray, force
     return np.concatenate([np.einsum("tsij,tsi->tsj", R_BS, part) for part in (F, M)], axis=-1)
 
 
-def peak_stresses(bundle: xr.Dataset, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def peak_stresses(bundle: Labelled, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Axial stress that is largest in size, and largest von Mises stress [Pa], shape (time, section) each.
 
     forces: as `section_forces` returns them.  A round section is turned so that a fibre lies in the plane of bending.
@@ -121,7 +121,7 @@ def _in_plane_of_bending(forces: np.ndarray) -> np.ndarray:
     return turned
 
 
-def _inertia(bundle: xr.Dataset, motion: Motion) -> Wrench:
+def _inertia(bundle: Labelled, motion: Motion) -> Wrench:
     """Rate of momentum of every slice less its weight: moment about the body's origin, force, (time, slice, 3)."""
     S = [_moved(bundle, "slice_translation_shape", x) for x in (motion.q, motion.u, motion.du)]
     theta = [skew(_moved(bundle, "slice_rotation_shape", x)) for x in (motion.q, motion.u, motion.du)]
@@ -138,7 +138,7 @@ def _inertia(bundle: xr.Dataset, motion: Motion) -> Wrench:
     return np.cross(r, force) + own, force
 
 
-def _moved(bundle: xr.Dataset, name: str, q: np.ndarray) -> np.ndarray:
+def _moved(bundle: Labelled, name: str, q: np.ndarray) -> np.ndarray:
     """Shapes (point, 3, mode) times coordinates (time, mode): (time, point, 3)."""
     return np.einsum("pim,tm->tpi", bundle[name].values, q, optimize=True)
 
