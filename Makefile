@@ -35,24 +35,19 @@ test-slow: $(TOOLS) ## The tests marked slow
 # other Pythons that this machine may have; each gets an environment of its own and runs what `doctor` computes
 OTHERS := python3.12 python3.13 python3.14 $(wildcard $(HOME)/.pyenv/versions/3.1[2-9]*/bin/python)
 
-interpreters: $(READY) ## A short run under every other Python there is, and with the lowest versions of libraries
-	@ran=" "; for p in $(OTHERS); do \
+interpreters: $(READY) ## A short run under every other Python, and with the lowest and newest versions of libraries
+	@try() { there=$(VENV)/others/$$1; echo "-- $$1"; p=$$2; extra=$$3; days=$$4; shift 4; \
+		test $$there/.ready -nt constraints.txt && test $$there/.ready -nt pyproject.toml && \
+		test $$there/.ready -nt .ci/lowest.txt && test -n "$$(find $$there/.ready -mtime -$$days)" || { \
+			$$p -m venv $$there && $$there/bin/pip install -q --retries 1 --timeout 20 "$$@" -e ".$$extra" && \
+			touch $$there/.ready; } || { echo "skipped: what it needs is not available here"; return 0; }; \
+		FLEXCLEAR_RESULTS=$$there/results $$there/bin/python -m flexclear doctor; }; \
+	ran=" "; for p in $(OTHERS); do \
 		v=$$($$p -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) || continue; \
-		case "$$ran" in *" $$v "*) continue;; esac; \
-		ran="$$ran$$v "; there=$(VENV)/others/$$v; \
-		echo "-- Python $$v"; \
-		test $$there/.ready -nt constraints.txt && test $$there/.ready -nt pyproject.toml || { \
-			$$p -m venv $$there && $$there/bin/pip install -q --retries 1 --timeout 20 -c constraints.txt -e . && \
-			touch $$there/.ready; } || \
-			{ echo "skipped: what it needs is not to be had for Python $$v here"; continue; }; \
-		FLEXCLEAR_RESULTS=$$there/results $$there/bin/python -m flexclear doctor || exit 1; \
-	done; test "$$ran" != " " || echo "skipped: there is no other Python here"
-	@echo "-- lowest versions of libraries"; there=$(VENV)/others/lowest; \
-	test $$there/.ready -nt .ci/lowest.txt && test $$there/.ready -nt pyproject.toml || { \
-		$(RUN) -m venv $$there && $$there/bin/pip install -q --retries 1 --timeout 20 -c .ci/lowest.txt -e . && \
-		touch $$there/.ready; } || \
-		{ echo "skipped: the lowest versions are not to be had here"; exit 0; }; \
-	FLEXCLEAR_RESULTS=$$there/results $$there/bin/python -m flexclear doctor
+		case "$$ran" in *" $$v "*) continue;; esac; ran="$$ran$$v "; \
+		try $$v $$p "" 365 -c constraints.txt || exit 1; \
+	done; test "$$ran" != " " || echo "skipped: there is no other Python here"; \
+	try lowest $(RUN) "[render]" 365 -c .ci/lowest.txt && try newest $(RUN) "[render]" 7 --upgrade --upgrade-strategy eager
 
 bench: $(READY) ## Benchmarks of accuracy against cost: docs/benchmarks.md
 	$(RUN) -m benchmarks evaluation peers runs commands cold growth ensembles exudyn

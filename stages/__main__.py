@@ -10,8 +10,10 @@ import argparse
 import atexit
 import gc
 import os
+import signal
 import sys
 from importlib import import_module
+from types import FrameType
 
 from flexclear.pipeline.core.errors import INTERRUPTED, FlexclearError, ResourceError, shown
 from flexclear.pipeline.core.system import plain_output
@@ -50,6 +52,7 @@ def main(arguments: list[str] | None = None) -> int:
     plain_output()
     own = arguments is None  # whether this process is the command's
     if own:
+        signal.signal(signal.SIGTERM, _as_interrupt)
         gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
         # at its end Python searches for garbage in all that there is, several times: a sixth of the time of a short
         # command, half a second where something was compiled; nobody gains by it, since the system takes all back
@@ -75,6 +78,14 @@ def main(arguments: list[str] | None = None) -> int:
     except (OSError, MemoryError) as error:  # of the machine, and nobody knew better words for it
         print(f"flexclear: {shown(str(error)) or 'there is not enough memory'}", file=sys.stderr)
         return ResourceError.exit_code
+
+
+def _as_interrupt(number: int, frame: FrameType | None) -> None:
+    """Stop as Ctrl-C does: schedulers of clusters and services send SIGTERM, and workers are to end in good order."""
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler):  # of a command in the background, Ctrl-C is ignored
+        raise KeyboardInterrupt
+    handler(number, frame)
 
 
 class Version(argparse.Action):

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.load import edited
@@ -248,10 +249,12 @@ class _Comparison:
 
     def _variant(self, name: str) -> Scene:
         gone = self._gone[name] if name else frozenset()
-        variant = variants.without(self.scene, [e for e in self.effects if e.name in gone])
-        if (variant.contacts() or variant.stop) and variant.solver.step is None and variant.solver.rtol < MEANS:
-            return edited(variant, {"solver.rtol": MEANS})
-        return variant
+        variant, setting = variants.without(self.scene, [e for e in self.effects if e.name in gone]), self.study.setting
+        if setting.step is not None:
+            return variant
+        rigid = setting.integrator == VIBRATING and not variant.flexible()
+        rtol = max(setting.rtol, MEANS) if variant.contacts() or variant.stop else setting.rtol
+        return edited(variant, {"solver.integrator": DEFAULT if rigid else setting.integrator, "solver.rtol": rtol})
 
     def _touching(self, name: str) -> bool:
         scene = self._variant(name)

@@ -101,6 +101,8 @@ def _explain(options: argparse.Namespace) -> None:
     print(f"{record.stage} {record.key}")
     for name, digest in record.files.items():
         print(shown(f"  holds {name}: sha256 {digest}"))
+    for fact, value in record.computed_by.items():
+        print(shown(f"  computed by {fact}: {value}"))
     for fact, value in record.facts.items():
         print(shown(f"  {fact}: {value}"))
 

@@ -96,7 +96,7 @@ def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None)
     check(made)
     # their kernels are there now, so that these do not compile side by side what the first ones did
     tight = {
-        label: graph.tighter(int(workplace.store.load(made.records[id(graph.simulate)]).attrs["evaluations"]))
+        label: graph.tighter(workplace.store.load(made.records[id(graph.simulate)]).attrs)
         for label, graph in graphs.items()
         if graph.has_tighter
     }

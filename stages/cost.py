@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.errors import FlexclearError, SolverError
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.solver import of_run
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import as_json, cost_design, cost_peers, kernels, limit, run, s4_simulate
 from flexclear.stages.cost_peers import Track
@@ -161,10 +162,7 @@ class Study:
         outcome = self.workplace.bring([graph.simulate])
         check(outcome)
         text = self.workplace.store.load(outcome.records[id(graph.simulate)]).attrs
-        solver = self.scene.solver
-        rtol = float(text.get("accuracy_rtol", solver.rtol))
-        begun = solver.integrator if "switched" in text and not self.scene.by_need() else str(text["method"])
-        return cost_design.Setting(begun, rtol, solver.step)
+        return cost_design.Setting(*of_run(self.scene.solver, self.scene.by_need(), text), self.scene.solver.step)
 
     def task(self) -> Task:
         """The task of the study of all points that there are."""

@@ -17,6 +17,7 @@ from flexclear.pipeline.core.integrators import DEFAULT, INTEGRATORS, STIFF, VIB
 from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.load import edited, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.solver import NAMING
 from flexclear.stages.timing import paper_solver
 
 #: the scene's own tolerance and step times these, in this order; half and a tenth show whether tighter runs agree
@@ -148,7 +149,7 @@ def _words(solver: Mapping[str, Any]) -> str:
 
 def _solver(scene: Scene, **changes: Any) -> dict[str, Any]:
     """The scene's solver with another method; its limits stay."""
-    own = scene.solver.model_dump(mode="json", exclude_none=True, exclude={"integrator", "rtol", "step", "events"})
+    own = scene.solver.model_dump(mode="json", exclude_none=True, exclude={*NAMING, "events", "by_need"})
     return own | changes
 
 

@@ -32,6 +32,8 @@ LIBRARIES = (
 )
 #: without these only pictures of shapes are missing
 OPTIONAL = ("pyvista", "vtk", "imageio")
+#: before each line: what is right, what is wrong, and what is lacking without being needed
+LABELS = {True: "ok   ", False: "WRONG", None: "lacks"}
 #: least space that is no reason to worry [B]
 LITTLE_MEMORY, LITTLE_DISK, LITTLE_FOR_KERNELS = 1e9, 2e9, 1e8
 #: characters of the longest path below the results, but for names of scenes that are longer than usual
@@ -110,14 +112,14 @@ def command(options: argparse.Namespace) -> None:
         return
     wrong = []
     for name, text, fine in findings():
-        print(f"{'ok   ' if fine else 'WRONG'}  {name:<10} {text}", flush=True)
-        wrong += [] if fine else [name]
+        print(f"{LABELS[fine]}  {name:<10} {text}", flush=True)
+        wrong += [name] if fine is False else []
     if wrong:
         raise UnwellError(f"not well: {', '.join(wrong)}")
 
 
-def findings() -> Iterator[tuple[str, str, bool]]:
-    """Name, finding, and whether that is right."""
+def findings() -> Iterator[tuple[str, str, bool | None]]:
+    """Name, finding, and whether that is right; None where something is lacking that only pictures need."""
     yield (
         "python",
         f"{platform.python_version()} on {platform.system()} {platform.machine()}",
@@ -162,12 +164,13 @@ def _kernels() -> tuple[str, bool]:
     return text, True
 
 
-def _graphics() -> tuple[str, bool]:
-    """Without the system's GL libraries only pictures of shapes are missing: that is no fault."""
+def _graphics() -> tuple[str, bool | None]:
+    """Draw something: libraries that load may still fail. Without them only pictures of shapes are lacking."""
     from flexclear.pipeline.post.render import gl
 
-    state = gl.state()
-    return (f"{state}; {gl.REMEDY}" if state.endswith("none") else state), True
+    if gl.works():
+        return f"{gl.state()}; a picture was drawn", True
+    return f"{gl.state()}; nothing can be drawn: {gl.remedy()}", None
 
 
 def _self_test() -> tuple[str, bool]:

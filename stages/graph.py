@@ -12,6 +12,7 @@ from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.solver import of_run
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import (
     s1_mesh,
@@ -234,19 +235,19 @@ class Graph:
             raise InputError(where, f"there is no {name} of {whose}", suggestion(body, tasks))
         return tasks[body]
 
-    @cached_property
-    def tight(self) -> Task:
-        """The same run at a tighter tolerance, or of half the step where steps are fixed, to tell its error by."""
-        return self._tighter({})
+    def tighter(self, run: Mapping[str, Any]) -> Task:
+        """The same run at a tighter tolerance, or of half the step where steps are fixed, to determine its error.
 
-    def tighter(self, evaluations: int) -> Task:
-        """`tight` that may take MOST times so many evaluations."""
-        return self._tighter({"evaluations": min(max(MOST * evaluations, LEAST), self.scene.solver.evaluations)})
-
-    def _tighter(self, limits: dict[str, float]) -> Task:
+        run: attributes of the dataset of the run.  The other one may take MOST times its evaluations.
+        """
         solver = self.scene.solver
-        finer = {"rtol": max(TIGHTER * solver.rtol, TIGHTEST)} if solver.step is None else {"step": 0.5 * solver.step}
-        change = {f"solver.{key}": value for key, value in (finer | limits).items()} | {"accuracy": None}
+        most = min(max(MOST * int(run["evaluations"]), LEAST), solver.evaluations)
+        change: dict[str, object] = {"solver.evaluations": most, "accuracy": None}
+        if solver.step is None:
+            integrator, rtol = of_run(solver, self.scene.by_need(), run)
+            change |= {"solver.integrator": integrator, "solver.rtol": max(TIGHTER * rtol, TIGHTEST)}
+        else:
+            change["solver.step"] = 0.5 * solver.step
         task = Graph(edited(self.scene, change), shown=False, recipe=self.recipe).simulate
         # progress and messages name it, else the scene would seem to be run twice
         how = "a tighter tolerance" if solver.step is None else "half the step"

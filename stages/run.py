@@ -266,9 +266,9 @@ def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, pl
         for sentence in filter(None, record.said.get("warnings", "").split("\n")):
             workplace.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
         verdict, requested = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
-        if verdict != "met" and requested is not None:
+        if verdict != "met":
             text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is stored"
-            if requested.allow_missed:
+            if requested is None or requested.allow_missed:
                 workplace.monitor.say(text)
             else:
                 missed.append(f"{text}\n  hint: ask for less, or write allow_missed = true in [accuracy]")

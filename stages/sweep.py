@@ -110,6 +110,7 @@ class _Desk:
     total: int
     done: dict[str, Point]
     waiting: list[tuple[Job, Point]] = field(default_factory=list)
+    here: bool = True  #: whether this machine computes them
     large: bool = False  #: values are left out of `done`: they are in the store, and memory does not hold them
     begun: float = field(default_factory=now)
     stored: float = field(default_factory=now)
@@ -138,7 +139,7 @@ class _Desk:
         for family in self.plan.families:
             mine = {job.key: point for job, point in self.waiting if job.family == family.key}
             if mine:
-                family.keep(mine, self.workplace.store, self.plan.recorded)
+                family.keep(mine, self.workplace.store, self.plan.recorded, self.here)
         self.waiting = []
 
 
@@ -166,9 +167,8 @@ def bring(plan: sweep_plan.Plan, workers: Engine, workplace: Workplace, folder: 
             key: point for family in ready.families for key, point in family.find(workplace.store, recorded).items()
         }
         requested = {job.key: job for job in ready.jobs}
-        desk = _Desk(
-            ready, workplace, len(requested), {key: points[key] for key in requested if key in points}, large=large
-        )
+        known = {key: points[key] for key in requested if key in points}
+        desk = _Desk(ready, workplace, len(requested), known, here=workers.here, large=large)
         missing = [job for key, job in requested.items() if key not in desk.done]
         try:
             if missing:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
 from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from math import ceil
+from math import ceil, inf
 from pathlib import Path
 from typing import Any
 
@@ -193,11 +194,16 @@ def _cluster(address: str) -> Iterator[Engine]:
     try:
         from distributed import Client, KilledWorker
         from distributed.client import FutureCancelledError
+        from distributed.comm import CommClosedError
     except ImportError:
         raise InputError(where, "dask.distributed is not installed", "pip install 'flexclear[cluster]'") from None
+    stack = ExitStack()
+    stack.enter_context(_quiet("distributed"))
     try:
         client = Client(address, timeout=PATIENCE, set_as_default=False)
+        stack.callback(client.close)
     except (OSError, ValueError, TimeoutError) as error:
+        stack.close()
         raise InputError(
             where, f"no scheduler answers there ({type(error).__name__})", "start one with `dask scheduler`"
         ) from None
@@ -206,12 +212,26 @@ def _cluster(address: str) -> Iterator[Engine]:
     except KilledWorker as error:
         text = f"{where}: workers died again and again over a task ({error}); is their memory full?"
         raise ResourceError(text) from None
-    except (CancelledError, FutureCancelledError):
+    except (CancelledError, FutureCancelledError, CommClosedError):
         raise ResourceError(f"{where}: the scheduler has gone; finished results are stored") from None
     except ImportError as error:  # of a worker that has joined since
         raise InputError(where, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
     finally:
-        client.close()
+        stack.close()
+
+
+@contextmanager
+def _quiet(library: str) -> Iterator[None]:
+    """Meanwhile a library logs nothing: what happens to it is reported in one sentence, without its traceback."""
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == library]
+    levels = {logger: logger.level for logger in map(logging.getLogger, names)}
+    for logger in levels:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in levels.items():
+            logger.setLevel(level)
 
 
 def _on_cluster(client: Any, where: str) -> Engine:
@@ -236,14 +256,29 @@ def _on_cluster(client: Any, where: str) -> Engine:
 
 
 def _threads(client: Any, where: str) -> int:
-    """Tasks that the workers run at a time; InputError where there are none, or they run other sources."""
-    threads = sum(client.nthreads().values())
-    if not threads:
-        raise InputError(where, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
-    digests = client.run(source_digest, on_error="return")
-    for worker, digest in digests.items():
-        if isinstance(digest, Exception):
-            raise InputError(where, f"worker {worker} cannot import flexclear: {digest}", "install it where it runs")
+    """Return how many tasks the workers run at a time.
+
+    Raises InputError where there are none, or they run other sources, ResourceError where one keeps silent.
+    """
+    end = inf
+    while True:
+        threads = sum(client.nthreads().values())
+        if not threads:
+            raise InputError(where, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
+        digests = client.run(source_digest, on_error="return")
+        for worker, digest in digests.items():
+            if isinstance(digest, ImportError):
+                raise InputError(
+                    where, f"worker {worker} cannot import flexclear: {digest}", "install it where it runs"
+                )
+        failed = {worker: error for worker, error in digests.items() if isinstance(error, Exception)}
+        if not failed:
+            break
+        end = min(end, now() + PATIENCE)  # from the first failure on: the check itself may have waited for a worker
+        if now() > end:
+            worker, error = next(iter(failed.items()))
+            raise ResourceError(f"{where}: worker {worker} does not answer ({error}); is its memory full?")
+        time.sleep(TICK)  # the scheduler removes workers that have died, and the others are asked again
     others = [worker for worker, digest in digests.items() if digest != source_digest()]
     if others:
         raise InputError(where, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")

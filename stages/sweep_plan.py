@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.store import FAMILY
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.machine import instruction_set
 from flexclear.pipeline.core.scene.design import Axis, Design, design
 from flexclear.pipeline.core.scene.limits import check_members
 from flexclear.pipeline.core.scene.load import edited, with_numbers
 from flexclear.pipeline.core.scene.quantity import Recorded, parse_recorded
 from flexclear.pipeline.core.scene.schema import Sections
 from flexclear.pipeline.core.workflow.task import Task, facts, key
-from flexclear.pipeline.core.workflow.workers import without_main
 from flexclear.stages import s4_simulate
 from flexclear.stages.graph import Graph
 from flexclear.stages.sweep_engine import Job
@@ -61,12 +61,14 @@ class Family:
         """Stage of its batches in the store, and a name there that no batch has."""
         return f"sweep/{self.key}", FAMILY
 
-    def keep(self, points: Mapping[str, Point], store: Store, recorded: Sequence[Recorded]) -> None:
-        """Store finished points as one artifact."""
+    def keep(self, points: Mapping[str, Point], store: Store, recorded: Sequence[Recorded], here: bool = True) -> None:
+        """Store finished points as one artifact. here: whether this machine computed them."""
         from flexclear.pipeline.core.artifacts.points import batch
 
         name = hashlib.sha256("".join(sorted(points)).encode()).hexdigest()[:32]
-        store.put(self.folder[0], name, {"nc": batch(points, recorded)}, self.facts)
+        store.put(
+            self.folder[0], name, {"nc": batch(points, recorded)}, self.facts, instruction_set() if here else None
+        )
 
     def find(self, store: Store, recorded: Sequence[Recorded]) -> dict[str, Point]:
         """All points of the family that are stored and sound, with their values of the `recorded` quantities."""
@@ -275,8 +277,7 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
     points = requested.design.points()
     groups = _groups(requested.scene, points)
     graphs = {text: Graph(edited(requested.scene, first), shown=False) for text, first in groups.items()}
-    with without_main():
-        outcome = workplace.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
+    outcome = workplace.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
     check(outcome)
     modules = _modules(requested)
     families = {}

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import ast
 import re
+import sys
+from functools import cache
+from typing import Any
 
+#: from this level of optimisation on Python strips docstrings (`python -OO`)
+STRIPPED = 2
 _SOURCE = re.compile(r"^\s*Sources?:\s+(.+?)(?:\n\s*\n|\Z)", re.DOTALL | re.MULTILINE)
 
 
@@ -14,3 +20,32 @@ def cited(docstring: str | None) -> list[str]:
     ['Hertz (1881), Journal f. Math. 92, 156-171.']
     """
     return [" ".join(match[1].split()) for match in _SOURCE.finditer(docstring or "")]
+
+
+def docstring(thing: Any) -> str | None:
+    """Return the docstring of a module, class or function, from its source file where Python strips docstrings.
+
+    What results name, such as their references, must not depend on the interpreter's options.
+    """
+    if sys.flags.optimize < STRIPPED:
+        return getattr(thing, "__doc__", None)
+    module = sys.modules.get(getattr(thing, "__module__", None) or thing.__name__)
+    path = getattr(module, "__file__", None)
+    name = "" if module is thing else getattr(thing, "__qualname__", getattr(thing, "__name__", None))
+    return _written(path).get(name) if path and path.endswith(".py") and name is not None else None
+
+
+@cache
+def _written(path: str) -> dict[str, str | None]:
+    """Return the docstrings of a source file by qualified name; that of the module is called by the empty name."""
+    with open(path, encoding="utf-8") as file:
+        tree = ast.parse(file.read())
+    return dict(_docstrings(tree, ""))
+
+
+def _docstrings(node: ast.Module | ast.ClassDef | ast.FunctionDef, name: str) -> list[tuple[str, str | None]]:
+    pairs = [(name, ast.get_docstring(node))]
+    for inner in node.body:
+        if isinstance(inner, (ast.ClassDef, ast.FunctionDef)):
+            pairs += _docstrings(inner, f"{name}.{inner.name}" if name else inner.name)
+    return pairs

@@ -37,6 +37,8 @@ _NAMED[".xmf"] = _NAMED[".xdmf"]
 #: what meshio puts among the sets of cells of a Gmsh 4 file, but numbers of curves and points
 NO_CELLS = "gmsh:bounding_entities"
 
+HDF5 = "MED and other formats in HDF5 need h5py: pip install 'flexclear[med]'"
+
 
 def require_file(path: Path, where: str) -> None:
     """Note a file that will be read; InputError unless it is an ordinary one.
@@ -64,6 +66,8 @@ def reading(path: Path, where: str, problem: str, remedy: str | None = None) -> 
         yield
     except FlexclearError:
         raise
+    except ImportError as error:  # libraries that few formats need, such as h5py
+        raise InputError(where, f"{problem}: {error}", HDF5 if error.name == "h5py" else remedy) from None
     except MemoryError:
         raise ResourceError(f"{where}: '{path.name}' takes more memory than there is, or is damaged") from None
     except Exception as error:

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import os
+from functools import cache
+from importlib import import_module
 from pathlib import Path
 
 from flexclear.pipeline.core.errors import ResourceError
 from flexclear.pipeline.core.system import free_space, memory
 
-__all__ = ["disk", "memory", "require_disk", "require_memory", "size"]
+__all__ = ["disk", "instruction_set", "memory", "require_disk", "require_memory", "size"]
+
+#: sets of instructions that change sums and products by rounding, as LLVM names them
+INSTRUCTIONS = ("avx512f", "avx2", "fma", "neon", "sve")
+#: settings that choose others
+CHOOSING = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT", "OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")
 
 #: fraction of what is left that one piece of work may take
 FRACTION = 0.8
@@ -38,3 +46,16 @@ def size(count: float) -> str:
     """Bytes in words: ``3.2 GB``."""
     power = next((k for k in range(5) if count < 1000.0 ** (k + 1)), 4)
     return f"{count / 1000.0**power:.3g} {('B', 'kB', 'MB', 'GB', 'TB')[power]}"
+
+
+@cache
+def instruction_set() -> dict[str, str]:
+    """Return what decides the rounding of results on this machine, in words: the processor, its vectors, settings.
+
+    It is no part of a key: results of other processors differ within the tolerances of their runs.
+    """
+    llvm = import_module("llvmlite.binding")  # by name: no result depends on which release knows the processor
+    features = llvm.get_host_cpu_features()
+    vectors = ", ".join(name for name in INSTRUCTIONS if features.get(name)) or "none of " + ", ".join(INSTRUCTIONS)
+    facts = {"processor": llvm.get_host_cpu_name(), "instructions": vectors}
+    return facts | {name: os.environ[name] for name in CHOOSING if os.environ.get(name)}

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
+    from flexclear.pipeline.dynamics.run.method_selection import Suit
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
 __all__ = ["campbell", "cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate", "simulated"]
@@ -33,8 +34,9 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     """One run of a scene (schema RUN).
 
     bundles: reduced flexible bodies by name.  progress(fraction or None, text) is called now and then.
-    A scene with `[accuracy]` is run until the error of its time integration, estimated, is what was asked for; where it
-    names no integrator, by the one that suits it.
+    A scene with `[accuracy]` is run until the estimated error of its time integration is what was asked for; where it
+    names no integrator, by the cheapest.  One that has neither `[accuracy]` nor a method or tolerance in `[solver]` is
+    run at the default tolerance, or, where that is dear, as `accuracy.by_default` says.
     Raises InputError for a scene that cannot be built, SolverError when the run cannot continue, StoppedError with what
     there is of it, marked as incomplete, when it is asked to stop.
     """
@@ -42,6 +44,7 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     from flexclear.pipeline.core.artifacts.schema import incomplete
     from flexclear.pipeline.core.errors import StoppedError
     from flexclear.pipeline.dynamics.record.dataset import recorded, warnings
+    from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable
     from flexclear.pipeline.dynamics.run.run import Run, integrate
 
     def once(edited: Scene, judges: Judges | None = None) -> LabelledArrays:
@@ -56,18 +59,28 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
             progress(None, f"warning: {sentence}")
         return recorded(done)
 
-    if scene.accuracy is None or not scene.accuracy.quantities:
-        return once(scene)
-    from flexclear.pipeline.dynamics.run.accuracy import deliver
+    requested = scene.accuracy is not None and scene.accuracy.quantities
+    if not requested:
+        try:
+            return once(scene, affordable(scene))
+        except DearError as dear:
+            progress(None, str(dear))
+    from flexclear.pipeline.dynamics.run.accuracy import by_default, deliver
 
     def compared(edited: Scene, judges: Judges | None = None) -> xr.Dataset:
         return once(edited, judges).to_xarray()
 
     if not scene.by_need():
         return of(deliver(scene, compared, progress))
-    from flexclear.pipeline.dynamics.run.method_selection import suit
 
-    return of(deliver(scene, compared, progress, suit(scene, bundles)))
+    def suited(edited: Scene) -> Suit:
+        from flexclear.pipeline.dynamics.run.method_selection import suit
+
+        return suit(edited, bundles)
+
+    if requested:
+        return of(deliver(scene, compared, progress, suited(scene)))
+    return of(by_default(scene, compared, progress, suited))
 
 
 def cost(

@@ -101,10 +101,12 @@ class _DataFields(AttributeTemplate):
     key = DataType
 
     def generic_resolve(self, kind: Any, name: str) -> Any:
-        if name in m.SIZES or name in m.REPORTS:
+        if name in m.SIZES or name in m.INDICES or name in m.REPORTS:
             return types.int64
-        if name in m.STRETCHES:
-            return POINTERS["w"]
+        if name in m.FLOATS:
+            return types.float64
+        if name in m.STRETCHES or name in m.LISTS:
+            return POINTERS["w" if name in m.STRETCHES else "n"]
         return Table(name) if name in m.NAMED else POINTERS.get(name)
 
 
@@ -134,16 +136,27 @@ def _wrapped(context: Any, builder: Any, kind: Any, pointer: Any) -> Any:
     return made._getvalue()
 
 
+def _single(context: Any, builder: Any, d: Any, name: str) -> Any:
+    """Pointer to a single integer of n or float of w."""
+    if name in m.REPORTS:
+        return _at(context, builder, d.n, m.REPORTS[name])
+    stretch, offset = m.FLOATS[name]
+    entry = builder.load(_at(context, builder, d.h, stretch))
+    return _at(context, builder, builder.gep(d.w, [entry]), offset)
+
+
 @lower_getattr_generic(DataType)
 def _read_data(context: Any, builder: Any, kind: Any, value: Any, name: str) -> Any:
     d = cgutils.create_struct_proxy(kind)(context, builder, value=value)
     if name in POINTERS:
         return getattr(d, name)
-    if name in m.REPORTS:
-        return builder.load(_at(context, builder, d.n, m.REPORTS[name]))
-    index = m.NAMED[name].place if name in m.NAMED else {**m.SIZES, **m.STRETCHES}[name]
+    if name in m.REPORTS or name in m.FLOATS:
+        return builder.load(_single(context, builder, d, name))
+    if name in m.LISTS:
+        return builder.gep(d.n, [builder.load(_at(context, builder, d.n, m.LISTS[name]))])
+    index = m.NAMED[name].place if name in m.NAMED else {**m.SIZES, **m.INDICES, **m.STRETCHES}[name]
     entry = builder.load(_at(context, builder, d.h, index))
-    if name in m.SIZES:
+    if name in m.SIZES or name in m.INDICES:
         return entry
     if name in m.STRETCHES:
         return builder.gep(d.w, [entry])
@@ -153,9 +166,11 @@ def _read_data(context: Any, builder: Any, kind: Any, value: Any, name: str) -> 
 @lower_setattr_generic(DataType)
 def _write_data(context: Any, builder: Any, signature: Any, values: Any, name: str) -> None:
     d = cgutils.create_struct_proxy(signature.args[0])(context, builder, value=values[0])
-    if name not in m.REPORTS:
-        raise TypeError(f"kernels cannot assign {name}: only integers of n and fields of rows are assigned by name")
-    builder.store(values[1], _at(context, builder, d.n, m.REPORTS[name]))
+    if name not in m.REPORTS and name not in m.FLOATS:
+        raise TypeError(f"kernels cannot assign {name}: only single numbers and fields of rows are assigned by name")
+    kind = types.int64 if name in m.REPORTS else types.float64
+    value = context.cast(builder, values[1], signature.args[1], kind)
+    builder.store(value, _single(context, builder, d, name))
 
 
 @lower_builtin(operator.getitem, Table, types.Integer)

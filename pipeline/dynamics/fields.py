@@ -1,9 +1,11 @@
 """Named fields of the arrays h, f, w and n: what `memory` declares, as kernels read and write it.
 
 After ``d = data(h, f, w, n)``, ``d.nv`` is a size, ``d.bias[k]`` an entry of a stretch of w, ``d.links[i].parent`` a
-field of a row of a table, and ``d.evaluation`` an integer of n.  The names are those of `memory` in small letters.  A
-field of three numbers is a vector and one of 3 x 3 numbers a matrix, both tuples that are read and assigned as a whole.
-A field of any other shape is indexed like a stretch.
+field of a row of a table, ``d.rtol`` a float of w, ``d.evaluation`` an integer of n, and ``d.mode[c]`` an entry of a
+stretch of n.  The names are those of `memory` in small letters.  ``d.at_y`` and ``d.at_links`` are the indices where
+the stretch y and the table of links begin, for kernels that take indices.  A field of three numbers is a vector and one
+of 3 x 3 numbers a matrix, both tuples that are read and assigned as a whole.  A field of any other shape is indexed
+like a stretch.
 
 Interpreted kernels and the tracer (`specialise`) use the classes here; compiled kernels get the same names from
 `field_types`, as loads and stores.  The compiler assumes that no two pointers of a kernel refer to the same memory, so
@@ -12,6 +14,7 @@ a kernel that writes never gets `d` together with a row or stretch of it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -98,6 +101,19 @@ def _stretch(index: int) -> property:
     return property(lambda d: Stretch(d.w, d.h[index]))
 
 
+def _list(index: int) -> property:
+    return property(lambda d: Stretch(d.n, d.n[index]))
+
+
+def _float(where: tuple[int, int]) -> property:
+    stretch, offset = where
+
+    def write(d: Data, value: Any) -> None:
+        d.w[d.h[stretch] + offset] = value
+
+    return property(lambda d: d.w[d.h[stretch] + offset], write)
+
+
 def _integer(index: int) -> property:
     def write(d: Data, value: Any) -> None:
         d.n[index] = value
@@ -105,7 +121,14 @@ def _integer(index: int) -> property:
     return property(lambda d: d.n[index], write)
 
 
-for _made, _places in ((_size, m.SIZES), (_stretch, m.STRETCHES), (_integer, m.REPORTS)):
+_MAKERS: tuple[tuple[Callable[[Any], property], dict[str, Any]], ...] = (
+    (_size, m.SIZES | m.INDICES),
+    (_stretch, m.STRETCHES),
+    (_float, m.FLOATS),
+    (_integer, m.REPORTS),
+    (_list, m.LISTS),
+)
+for _made, _places in _MAKERS:
     for _name, _place in _places.items():
         setattr(Data, _name, _made(_place))
 for _name in m.NAMED:

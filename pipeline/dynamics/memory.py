@@ -52,6 +52,8 @@ TABLES: dict[str, list[Any]] = {"h": [], "f": [], "w": []}
 #: indices in the header of h by the names that kernels use (`fields`): of sizes, and of stretches of w
 SIZES: dict[str, int] = {}
 STRETCHES: dict[str, int] = {}
+#: single floats of w by the names that kernels use: the index of their stretch in the header, and their offset there
+FLOATS: dict[str, tuple[int, int]] = {}
 #: rows of tables and layouts as NumPy has them, by the class of what declares them
 _ROWS: dict[type, np.dtype[Any]] = {}
 
@@ -67,6 +69,18 @@ def _named(kind: dict[str, int], declared: str) -> list[int]:
     places = _places(len(names))
     kind.update(zip(names, places, strict=True))
     return places
+
+
+def _numbered(declared: str) -> dict[str, int]:
+    """Index of each name."""
+    return {name: index for index, name in enumerate(declared.split())}
+
+
+def _floats(stretch: int, declared: str) -> range:
+    """Offsets of named floats in a stretch of w."""
+    names = _numbered(declared)
+    FLOATS.update({name: (stretch, offset) for name, offset in names.items()})
+    return range(len(names))
 
 
 def _fields(declared: str) -> dict[str, tuple[int, ...]]:
@@ -145,13 +159,13 @@ class Room:
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
     MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES, N_RUBBING, N_BEARINGS, RUBBING_SLOT,
-    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES, N_COMPONENTS,
+    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS,
 ) = _named(
     SIZES,
     "n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger n_pairs "
     "n_known_pairs n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
     "n_loads n_internal load_slot n_couplings n_surfaces n_rubbing n_bearings rubbing_slot n_worn wear_slot n_bodies "
-    "n_frames n_components",
+    "n_frames n_components n_guards",
 )
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
@@ -215,6 +229,9 @@ RUBBING_ENTRIES = wiring("coordinate column sign")  # what moves the joint; pres
 REACTION_TERMS = wiring("coordinate column")  # free coordinates whose acceleration the joint of a link feels
 REACTION_LOOPS = wiring("closure sign part")  # closures that act beyond it
 WORN = wiring("contact")  # contacts whose wear is counted
+#: on what steps end: the vector of `components` numbers from `offset` on in the table of w that has this index in
+#: the header.  contact: that must be closed, or -1; bearing: by whose load it is measured, or -1
+GUARDS = wiring("table offset components contact bearing")
 BODIES, FRAMES = wiring("link"), wiring("link")  # moving bodies and named frames: what is recorded, which no step reads
 GROUPS = wiring("group")  # error group of each state variable
 BOOKS = wiring("work loss load")  # of each independent mechanism: places in the ledger (`DRIVE_WORK`, ...)
@@ -230,18 +247,18 @@ BASIS_VALUES = numbers("value")
 INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port and moving shape r: translation shape (3r), rotation shape (3r)
-#: radius: of the inner surface; kinks: sliding speeds at which the friction law bends, or 0; shape: what else its kind
-#: of surfaces has; length: size of the mechanism that it belongs to
-CONTACT_NUMBERS = numbers("clearance radius floor stick_speed kinks:2 normal_law:4 friction_law:6 shape:2 length")
+#: radius: of the inner surface; shape: what else its kind of surfaces has; length: size of the mechanism that it
+#: belongs to
+CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6 shape:2 length")
 #: radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per force
-#: along the axis and per moment about it; preload: normal force that is always there; kinks: as of CONTACT_NUMBERS;
-#: turning_kink: size of sliding speeds of a law that bends where sliding reverses, or 0
-BEARING_NUMBERS = numbers("radius lever axial torsion preload law:6 kinks:2 turning_kink")
+#: along the axis and per moment about it; preload: normal force that is always there
+BEARING_NUMBERS = numbers("radius lever axial torsion preload law:6")
 COUPLING_NUMBERS = numbers("ratio offset")  # second coordinate = ratio * first + offset
 PIECES = numbers("start coefficients:8")
 HARMONICS = numbers("amplitude frequency phase")  # angular frequency
 LOAD_NUMBERS = numbers("value")  # see `loads`
-LOAD_KINKS = numbers("speeds:2")  # of each load, along its joint coordinate, at which its friction bends, or 0
+#: of each guard. level: length of what it watches, 0: that it reverses; scale: what counts as close is measured by
+GUARD_NUMBERS = numbers("level scale")
 GRAVITY = numbers("acceleration:3")
 #: per error group. magnitude: below it is resolved absolutely, natural: the same by the size of all that there is;
 #: share: factor of its tolerance by which no independent mechanism is resolved less well than alone
@@ -282,20 +299,21 @@ INDEPENDENCE, COLLOCATION = _named(STRETCHES, "independence collocation")
 COLLOCATION_ROWS = 13
 #: smallest pivot of J M^-1 J^T as fraction of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
-LAST_PIVOT, WANTED_PIVOT, PIVOT_SIZE = range(3)
+LAST_PIVOT, WANTED_PIVOT = _floats(PIVOT, "last_pivot wanted_pivot")
+PIVOT_SIZE = 2
 #: what a contact does now; bent: what the bristles store
 TOUCH = work("gap rate normal_force friction_power damping_power stored bent slip force:3 offset:3 point:3")
 LAW = work("value rate second_rate")
 #: what a load does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
 #: energy, power that it brings in, power that it loses
 LOAD = work("force:3 moment:3 value rate stored power loss")
-#: speeds along the coordinates of loads whose friction bends: now, at the start of the step and at its end
-LOAD_SPEEDS = work("now start end")
+#: speeds along the coordinates of loads whose friction bends
+LOAD_SPEEDS = work("now")
 #: what a bearing does now; unit: wrench of its friction on the joint's second body per normal force, about the kernels'
 #: origin; loss: what it takes per normal force [m/s]
 BEARING = work("load slip loss unit_moment:3 unit_force:3")
 #: what bends the friction of a bearing where it reverses: sliding velocity, force along the axis, moment about it and
-#: forces at both ends as they press; now, in further rows at the start of the step, and at its end
+#: forces at both ends as they press
 BENDS = work("sliding:3 along about one_end:2 other_end:2")
 #: reactions of the joints with friction: without it, then per normal force of each bearing; moment about the second
 #: frame's origin, force
@@ -314,6 +332,7 @@ MAGNITUDE, CORRECTION, LATCHED = _named(STRETCHES, "magnitude correction latched
 WATCH = work(
     "gap0 rate0 force0 slip0 trend0 gap1 rate1 force1 slip1 trend1 event_row mode0 latched0 slip_rate0 slip_rate1"
 )
+GUARDED = work("start:3 end:3")  # what guards watch, at the start and at the end of the step
 (CONTROL,) = _named(STRETCHES, "control")
 HEADER = next(_place)
 
@@ -339,22 +358,38 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
 # what the last first step with a contact closed could have been, whether the next accepted step is the first one of a
 # segment
-TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST = range(13)
-SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, FRACTION, LEFT, BLIND_STEPS = range(13, 22)
-REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, N_CONTROLS = range(22, 27)
+# fmt: off
+(
+    TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST,
+    SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, FRACTION, LEFT, BLIND_STEPS,
+    REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST,
+) = _floats(
+    CONTROL,
+    "time step end rtol span length drift last_norm most_growth fixed parameter rate_drift steepest "
+    "sigma past_time pass_time reach most_reach collocated fraction left blind_steps "
+    "rejected_step rejected_norm touched_step first",
+)
+# fmt: on
+N_CONTROLS = FIRST + 1
 
 # Integers in n -------------------------------------------------------------------------------------------------------
 # report of the last evaluation; where the laws' active pieces and the contacts' modes start in n; where the state
 # being evaluated starts in w; whether the last evaluation left no more than the steps read; then the stepper's own
+_INTEGERS = _numbered(
+    "evaluation active mode state abridged status evaluations steps rejected next_output n_recorded n_events budget "
+    "cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps"
+)
 # fmt: off
 (
     EVALUATION, ACTIVE, MODE, STATE, ABRIDGED,
     STATUS, EVALUATIONS, STEPS, REJECTED, NEXT_OUTPUT, N_RECORDED, N_EVENTS, BUDGET, CAP, FRESH, IMMEDIATE,
-    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, INTEGERS,
-) = range(22)
+    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS,
+) = _INTEGERS.values()
 # fmt: on
-#: what an evaluation reads and reports there, by the names that kernels use (`fields`)
-REPORTS = {"evaluation": EVALUATION, "state": STATE, "abridged": ABRIDGED}
+INTEGERS = len(_INTEGERS)
+#: stretches of n by the names that kernels use (`fields`), and the other integers there
+LISTS = {"active": ACTIVE, "mode": MODE}
+REPORTS = {name: index for name, index in _INTEGERS.items() if name not in LISTS}
 # values of n[STATUS]
 SEGMENT_END, PAUSED, CAP_REACHED, FULL, STEP_TOO_SMALL, NO_START, STUCK_EVENT, LOST_CLOSURE = range(8)
 NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER, SINGULAR_AHEAD = range(8, 14)
@@ -363,6 +398,9 @@ NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER, SINGULAR_AHE
 NAMED: dict[str, Any] = {
     name.lower(): value for name, value in list(globals().items()) if type(value).__name__ == "Table"
 }
+#: where stretches of w, and tables, begin
+INDICES = {f"at_{name}": index for name, index in STRETCHES.items()}
+INDICES |= {f"at_{name}": table.place for name, table in NAMED.items()}
 _ARRAYS = {table.place: array for array, tables in TABLES.items() for table in tables}
 ARRAYS = {name: _ARRAYS[table.place] for name, table in NAMED.items()}
 #: shapes of fields that are tuples, and how many numbers these have

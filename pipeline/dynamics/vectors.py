@@ -45,14 +45,6 @@ def at6(a, i):
 
 
 @kernel
-def put9(a, i, m):
-    """Store a matrix from index i."""
-    put(a, i, (m[0], m[1], m[2]))
-    put(a, i + 3, (m[3], m[4], m[5]))
-    put(a, i + 6, (m[6], m[7], m[8]))
-
-
-@kernel
 def dot6(a, i, b, j):
     """Product of the six-vectors stored from i in a and from j in b."""
     first = a[i] * b[j] + a[i + 1] * b[j + 1] + a[i + 2] * b[j + 2]
@@ -82,6 +74,32 @@ def scale(s, a):
 def dot(a, b):
     """A . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def dot_wrench(wrench, twist):
+    """Product of a row with moment and force, and one with an angular and a linear part."""
+    return dot(wrench.moment, twist.angular) + dot(wrench.force, twist.linear)
+
+
+@kernel
+def dot_momentum(momentum, twist):
+    """Product of two rows with an angular and a linear part."""
+    return dot(momentum.angular, twist.angular) + dot(momentum.linear, twist.linear)
+
+
+@kernel
+def add_wrench(row, moment, force):
+    """Add to the moment and the force of a row."""
+    row.moment = add(row.moment, moment)
+    row.force = add(row.force, force)
+
+
+@kernel
+def add_twist(row, angular, linear):
+    """Add to the angular and the linear part of a row."""
+    row.angular = add(row.angular, angular)
+    row.linear = add(row.linear, linear)
 
 
 @kernel

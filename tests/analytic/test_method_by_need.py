@@ -12,9 +12,14 @@ import xarray as xr
 
 from flexclear.pipeline import dynamics, load_scene
 from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.effect_size import recorded as recorded_quantities
+from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.load import edited, with_numbers
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.effects import schemes
+from flexclear.pipeline.dynamics.record.point import Runner
+from flexclear.pipeline.dynamics.run import progress_rate
 from flexclear.pipeline.dynamics.run.accuracy import FINER, Attempt, Search
 from flexclear.pipeline.dynamics.run.method_selection import Rates, Suit
 from flexclear.pipeline.dynamics.run.progress_rate import Look, limited, pace
@@ -53,6 +58,58 @@ def test_ringing_modes_get_the_method_that_follows_them() -> None:
     assert error < 3e-3  # what is wanted, and the estimate's own doubt, as in test_accuracy
     # an explicit method is stable with 140 evaluations per millisecond; here some 25 are taken
     assert run.attrs["evaluations"] < 0.5 * reference().attrs["evaluations"]
+
+
+def test_a_scene_without_solver_and_accuracy_runs_at_the_default_tolerance_where_that_is_cheap() -> None:
+    left_open = load_scene(RIGID, {**SHORT, "solver.by_need": True})
+    assert left_open.by_need()
+    assert not load_scene(RIGID, SHORT).by_need()  # which gives a tolerance
+    xr.testing.assert_identical(
+        simulated(left_open).drop_attrs(), simulated(load_scene(RIGID, {**SHORT, "solver.rtol": 1e-10})).drop_attrs()
+    )
+
+
+def test_where_that_is_dear_it_is_as_exact_as_a_thousandth_of_each_range(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(progress_rate, "AFFORDABLE", 500)
+    monkeypatch.setattr(progress_rate, "EVERY", 200)
+    said: list[str] = []
+    scene = load_scene(RINGING, {**SHORT, "solver.by_need": True})
+    run = simulated(scene, said)
+    assert any("dop853 would take some" in text for text in said)
+    assert run.attrs["accuracy_verdict"] == "met"
+    assert run.attrs["evaluations"] < 0.5 * reference().attrs["evaluations"]
+    for name in ("platform.position", "platform.velocity"):
+        quantity = parse(name, scene.owners())
+        error = quantities.error(run, reference(), quantity) / quantities.scale(reference(), quantity)
+        assert error < 3e-3  # the default request, and the estimate's own doubt, as above
+
+
+def test_dear_points_and_members_have_the_tolerance_of_runs_that_none_is_compared_with(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(progress_rate, "AFFORDABLE", 500)
+    monkeypatch.setattr(progress_rate, "EVERY", 200)
+    scene = load_scene(RIGID, {**SHORT, "solver.by_need": True})
+    given = load_scene(RIGID, {**SHORT, "solver.integrator": "radau", "solver.rtol": progress_rate.UNVERIFIED})
+    speed = recorded_quantities(scene.owners(), [parse("platform.velocity", scene.owners())])
+    points = [Runner(bundles(one), speed).run(one) for one in (scene, given)]
+    assert not points[0].refused
+    assert points[0].values.keys() == points[1].values.keys()
+    for name, values in points[0].values.items():
+        np.testing.assert_array_equal(values, points[1].values[name])
+    ensembles = [
+        dynamics.ensemble(edited(one, {"ensemble": {"members": 2}}), bundles(one), silent) for one in (scene, given)
+    ]
+    np.testing.assert_array_equal(ensembles[0]["velocity"], ensembles[1]["velocity"])
+
+
+def test_an_edit_of_the_method_closes_the_choice_and_no_other_edit_does() -> None:
+    scene = load_scene(TREE / "scenes" / "checks" / "pendulum.toml")
+    assert scene.by_need()
+    assert edited(scene, {"solver.evaluations": 1000}).by_need()
+    assert edited(scene, {"accuracy": {"bob.position": "1 um"}}).by_need()
+    assert not edited(scene, {"solver.rtol": 1e-6}).by_need()
+    assert not with_numbers(scene, {"solver.integrator": "radau"}).by_need()
 
 
 def test_a_stiff_choice_by_hand_stays() -> None:

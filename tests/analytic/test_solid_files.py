@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -211,6 +212,13 @@ def test_files_that_hold_no_body_are_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match=message):
             build(recipe(name), tmp_path)
+
+
+@pytest.mark.skipif(find_spec("h5py") is not None, reason="with h5py MED is read")
+def test_a_format_in_hdf5_names_the_library_that_it_needs(tmp_path: Path) -> None:
+    (tmp_path / "code_aster.med").write_bytes(b"\x89HDF")
+    with pytest.raises(InputError, match=r"No module named 'h5py'\n.*pip install 'flexclear\[med\]'"):
+        build(recipe("code_aster.med"), tmp_path)
 
 
 def test_a_unit_must_be_declared() -> None:

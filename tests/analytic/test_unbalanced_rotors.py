@@ -166,6 +166,13 @@ def test_a_flexible_shaft_holds_its_unbalanced_disc_above_the_critical_speed_too
     assert found.attrs["growth"] == 0.0
 
 
+@pytest.mark.parametrize("speed, unbalance", [(100.0, 3e-4), (100.0, 1e-3), (100.0, 1e-2), (150.0, 3e-3)])
+def test_no_motion_of_an_undamped_rotor_grows_by_rounding(speed: float, unbalance: float) -> None:
+    """Its centrifugal and elastic forces balance: rounding of both remains in the forces per speed, 2e-6 1/s of it."""
+    overrides = (("drive.axle.law.coefficients", (0.0, speed)), ("body.disc.com", (unbalance, 0.0, 0.0)))
+    assert frequencies.__wrapped__("checks/overhung_rotor", overrides, moving=True).attrs["growth"] == 0.0
+
+
 def test_a_rotor_on_a_bushing_alone_is_refused_with_its_remedy() -> None:
     table = rotor(20.0, 1e-6)
     del table["joint"]["float"]

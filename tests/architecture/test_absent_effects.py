@@ -137,7 +137,7 @@ EFFECTS = {
     "harmonics": ("import oscillate", "flexclear.pipeline.dynamics.drives.oscillation"),
     "joint friction": ("make_joint_friction", "flexclear.pipeline.dynamics.equations.joint_friction"),
     "wear": ("import wearing", "flexclear.pipeline.dynamics.contact.wear"),
-    "kinks of loads": ("LOAD_FRICTION_KINKS", "flexclear.pipeline.dynamics.integrate.load_kinks"),
+    "guards": ("integrate.guards import", "flexclear.pipeline.dynamics.integrate.guards"),
 }
 SPRING = ("spring-damper",)
 SMOOTH = {"surfaces": ("clearance-spherical",), "forms": ("hysteretic",)}
@@ -148,7 +148,7 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
     "smooth clearance": (Parts(("free",), **SMOOTH), {"contact", "normal law"}),
     "clearance": (
         Parts(("prismatic", "spherical"), **RUBBING, closures=True),
-        {"contact", "normal law", "friction", "closures"},
+        {"contact", "normal law", "friction", "closures", "guards"},
     ),
     "flexible": (Parts(("fixed",), flexible=True), {"flexible bodies"}),
     "stiffened": (Parts(("fixed",), flexible=True, stiffening=True), {"flexible bodies", "stiffening"}),
@@ -158,7 +158,7 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
     "stopped": (Parts(("revolute",), forms=("hysteretic",), stops=True), {"stops", "normal law"}),
     "rubbing hinges": (
         Parts(("revolute",), closures=True, joint_frictions=("modified-coulomb",)),
-        {"closures", "joint friction", "friction"},
+        {"closures", "joint friction", "friction", "guards"},
     ),
     "worn": (Parts(("free",), **SMOOTH, wear=True), {"contact", "normal law", "wear"}),
     "everything": (
@@ -337,15 +337,12 @@ def test_the_reference_condition_and_the_number_of_modes_are_not_compiled_in(roo
 def test_mechanisms_share_the_code_in_which_they_are_alike() -> None:
     """Steps know neither joints nor bodies nor laws; what is recorded and the equations know no integrator."""
     one, whole = CASES["clearance"][0], CASES["everything"][0]
-    other = replace(whole, load_kinks=False)
-    mine, theirs = digests(one, SCHEME), digests(replace(other, joint_frictions=()), SCHEME)
+    mine, theirs = digests(one, SCHEME), digests(whole, SCHEME)
     assert [name for name in mine if mine[name] == theirs[name]] == ["advance"]
-    # they end where joints with friction have kinks, whatever the law
-    rubbing = digests(replace(one, joint_frictions=("modified-coulomb",)), SCHEME)
-    assert rubbing["advance"] == digests(other, SCHEME)["advance"] != mine["advance"]
-    # and where loads have some
-    braked = digests(replace(one, joint_frictions=("modified-coulomb",), load_kinks=True), SCHEME)
-    assert braked["advance"] == digests(whole, SCHEME)["advance"] != rubbing["advance"]
+    # they end on guards, whatever these watch: sliding in joints or along coordinates
+    hinges, springs = CASES["rubbing hinges"][0], replace(CASES["springs"][0], closures=True, load_kinks=True)
+    assert digests(hinges, SCHEME)["advance"] == digests(springs, SCHEME)["advance"] != mine["advance"]
+    assert digests(replace(one, frictions=()), SCHEME)["advance"] != mine["advance"]  # it has no guards
     radau = digests(one, Scheme("radau"))
     assert [name for name in mine if mine[name] != radau[name]] == ["advance"]
     assert digests(CASES["ideal"][0], SCHEME)["advance"] != mine["advance"]  # it has no contacts to watch

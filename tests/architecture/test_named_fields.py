@@ -24,18 +24,24 @@ def arrays() -> tuple[np.ndarray, ...]:
         sizes[ARRAYS[name]] += ROWS * table.size
     for place in m.STRETCHES.values():
         h[place] = sizes["w"]
-        sizes["w"] += ROWS
+        sizes["w"] += m.N_CONTROLS  # the most named floats that a stretch has
     for k, place in enumerate(m.SIZES.values()):
         h[place] = -1 - k
     wiring = np.arange(m.HEADER, sizes["h"]) * 10
     f, w = (np.arange(float(sizes[array])) + start for array, start in (("f", 0.25), ("w", 0.5)))
-    return np.concatenate([h, wiring]), f, w, np.arange(m.INTEGERS)
+    n = np.arange(m.INTEGERS + 2 * ROWS)
+    n[m.ACTIVE], n[m.MODE] = m.INTEGERS, m.INTEGERS + ROWS
+    return np.concatenate([h, wiring]), f, w, n
 
 
 def test_names_are_those_of_memory_and_none_means_two_things() -> None:
-    names = [*m.SIZES, *m.STRETCHES, *m.REPORTS, *TABLES]
+    floats = {name: offset for name, (_, offset) in m.FLOATS.items()}
+    kinds = (m.SIZES, m.STRETCHES, m.REPORTS, m.LISTS, floats, TABLES)
+    names = [name for kind in (*kinds, m.INDICES) for name in kind]
     assert len(names) == len(set(names))
-    assert {name: getattr(m, name.upper()) for name in names} == {**m.SIZES, **m.STRETCHES, **m.REPORTS, **TABLES}
+    for kind in kinds:
+        assert {name: getattr(m, name.upper()) for name in kind} == kind
+    assert sorted([*m.REPORTS.values(), *m.LISTS.values()]) == list(range(m.INTEGERS))
     assert len(m.SIZES) + len(m.STRETCHES) + len(TABLES) + len(m.ADDRESSES) == m.HEADER
 
 
@@ -64,6 +70,8 @@ def changed(h, f, w, n):
     tree.inertia[5] = d.gravity[0].acceleration[2]
     d.bias[1] += d.u[2]
     d.evaluation, d.abridged = d.links[2].joint, d.state + 3
+    d.mode[1] += 5
+    d.rtol = d.last_pivot + d.w[d.at_y + 1] + d.at_touch
     return d.nv + d.links[d.n_links + 2].parent + d.touch[1].gap
 
 

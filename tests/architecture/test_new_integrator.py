@@ -17,7 +17,6 @@ MODULE = '''"""Heun's method of order 2, with Euler's as its error estimate."""
 import numpy as np
 
 from flexclear.pipeline.core.integrators import INTEGRATORS
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
@@ -29,11 +28,11 @@ B, C = np.array([0.5, 0.5]), np.array([0.0, 1.0])
 
 
 @kernel
-def error(h, f, w, n, step):
+def error(d, step):
     total = 0.0
-    for c in range(h[m.NY]):
-        total += (0.5 * step * (w[slope(h, 1) + c] - w[slope(h, 0) + c]) / error_scale(h, w, c)) ** 2
-    return np.sqrt(total / h[m.NY])
+    for c in range(d.ny):
+        total += (0.5 * step * (d.w[slope(d, 1) + c] - d.w[slope(d, 0) + c]) / error_scale(d, c)) ** 2
+    return np.sqrt(total / d.ny)
 
 
 def make_kernels(evaluate, retract):

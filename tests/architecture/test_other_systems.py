@@ -18,6 +18,7 @@ import pytest
 import flexclear as fc
 from flexclear.pipeline.core import portable, system
 from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.scene.load import scene_name
 from flexclear.stages import bundle, doctor, owner
 from flexclear.stages.__main__ import COMMANDS, main
 from tests.architecture import windows_rules as rules
@@ -245,6 +246,26 @@ def test_a_console_of_any_code_page_shows_the_help_of_all_commands(page: str, mo
 def test_a_body_with_files_has_no_name_of_a_device(root: Path, name: str) -> None:
     with pytest.raises(InputError, match=rf"\[body\.{name}\]: '{name}' is a device on Windows"):
         renamed(root, {"rod": name})
+
+
+@pytest.mark.parametrize(
+    "name, why",
+    [
+        ("aux.toml", "'aux' is a device"),
+        ("a:b.toml", "'a:b' contains :"),
+        ("trail .toml", "ends with a dot or a space"),
+        ("COM1.v2/fine.toml", "'COM1.v2' is a device"),
+        ("50%?/fine.toml", r"contains \?"),
+    ],
+)
+def test_a_scene_has_a_name_that_every_system_can_have(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, why: str
+) -> None:
+    """Its results lie in a folder of that name, and are copied between systems."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=why):
+        scene_name(tmp_path / name)
+    assert scene_name(tmp_path / "con_rod" / "aux1.v2.toml") == "con_rod/aux1.v2"
 
 
 def test_names_of_many_bytes_are_refused_before_files_are_called_by_them(root: Path) -> None:

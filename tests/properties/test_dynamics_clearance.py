@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.contact import forces, friction
 from flexclear.pipeline.dynamics.contact import form as forms
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from tests.properties.kernels import from_python
+from tests.properties.kernels import from_arrays, from_python
 
 FRICTION: dict[str, dict[str, Any]] = {
     "modified-coulomb": {"static": 0.15, "dynamic": 0.1, "v_static": 2e-4, "v_dynamic": 1e-2},
@@ -67,7 +67,7 @@ def kernel(laws: Laws) -> Any:
     form = import_module(module_of(forms.__name__, tables_of(laws).laws[0].form))
     surfaces = import_module(module_of(joints.__name__, laws[2], table="CONTACTS"))
     frictions = () if laws[1] is None else (import_module(module_of(friction.__name__, laws[1])),)
-    return from_python(forces.make_contacts((surfaces,), (form,), frictions))
+    return from_arrays(forces.make_contacts((surfaces,), (form,), frictions))
 
 
 class Touch:

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from flexclear.pipeline.core import machine
 from flexclear.pipeline.core.artifacts.disk import checked
 from flexclear.pipeline.core.artifacts.store import Record, Store
+from flexclear.stages import why
 from flexclear.stages.__main__ import main
 
 
@@ -118,3 +120,28 @@ def test_kernels_of_another_build_are_told_and_are_no_damage(store: Store, capsy
     assert "2 compiled kernels, 1 of another build" in told
     assert "flexclear_bad.py is damaged" in told
     assert "flexclear_old.py is damaged" not in told
+
+
+def test_results_of_another_processor_are_reported_and_are_fresh():
+    """Numbers differ by rounding under one key: the record names the instructions, `why` and `explain` report them."""
+    here = machine.instruction_set()
+    assert {"processor", "instructions"} <= here.keys()
+    of_here, of_others = (
+        Record("simulate", "a" * 32, {"nc": "b"}, {}, {}, facts)
+        for facts in (here, {**here, "NUMBA_CPU_NAME": "generic"})
+    )
+    assert why.elsewhere("simulate", of_here) == []
+    (note,) = why.elsewhere("simulate", of_others)
+    assert note.endswith("numbers differ by rounding: NUMBA_CPU_NAME generic, here (none)")
+    # records of before have none
+    assert why.elsewhere("simulate", Record("simulate", "a" * 32, {"nc": "b"}, {})) == []
+
+
+def test_the_record_of_a_run_names_its_processor(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path))
+    assert main(["run", "checks/pendulum", "-q", "--jobs", "1"]) == 0
+    capsys.readouterr()
+    assert main(["cache", "explain", str(tmp_path / "runs" / "checks" / "pendulum" / "run.nc")]) == 0
+    assert f"computed by processor: {machine.instruction_set()['processor']}" in capsys.readouterr().out

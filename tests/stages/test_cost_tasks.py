@@ -116,7 +116,7 @@ def test_the_answer_names_its_cost_its_error_and_the_next_digit(study: cost.Stud
 
 
 def test_a_scene_without_a_quantity_is_refused(root: Path):
-    with pytest.raises(InputError, match="did you mean 'position'"):
+    with pytest.raises(InputError, match=r"did you mean 'platform\.position'"):
         load_scene(root / "scenes" / "sps4" / "csj.toml", {"accuracy": {"platform.positon": "1 um"}})
 
 

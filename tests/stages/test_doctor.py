@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from flexclear.pipeline.dynamics.compile import files, functions
+from flexclear.pipeline.post.render import gl
 from flexclear.stages import ahead, doctor, new
 from flexclear.stages.__main__ import main
 
@@ -27,6 +28,17 @@ def test_the_doctor_says_what_is_wrong(capsys: pytest.CaptureFixture[str], monke
     told = capsys.readouterr()
     assert "WRONG  self-test  it fell upwards" in told.out
     assert "not well: self-test" in told.err
+
+
+@pytest.mark.parametrize("draws, line", [(True, "ok     graphics"), (False, "lacks  graphics")])
+def test_graphics_are_well_only_where_something_was_drawn(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, draws: bool, line: str
+):
+    """Libraries that load may fail when they draw; they are not needed, so that the machine is well without them."""
+    monkeypatch.setattr(gl, "works", lambda: draws)
+    monkeypatch.setattr(gl, "state", lambda: "GL: libGL.so.1")
+    assert main(["doctor"]) == 0
+    assert line in capsys.readouterr().out
 
 
 def test_threads_that_somebody_asks_for_do_not_change_bytes(root: Path):

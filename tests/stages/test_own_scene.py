@@ -80,6 +80,23 @@ def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, capsys: p
             "inertia = [600, 600, 1000]",
             r"\[body.crank.inertia\], line \d+: a radius of gyration of 35.4 m for a body whose frames",
         ),
+        ('mass = "0.8 kg"', "mass = 800", r"\[body.crank.mass\], line \d+: 800 kg for a body whose frames lie within"),
+        ('change = "360 deg"', "change = 360", r'360 rad are 57.3 turns\n.*write "360 deg" for degrees'),
+        (
+            'interval = "0.1 ms"',
+            'interval = "1 s"',
+            r"\[output.interval\], line \d+: 1 s is longer than the run of 0.13 s",
+        ),
+        (
+            '[joint.wrist]\ntype = "revolute"\nbetween = ["rod.small_end", "slider.pin"]\n',
+            "",
+            r"nothing connects a frame of rod and slider.pin\n.*is a joint missing\?",
+        ),
+        (
+            "[load.gravity]",
+            '[load.hold]\ntype = "pid"\njoint = "guide"\nreference = 0.2\nproportional = -5.0\n\n[load.gravity]',
+            r"\[load.hold.proportional\], line \d+: -5 pushes the coordinate away from its reference",
+        ),
     ],
 )
 def test_what_looks_like_a_slip_of_units_is_told_and_not_refused(

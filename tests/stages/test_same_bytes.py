@@ -53,3 +53,26 @@ def test_a_task_has_one_thread_and_looks_for_more_only_where_there_may_be(root: 
     environment = {**os.environ, "OPENBLAS_NUM_THREADS": "2"}
     done = subprocess.run([sys.executable, "-c", AFTER], cwd=root, env=environment, capture_output=True, text=True)
     assert done.stdout.splitlines() == ["False {1}", "{1}"], done.stderr
+
+
+#: docstrings of a module, a class and a compiled kernel, which become references, titles and meanings of keys
+DOCSTRINGS = """
+from importlib import import_module
+from flexclear.pipeline.core.citations import docstring
+places = [("integrate.dop853", ""), ("contact.normal.hertz", ""), ("contact.normal.hertz", "Hertz")]
+for module, name in places:
+    thing = import_module(f"flexclear.pipeline.dynamics.{module}")
+    print(" ".join((docstring(getattr(thing, name) if name else thing) or "").split()))
+"""
+
+
+def test_python_without_docstrings_gives_the_same_references(root: Path) -> None:
+    """`PYTHONOPTIMIZE=2` strips docstrings; runs had no references then, under the same key."""
+    said = [
+        subprocess.run(
+            [sys.executable, *options, "-c", DOCSTRINGS], cwd=root, capture_output=True, text=True, check=True
+        ).stdout
+        for options in ([], ["-OO"])
+    ]
+    assert "Source" in said[0]
+    assert said[0] == said[1]

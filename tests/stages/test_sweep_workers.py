@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import subprocess
@@ -17,7 +18,7 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.errors import InputError, ResourceError
 from flexclear.stages import sweep, sweep_engine, sweep_plan
 from flexclear.stages.__main__ import main
 from flexclear.stages.workplace import open_workplace
@@ -61,13 +62,16 @@ def test_a_killed_sweep_goes_on_with_what_it_has_not(root: Path, tmp_path: Path,
     assert asked == []
 
 
-def test_an_interrupted_sweep_leaves_what_is_finished_and_says_so(root: Path, tmp_path: Path):
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_sweep_leaves_what_is_finished_and_says_so(root: Path, tmp_path: Path, number: signal.Signals):
+    """SIGTERM too, as of a cluster's scheduler: it used to end the command with leaked semaphores of its workers."""
     results = tmp_path / "results"
     process = flexclear("sweep", str(pendulum(tmp_path, 20_000)), "--workers=2", cwd=root, results=results)
     begun(process, results)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, err = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130, err
+    assert "leaked" not in err
     with xr.open_dataset(results / "sweeps" / "lengths" / "sweep.nc") as left:
         assert left.attrs["complete"] == 0
         done = left["status"].values == 0
@@ -143,6 +147,40 @@ def test_two_workers_finish_together():
     assert sum(sizes) == 80
     assert sum(busy) / max(busy) >= 1.9  # found 2.00; without the smaller ones at the end 1.86
     assert max(sizes) >= 10
+
+
+class Cluster:
+    """Stands for a client of Dask whose workers answer the opening check, one after the other call of it, as given."""
+
+    def __init__(self, *answers: dict[str, object]) -> None:
+        self.answers = list(answers)
+
+    def nthreads(self) -> dict[str, int]:
+        return dict.fromkeys(self.answers[0], 2)
+
+    def run(self, *_: object, **__: object) -> dict[str, object]:
+        return self.answers.pop(0) if len(self.answers) > 1 else self.answers[0]
+
+
+def test_a_worker_that_dies_in_the_opening_check_is_not_one_that_lacks_this_program(monkeypatch: pytest.MonkeyPatch):
+    fine = {"tcp://a": sweep_engine.source_digest()}
+    assert sweep_engine._threads(Cluster({**fine, "tcp://b": OSError("Address removed.")}, fine), "there") == 2
+    with pytest.raises(InputError, match="no workers"):
+        sweep_engine._threads(Cluster({"tcp://b": OSError("Address removed.")}, {}), "there")
+    with pytest.raises(InputError, match="tcp://b cannot import flexclear"):
+        sweep_engine._threads(Cluster({**fine, "tcp://b": ModuleNotFoundError("flexclear")}), "there")
+    monkeypatch.setattr(sweep_engine, "PATIENCE", 0.3)
+    with pytest.raises(ResourceError, match="tcp://b does not answer"):
+        sweep_engine._threads(Cluster({**fine, "tcp://b": OSError("timed out")}), "there")
+
+
+def test_libraries_of_a_cluster_log_nothing_meanwhile() -> None:
+    """A lost scheduler gave 30 lines of traceback before the sentence about it."""
+    logger = logging.getLogger("distributed.client")
+    logger.setLevel(logging.WARNING)
+    with sweep_engine._quiet("distributed"):
+        assert not logger.isEnabledFor(logging.CRITICAL)
+    assert logger.level == logging.WARNING
 
 
 def _dask(*arguments: str, cwd: Path) -> subprocess.Popen[str]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -73,6 +75,31 @@ def test_what_failed_in_a_worker_is_the_task_that_was_asked_for(tmp_path: Path) 
     tasks = [Task("post", scene, "flexclear.stages.s5_post:run", {"of": scene}, "") for scene in ("a", "b")]
     outcome = bring(tasks, Store(tmp_path), Sources(TREE), Monitor(), 2)
     assert {id(failure.task) for failure in outcome.failures} == {id(task) for task in tasks}
+
+
+UNGUARDED = """
+import sys
+from pathlib import Path
+from flexclear.pipeline.core.artifacts.paths import TREE
+from flexclear.pipeline.core.artifacts.store import Store
+from flexclear.pipeline.core.workflow.fingerprint import Sources
+from flexclear.pipeline.core.workflow.progress import Monitor
+from flexclear.pipeline.core.workflow.schedule import bring
+from flexclear.pipeline.core.workflow.task import Task
+print("once", flush=True)
+tasks = [Task("post", scene, "flexclear.stages.s5_post:run", {"of": scene}, "") for scene in "ab"]
+print(len(bring(tasks, Store(Path(sys.argv[1])), Sources(TREE), Monitor(), 2).failures))
+"""
+
+
+def test_a_script_without_a_guard_is_not_run_again_by_its_helpers(root: Path, tmp_path: Path) -> None:
+    """Python asks for `if __name__ == "__main__"` where processes are spawned; whoever calls this program need not."""
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED, encoding="utf-8")
+    environment = {**os.environ, "PYTHONPATH": str(root)}
+    command = [sys.executable, str(script), str(tmp_path / "results")]
+    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["once", "2"], done.stderr
 
 
 @pytest.mark.parametrize("who", ["the idle worker", "the process of the progress"])

@@ -8,22 +8,21 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.scene.loads import QuadraticDrag as Declared
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, number
 from flexclear.pipeline.dynamics.loads.row import Row
-from flexclear.pipeline.dynamics.vectors import at, cross, dot, scale
+from flexclear.pipeline.dynamics.vectors import cross, dot, scale
 
 
 @kernel
-def apply(h, f, w, k):
+def apply(d, k):
     """Apply load k; all of its power is lost."""
-    o = m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
-    v = at(w, o + m.FRAME.velocity)
+    frame = d.site_frames[d.loads[k].b]
+    v = frame.velocity
     speed = np.sqrt(dot(v, v))
-    force = scale(-number(h, f, k, 0) * speed, v)
-    moment = cross(at(w, o + m.FRAME.origin), force)
-    act(h, w, k, moment, force, 0.0, 0.0, 0.0, 0.0, -dot(force, v))
+    force = scale(-number(d, k, 0) * speed, v)
+    moment = cross(frame.origin, force)
+    act(d, k, moment, force, 0.0, 0.0, 0.0, 0.0, -dot(force, v))
 
 
 class QuadraticDrag:

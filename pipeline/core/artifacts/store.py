@@ -64,6 +64,7 @@ class Record:
     """What is known of a stored artifact: sha256 of each file by its name, and the facts of its key.
 
     said: those of the main file's attributes that a command shows its user (`REPORTED`).
+    computed_by: the processor and its settings, no part of the key (`machine.instruction_set`).
     """
 
     stage: str
@@ -71,6 +72,7 @@ class Record:
     files: Mapping[str, str]
     facts: Mapping[str, str]
     said: Mapping[str, str] = field(default_factory=dict)
+    computed_by: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def digest(self) -> str:
@@ -79,7 +81,7 @@ class Record:
 
     def table(self) -> dict[str, object]:
         """What its file holds, and `read_record` reads."""
-        content = {"files": self.files, "facts": self.facts, "said": self.said}
+        content = {"files": self.files, "facts": self.facts, "said": self.said, "computed_by": self.computed_by}
         return {"stage": self.stage, "key": self.key, **{name: dict(texts) for name, texts in content.items()}}
 
 
@@ -117,7 +119,14 @@ class Store:
                 return f"{self._shown(path)} is corrupt (its content differs from its sha256)"
         return None
 
-    def put(self, stage: str, key: str, product: Product, facts: Mapping[str, str]) -> Record:
+    def put(
+        self,
+        stage: str,
+        key: str,
+        product: Product,
+        facts: Mapping[str, str],
+        computed_by: Mapping[str, str] | None = None,
+    ) -> Record:
         """Store an artifact; the record goes last and makes it valid.
 
         Raises ResourceError when the disk is full or cannot be written; nothing half-written stays.
@@ -130,7 +139,7 @@ class Store:
                 path = self.path(stage, key, name)
                 digests[name] = publish(path, content) if isinstance(content, bytes) else _store(path, content)
             said = {name: str(value) for name, value in _attributes(product).items() if name in REPORTED and value}
-            record = Record(stage, key, digests, dict(facts), said)
+            record = Record(stage, key, digests, dict(facts), said, computed_by or {})
             publish(self.path(stage, key, "json"), checked(record.table()))
         return record
 
@@ -292,8 +301,8 @@ def read_record(path: Path) -> Record | None:
     """The record in a file; None when there is none, it is damaged, or it cannot be understood."""
     try:
         table = read_checked(path) or {}
-        files, facts, said = (_texts(table.get(name, {})) for name in ("files", "facts", "said"))
-        record = Record(str(table["stage"]), str(table["key"]), files, facts, said)
+        files, facts, *others = (_texts(table.get(name, {})) for name in ("files", "facts", "said", "computed_by"))
+        record = Record(str(table["stage"]), str(table["key"]), files, facts, *others)
     except (ValueError, KeyError, TypeError, AttributeError):
         return None
     # a record of somebody else's must not lead out of its folder: what is pruned is removed

@@ -6,6 +6,8 @@ import inspect
 import re
 from collections.abc import Collection
 
+from flexclear.pipeline.core.citations import docstring
+
 
 def meanings(part: type, keys: Collection[str]) -> dict[str, str]:
     """Meaning of each of the keys that a class, or one that it is made from, describes in its docstring.
@@ -18,7 +20,7 @@ def meanings(part: type, keys: Collection[str]) -> dict[str, str]:
     """
     descriptions: dict[str, str] = {}
     for owner in reversed(part.__mro__):
-        descriptions |= _descriptions(" ".join(inspect.cleandoc(owner.__dict__.get("__doc__") or "").split()), keys)
+        descriptions |= _descriptions(" ".join(inspect.cleandoc(docstring(owner) or "").split()), keys)
     return descriptions
 
 

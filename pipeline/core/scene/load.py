@@ -22,6 +22,7 @@ from flexclear.pipeline.core.scene.file_kinds import SCENE, require_kind
 from flexclear.pipeline.core.scene.limits import check_parts
 from flexclear.pipeline.core.scene.not_toml import not_toml
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.solver import NAMING
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
@@ -130,6 +131,8 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
         try:
             for key, value in values.items():
                 _put(table, key, value, "")
+            if family == "solver" and values.keys() & set(NAMING):
+                table["by_need"] = False
             read = _reader(family).validate_python({name: table} if name else table)
             whole = {**getattr(result, family), **read} if name else read
             result = result.model_copy(update={family: whole})
@@ -157,9 +160,13 @@ def scene_name(path: Path) -> str:
         raise InputError(shown(str(path)), "is no name for a scene: results go into a folder of that name", "rename it")
     if "scenes" in whole.parts[:-1]:
         last = len(whole.parts) - 1 - whole.parts[::-1].index("scenes")
-        return "/".join(whole.parts[last + 1 :])
-    here = Path.cwd()
-    return whole.relative_to(here).as_posix() if whole.is_relative_to(here) else whole.name
+        parts = whole.parts[last + 1 :]
+    else:
+        here = Path.cwd()
+        parts = whole.relative_to(here).parts if whole.is_relative_to(here) else (whole.name,)
+    for reason in filter(None, map(portable.unfit, parts)):
+        raise InputError(shown(str(path)), f"{reason}: results go into a folder of that name", "rename it")
+    return "/".join(parts)
 
 
 def _resolved(path: Path) -> Path:
@@ -370,6 +377,8 @@ def _put(table: dict[str, Any], path: str, value: object, where: str) -> None:
         owner[last] = value
     elif isinstance(owner, dict):
         owner[key] = value
+        if parent == "solver" and key in NAMING:
+            owner["by_need"] = False
     else:
         raise InputError(where, f"'{parent}' is a value, not a table")
 

@@ -31,7 +31,7 @@ from flexclear.pipeline.core.scene.parts import (
     RigidBody,
 )
 from flexclear.pipeline.core.scene.quantity import Quantity, parse, usual
-from flexclear.pipeline.core.scene.solver import PlainIntegrator, Solver
+from flexclear.pipeline.core.scene.solver import NAMING, PlainIntegrator, Solver
 from flexclear.pipeline.core.scene.start import Start
 from flexclear.pipeline.core.scene.stops import Stop
 from flexclear.pipeline.core.units import any_quantity, measured, quantity
@@ -278,9 +278,16 @@ class Scene(Part):
     def _method_by_need(cls, table: Any) -> Any:
         """Note whether the integrator is left open, before it gets its default."""
         accuracy, solver = (table.get(key) for key in ("accuracy", "solver")) if isinstance(table, dict) else (0, 0)
-        if not isinstance(accuracy, dict) or "by_need" in accuracy or not isinstance(solver, dict | None):
+        if not isinstance(solver, dict | None):
             return table
-        return {**table, "accuracy": {**accuracy, "by_need": not {"integrator", "step"} & set(solver or ())}}
+        given = set(solver or ())
+        if "by_need" not in given:
+            table = {**table, "solver": {**(solver or {}), "by_need": not set(NAMING) & given}}
+        elif (solver or {})["by_need"]:
+            given -= set(NAMING)  # an edit writes the defaults out
+        if not isinstance(accuracy, dict) or "by_need" in accuracy:
+            return table
+        return {**table, "accuracy": {**accuracy, "by_need": not {"integrator", "step"} & given}}
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
@@ -297,8 +304,10 @@ class Scene(Part):
         self._bodies_have_files_of_their_own()
 
     def by_need(self) -> bool:
-        """Whether the integrator is chosen for the accuracy that is asked for."""
-        return bool(self.accuracy is not None and self.accuracy.quantities and self.accuracy.by_need)
+        """Whether the integrator is chosen: for the accuracy that is asked for, or because the scene names none."""
+        if self.accuracy is None or not self.accuracy.quantities:
+            return bool(self.solver.by_need)
+        return bool(self.accuracy.by_need)
 
     def owners(self) -> dict[str, dict[str, bool]]:
         """Names of the parts that may own a quantity, by what they are; whether what they do is about an axis."""

@@ -9,6 +9,9 @@ from flexclear.pipeline.core.integrators import DEFAULT, INTEGRATORS
 from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.fields import Number, Part, Time
 
+#: keys by which a scene says how it is integrated
+NAMING = ("integrator", "rtol", "step")
+
 
 class Stepping(Part):
     """What all integrators have.
@@ -21,6 +24,8 @@ class Stepping(Part):
     evaluations: most right-hand sides of one run.  step: present means steps of this length.
     events: where contacts begin and end, ``at step ends`` only with fixed steps.
     integrator: name, as docs/integrators.md lists them.
+    by_need: whether a dear run gets another integrator and tolerance, where the scene has no `[accuracy]`; by default
+        it does where `[solver]` gives neither of them and no step.
     """
 
     integrator: str
@@ -29,6 +34,7 @@ class Stepping(Part):
     evaluations: Annotated[int, Field(gt=0, le=10**15)] = 50_000_000
     step: Annotated[Time, Field(gt=0.0)] | None = None
     events: Literal["located", "at step ends"] = "located"
+    by_need: bool | None = None
 
     @model_validator(mode="after")
     def _located_unless_fixed(self) -> Self:
@@ -85,3 +91,13 @@ Solver = Annotated[
     Discriminator(_tag),
     BeforeValidator(_known),
 ]
+
+
+def of_run(solver: Stepping, by_need: bool, attributes: Mapping[str, Any]) -> tuple[str, float]:
+    """Integrator and relative tolerance that a finished run began with.
+
+    solver, by_need: of its scene.  attributes: of its dataset, which count where the scene left them open.
+    """
+    rtol = float(attributes.get("accuracy_rtol", solver.rtol))
+    named = "switched" in attributes and not by_need
+    return solver.integrator if named else str(attributes["method"]), rtol

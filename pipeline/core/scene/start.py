@@ -85,7 +85,8 @@ class Start(Part):
 
     at: "equilibrium", the static equilibrium with the drives where their laws start, and the joint coordinates whose
     `position` is given held there; or "ideal", where the mechanism without clearance would start, each loose pin
-    resting in its socket on the side to which the joint's force presses it.
+    resting in its socket on the side to which the joint's force presses it, flexible
+    bodies deformed as the loads of that moment hold them.
     joint: of joints, by name; those with several coordinates by the coordinate's name below.
     modal: of flexible bodies, by name.
     branch: in a change point, which of the branches that cross there the motion takes; with several loops a list, each

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 
-from flexclear.pipeline.core import file_dependencies, threads
+from flexclear.pipeline.core import file_dependencies, machine, threads
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.workflow import journal
@@ -59,7 +59,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             ):
                 product = run({**task.params, **task.context}, data, progress)
             known |= _noted(task, plain, read, store)
-            record = store.put(task.stage, key(known), product, known)
+            record = store.put(task.stage, key(known), product, known, machine.instruction_set())
             storage.remove()
     store.show(record, task.folder, task.names, task.label)
     return record

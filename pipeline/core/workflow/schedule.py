@@ -222,7 +222,7 @@ def _submit(
             monitor.finish(name, failed=False)
             continue
         where = (store.root, sources.root, sources.memo)
-        with workers.lost():  # an idle one
+        with workers.lost(), workers.without_main():  # an idle one; a script without a guard is not run again
             future = pool.submit(_work, task, inputs, name, where, reports, others_idle)
         running[future] = _Running(task, key, name)
 

@@ -125,7 +125,8 @@ class Team:
         from multiprocessing.managers import SyncManager
 
         server, bell = SyncManager(ctx=_context()), Bell.made()
-        server.start(_follow, (os.getpid(),))
+        with without_main():
+            server.start(_follow, (os.getpid(),))
         return Team(width, pool(width, bell), bell, server, server.Queue())
 
     def end(self) -> None:

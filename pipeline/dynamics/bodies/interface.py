@@ -20,80 +20,83 @@ from flexclear.pipeline.dynamics.vectors import ZERO, add, scale
 
 
 @kernel
-def in_interface(h, f, w, k, source, out):
+def in_interface(d, k, source, out):
     """T^T of body k: what w holds of each mode from `source` on, of each shape from `out` on."""
-    e, end = m.FLEXES.basis0(h, k), m.FLEXES.basis0(h, k) + m.FLEXES.n_basis(h, k)
-    for j in range(m.FLEXES.n_modes(h, k)):
+    body = d.flexes[k]
+    e, end = body.basis0, body.basis0 + body.n_basis
+    for j in range(body.n_modes):
         total = 0.0
-        while e < end and m.BASIS.shape(h, e) == j:
-            total += f[m.BASIS_VALUES.row(h, e)] * w[source + m.BASIS.mode(h, e)]
+        while e < end and d.basis[e].shape == j:
+            total += d.basis_values[e].value * d.w[source + d.basis[e].mode]
             e += 1
-        w[out + j] = total
+        d.w[out + j] = total
 
 
 @kernel
-def all_in_interface(h, f, w, k, source, out, more):
+def all_in_interface(d, k, source, out, more):
     """The same of four times as much: what stands from `source` on goes to `out`, the three after it from `more` on."""
-    n, e, end = m.FLEXES.n_modes(h, k), m.FLEXES.basis0(h, k), m.FLEXES.basis0(h, k) + m.FLEXES.n_basis(h, k)
+    body = d.flexes[k]
+    n, e, end = body.n_modes, body.basis0, body.basis0 + body.n_basis
     for j in range(n):
         total, rest = 0.0, ZERO
-        while e < end and m.BASIS.shape(h, e) == j:
-            value, i = f[m.BASIS_VALUES.row(h, e)], source + m.BASIS.mode(h, e)
-            total += value * w[i]
-            rest = add(rest, scale(value, (w[i + n], w[i + 2 * n], w[i + 3 * n])))
+        while e < end and d.basis[e].shape == j:
+            value, i = d.basis_values[e].value, source + d.basis[e].mode
+            total += value * d.w[i]
+            rest = add(rest, scale(value, (d.w[i + n], d.w[i + 2 * n], d.w[i + 3 * n])))
             e += 1
-        w[out + j], w[more + j], w[more + n + j], w[more + 2 * n + j] = total, rest[0], rest[1], rest[2]
+        d.w[out + j], d.w[more + j], d.w[more + n + j], d.w[more + 2 * n + j] = total, rest[0], rest[1], rest[2]
 
 
 @kernel
-def in_modes(h, f, w, k, source, out):
+def in_modes(d, k, source, out):
     """T of body k: what w holds of each shape from `source` on, of each mode from `out` on."""
-    for i in range(m.FLEXES.n_modes(h, k)):
-        w[out + i] = 0.0
-    first = m.FLEXES.basis0(h, k)
-    for e in range(first, first + m.FLEXES.n_basis(h, k)):
-        w[out + m.BASIS.mode(h, e)] += f[m.BASIS_VALUES.row(h, e)] * w[source + m.BASIS.shape(h, e)]
+    body = d.flexes[k]
+    for i in range(body.n_modes):
+        d.w[out + i] = 0.0
+    for e in range(body.basis0, body.basis0 + body.n_basis):
+        entry = d.basis[e]
+        d.w[out + entry.mode] += d.basis_values[e].value * d.w[source + entry.shape]
 
 
 @kernel
-def deform(h, f, w):
+def deform(d):
     """Coordinates of the moving shapes and their rates, INTERFACE_X and INTERFACE_U, from X and U."""
-    for k in range(h[m.N_FLEX]):
-        c0, x, u = m.FLEXES.c0(h, k), h[m.X] + m.FLEXES.q0(h, k), h[m.U] + m.FLEXES.c0(h, k)
-        e, end = m.FLEXES.moving0(h, k), m.FLEXES.basis0(h, k) + m.FLEXES.n_basis(h, k)
-        for j in range(m.FLEXES.n_held(h, k), m.FLEXES.n_modes(h, k)):
+    for k in range(d.n_flex):
+        body = d.flexes[k]
+        e, end = body.moving0, body.basis0 + body.n_basis
+        for j in range(body.n_held, body.n_modes):
             place = rate = 0.0
-            while e < end and m.BASIS.shape(h, e) == j:
-                value, i = f[m.BASIS_VALUES.row(h, e)], m.BASIS.mode(h, e)
-                place += value * w[x + i]
-                rate += value * w[u + i]
+            while e < end and d.basis[e].shape == j:
+                value, i = d.basis_values[e].value, d.basis[e].mode
+                place += value * d.x[body.q0 + i]
+                rate += value * d.u[body.c0 + i]
                 e += 1
-            w[h[m.INTERFACE_X] + c0 + j], w[h[m.INTERFACE_U] + c0 + j] = place, rate
+            d.interface_x[body.c0 + j], d.interface_u[body.c0 + j] = place, rate
 
 
 @kernel
-def to_interface(h, f, w, b):
+def to_interface(d, b):
     """What w holds of each coordinate from place b on, modes as eigenmodes: now in the interface basis."""
-    for k in range(h[m.N_FLEX]):
-        place = b + m.FLEXES.c0(h, k)
-        in_interface(h, f, w, k, place, h[m.MODAL])
-        for j in range(m.FLEXES.n_modes(h, k)):
-            w[place + j] = w[h[m.MODAL] + j]
+    for k in range(d.n_flex):
+        place = b + d.flexes[k].c0
+        in_interface(d, k, place, d.h[m.MODAL])
+        for j in range(d.flexes[k].n_modes):
+            d.w[place + j] = d.modal[j]
 
 
 @kernel
-def to_modes(h, f, w, b):
+def to_modes(d, b):
     """What w holds of each coordinate from place b on, modes in the interface basis: now as eigenmodes."""
-    for k in range(h[m.N_FLEX]):
-        place = b + m.FLEXES.c0(h, k)
-        in_modes(h, f, w, k, place, h[m.MODAL])
-        for j in range(m.FLEXES.n_modes(h, k)):
-            w[place + j] = w[h[m.MODAL] + j]
+    for k in range(d.n_flex):
+        place = b + d.flexes[k].c0
+        in_modes(d, k, place, d.h[m.MODAL])
+        for j in range(d.flexes[k].n_modes):
+            d.w[place + j] = d.modal[j]
 
 
 @kernel
-def modal_rates(h, f, w, dy):
+def modal_rates(d, dy):
     """Accelerations of the eigenmodes into the rates dy of the state, from DU."""
-    for k in range(h[m.N_FLEX]):
-        c0 = m.FLEXES.c0(h, k)
-        in_modes(h, f, w, k, h[m.DU] + c0, dy + h[m.NQ] + c0)
+    for k in range(d.n_flex):
+        c0 = d.flexes[k].c0
+        in_modes(d, k, d.h[m.DU] + c0, dy + d.nq + c0)

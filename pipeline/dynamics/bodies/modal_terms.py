@@ -2,126 +2,124 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies.rigid import carry
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import accumulate, add, at, at6, cross, dot, dot6, put, scale, turn_symmetric
+from flexclear.pipeline.dynamics.vectors import (
+    add,
+    add_twist,
+    at6,
+    cross,
+    dot,
+    dot_momentum,
+    dot_wrench,
+    scale,
+    turn_symmetric,
+)
 
 RATE = 9  #: SCRATCH: second moment int rho r r^T (9), then D = int rho r rdot^T (9)
 
 
 @kernel
-def places(h, k):
-    """Number of modes, and where body k keeps positions, speeds and numbers."""
-    n = m.FLEXES.n_modes(h, k)
-    return n, h[m.X] + m.FLEXES.q0(h, k), h[m.U] + m.FLEXES.c0(h, k), h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k)
+def of_mode(numbers, first, n, j):
+    """Column j of a 3 x n matrix, the values of a table from row `first` on."""
+    return (numbers[first + j].value, numbers[first + n + j].value, numbers[first + 2 * n + j].value)
 
 
 @kernel
-def tensor(w, Q):
-    """Inertia tensor tr(Q) 1 - Q, as (xx, yy, zz, xy, xz, yz), of the second moment stored from Q."""
+def tensor(Q):
+    """Inertia tensor tr(Q) 1 - Q, as (xx, yy, zz, xy, xz, yz), of the second moment at the start of a stretch."""
+    return (Q[4] + Q[8], Q[0] + Q[8], Q[0] + Q[4], -Q[1], -Q[2], -Q[5])
+
+
+@kernel
+def spin(P, first, n, j):
+    """Antisymmetric part of column j of P (or V), from `first` on: int rho r x S_j (or rdot x S_j)."""
     return (
-        w[Q + 4] + w[Q + 8],
-        w[Q] + w[Q + 8],
-        w[Q] + w[Q + 4],
-        -w[Q + 1],
-        -w[Q + 2],
-        -w[Q + 5],
+        P[first + 5 * n + j] - P[first + 7 * n + j],
+        P[first + 6 * n + j] - P[first + 2 * n + j],
+        P[first + n + j] - P[first + 3 * n + j],
     )
 
 
 @kernel
-def spin(w, P, n, j):
-    """Antisymmetric part of column j of P (or V): int rho r x S_j (or rdot x S_j)."""
-    return (
-        w[P + 5 * n + j] - w[P + 7 * n + j],
-        w[P + 6 * n + j] - w[P + 2 * n + j],
-        w[P + n + j] - w[P + 3 * n + j],
-    )
-
-
-@kernel
-def spatial(w, o, mass, p, c, J):
-    """Store a spatial inertia; c, J: first moment and inertia about p, world axes."""
-    w[o] = mass
-    put(w, o + 1, add(scale(mass, p), c))
+def spatial(own, mass, p, c, J):
+    """Store a spatial inertia (a row of OWN); c, J: first moment and inertia about p, world axes."""
+    own.mass, own.moment = mass, add(scale(mass, p), c)
     square = mass * dot(p, p) + 2.0 * dot(p, c)
     for k in range(3):
-        w[o + 4 + k] = J[k] + square - mass * p[k] * p[k] - 2.0 * p[k] * c[k]
-    w[o + 7] = J[3] - mass * p[0] * p[1] - p[0] * c[1] - p[1] * c[0]
-    w[o + 8] = J[4] - mass * p[0] * p[2] - p[0] * c[2] - p[2] * c[0]
-    w[o + 9] = J[5] - mass * p[1] * p[2] - p[1] * c[2] - p[2] * c[1]
+        own.inertia[k] = J[k] + square - mass * p[k] * p[k] - 2.0 * p[k] * c[k]
+    own.inertia[3] = J[3] - mass * p[0] * p[1] - p[0] * c[1] - p[1] * c[0]
+    own.inertia[4] = J[4] - mass * p[0] * p[2] - p[0] * c[2] - p[2] * c[0]
+    own.inertia[5] = J[5] - mass * p[1] * p[2] - p[1] * c[2] - p[2] * c[1]
 
 
 @kernel
-def carried(h, w, k):
+def carried(d, k):
     """Shapes that also move the body frame: their columns carry the body's own wrench and inertia."""
-    i, c0, held = m.FLEXES.link(h, k), m.FLEXES.c0(h, k), m.FLEXES.n_held(h, k)
-    own = m.OWN.row(h, i)
-    c, J = at(w, own + 1), at6(w, own + 4)
-    for j in range(c0, c0 + m.FLEXES.n_modes(h, k)):
-        s, o = m.COLUMNS.row(h, j), m.MOMENTA.row(h, j)
+    body = d.flexes[k]
+    own, wrench = d.own[body.link], d.wrench[body.link]
+    c, J, mass = own.moment, at6(own.inertia, 0), own.mass
+    for j in range(body.c0, body.c0 + body.n_modes):
+        column, momentum, deformation = d.columns[j], d.momenta[j], d.deformation[j]
         # momentum of the deformation alone stays for the mass matrix
-        for e in range(6):
-            w[m.DEFORMATION.row(h, j) + e] = w[o + e]
-        if j < c0 + held:
+        deformation.angular, deformation.linear = momentum.angular, momentum.linear
+        if j < body.c0 + body.n_held:
             continue
-        w[h[m.MODAL_BIAS] + j] += dot6(w, s, w, m.WRENCH.row(h, i))
-        omega, v = at(w, s), at(w, s + 3)
-        accumulate(w, o, add(turn_symmetric(J, omega), cross(c, v)))
-        accumulate(w, o + 3, add(scale(w[own], v), cross(omega, c)))
+        d.modal_bias[j] += dot_wrench(wrench, column)
+        omega, v = column.angular, column.linear
+        add_twist(momentum, add(turn_symmetric(J, omega), cross(c, v)), add(scale(mass, v), cross(omega, c)))
 
 
 @kernel
-def stiffness(h, f, w, k):
+def stiffness(d, k):
     """Elastic and damping forces join those on the modes; the power lost to damping joins the ledger."""
-    n, x, u, data = places(h, k)
-    K, bias, rate = data + 12 * n + n * n, h[m.MODAL] + 18 * n, h[m.POSITION_RATE] + m.FLEXES.q0(h, k)
+    body = d.flexes[k]
+    n = body.n_modes
+    K, bias = body.data0 + 12 * n + n * n, 18 * n
     for j in range(n):
-        speed = w[u + j]
-        damping = f[K + n + j] * speed
-        w[bias + j] += f[K + j] * w[x + j] + damping
-        w[rate + j] = speed
-        w[h[m.LEDGER_RATE] + m.FLEXES.book(h, k)] += damping * speed
+        speed = d.u[body.c0 + j]
+        damping = d.flex_data[K + n + j].value * speed
+        d.modal[bias + j] += d.flex_data[K + j].value * d.x[body.q0 + j] + damping
+        d.position_rate[body.q0 + j] = speed
+        d.ledger_rate[body.book] += damping * speed
 
 
 @kernel
-def body_mass_matrix(h, f, w, k):
+def body_mass_matrix(d, k):
     """Own part of the modal block of the mass matrix, into the envelope; right after `inertia`."""
-    n, c0, held, moves = m.FLEXES.n_modes(h, k), m.FLEXES.c0(h, k), m.FLEXES.n_held(h, k), m.FLEXES.inboard(h, k)
-    mass = h[m.INTERFACE_DATA.place] + m.FLEXES.interface0(h, k) + 3 * n
+    body = d.flexes[k]
+    n, c0, held = body.n_modes, body.c0, body.n_held
+    mass = body.interface0 + 3 * n
     for i in range(n):
-        start = h[m.MASS] + m.ENVELOPE.origin(h, c0 + i) + c0
-        for j in range(0 if m.FLEXES.coupled(h, k) and i >= held else i, i + 1):
-            value = f[mass + i * n + j]
-            if moves and j >= held:
-                value += dot6(w, m.MOMENTA.row(h, c0 + i), w, m.COLUMNS.row(h, c0 + j))
-            if moves and i >= held:
-                value += dot6(w, m.COLUMNS.row(h, c0 + i), w, m.DEFORMATION.row(h, c0 + j))
-            w[start + j] += value
+        start = d.envelope[c0 + i].origin + c0
+        for j in range(0 if body.coupled and i >= held else i, i + 1):
+            value = d.interface_data[mass + i * n + j].value
+            if body.inboard and j >= held:
+                value += dot_momentum(d.momenta[c0 + i], d.columns[c0 + j])
+            if body.inboard and i >= held:
+                value += dot_momentum(d.columns[c0 + i], d.deformation[c0 + j])
+            d.mass[start + j] += value
 
 
 @kernel
-def port_load(h, w, i):
+def port_load(d, i):
     """A link on a flexible parent also loads the parent's moving shapes, through its port."""
-    p = m.LINKS.carried_by(h, i)
+    p = d.links[i].carried_by
     if p < 0:
         return
-    b = m.PORTS.flex(h, p)
-    held, first = m.FLEXES.n_held(h, b), m.PORTS.column(h, p)
-    c0 = m.FLEXES.c0(h, b) + held
-    for j in range(m.FLEXES.n_modes(h, b) - held):
-        k = first + j
-        carry(h, w, i, k)
-        accumulate(w, m.MOMENTA.row(h, c0 + j), at(w, m.MOMENTA.row(h, k)))
-        accumulate(w, m.MOMENTA.row(h, c0 + j) + 3, at(w, m.MOMENTA.row(h, k) + 3))
-        w[h[m.MODAL_BIAS] + c0 + j] += dot6(w, m.COLUMNS.row(h, k), w, m.WRENCH.row(h, i))
+    port = d.ports[p]
+    body = d.flexes[port.flex]
+    for j in range(body.n_modes - body.n_held):
+        k, shape = port.column + j, body.c0 + body.n_held + j
+        carry(d, i, k)
+        add_twist(d.momenta[shape], d.momenta[k].angular, d.momenta[k].linear)
+        d.modal_bias[shape] += dot_wrench(d.wrench[i], d.columns[k])
 
 
 @kernel
-def modal_forces(h, w):
+def modal_forces(d):
     """Generalised forces of the modes."""
-    for b in range(h[m.N_FLEX]):
-        c0 = m.FLEXES.c0(h, b)
-        for j in range(c0, c0 + m.FLEXES.n_modes(h, b)):
-            w[h[m.BIAS] + j] = w[h[m.MODAL_BIAS] + j]
+    for b in range(d.n_flex):
+        body = d.flexes[b]
+        for j in range(body.c0, body.c0 + body.n_modes):
+            d.bias[j] = d.modal_bias[j]

@@ -8,18 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.bodies.modal_terms import of_mode
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
-    accumulate,
+    ZERO,
     add,
-    at,
-    at9,
+    add_twist,
     cross,
     exponential,
     product,
-    put,
-    put9,
     scale,
     sub,
     tangent,
@@ -31,107 +28,91 @@ from flexclear.pipeline.dynamics.vectors import (
 
 
 @kernel
-def _shape(f, first, n, j):
-    """Column j of a 3 x n shape stored from `first`."""
-    return (f[first + j], f[first + n + j], f[first + 2 * n + j])
-
-
-@kernel
-def moving(h, k):
-    """Number of moving shapes of body k, and the first of their coordinates."""
-    held = m.FLEXES.n_held(h, k)
-    return m.FLEXES.n_modes(h, k) - held, m.FLEXES.c0(h, k) + held
+def moving(body):
+    """Number of moving shapes of a body, and the first of their coordinates."""
+    return body.n_modes - body.n_held, body.c0 + body.n_held
 
 
 def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
-    """The kernels `site` and `inboard`; shortening(h, f, w, p, j, vector) is what bending adds along x, or zero."""
+    """The kernels `site` and `inboard`; shortening(d, p, j, vector, first) is what bending adds along x, or zero."""
 
     @kernel
-    def relative_motion(h, f, w, p):
+    def relative_motion(d, p):
         """Pose, twist and acceleration of port p's frame in the body frame, and its rotation vector theta.
 
         Body components.  The accelerations hold what the known modal accelerations give.
         """
-        k = m.PORTS.flex(h, p)
-        n, first = moving(h, k)
-        x, u, du = h[m.INTERFACE_X] + first, h[m.INTERFACE_U] + first, h[m.DU] + first
-        move = h[m.PORT_DATA.place] + m.PORTS.shapes(h, p)
-        spin = move + 3 * n
-        zero = (0.0, 0.0, 0.0)
-        s, s_rate, s_acc, theta, theta_rate, theta_acc = zero, zero, zero, zero, zero, zero
+        port, undeformed = d.ports[p], d.port_numbers[p]
+        n, c = moving(d.flexes[port.flex])
+        move, spin = port.shapes, port.shapes + 3 * n
+        s, s_rate, s_acc, theta, theta_rate, theta_acc = ZERO, ZERO, ZERO, ZERO, ZERO, ZERO
         for j in range(n):
-            phi, psi, drawn = _shape(f, move, n, j), _shape(f, spin, n, j), shortening(h, f, w, p, j, x)
+            x, u, du = d.interface_x[c + j], d.interface_u[c + j], d.du[c + j]
+            phi, psi = of_mode(d.port_data, move, n, j), of_mode(d.port_data, spin, n, j)
+            drawn = shortening(d, p, j, d.interface_x, c)
             bent = (phi[0] + drawn, phi[1], phi[2])
-            s = add(s, scale(w[x + j], (phi[0] + 0.5 * drawn, phi[1], phi[2])))
-            s_rate, s_acc = add(s_rate, scale(w[u + j], bent)), add(s_acc, scale(w[du + j], bent))
-            s_acc = add(s_acc, (w[u + j] * shortening(h, f, w, p, j, u), 0.0, 0.0))
-            theta, theta_rate = add(theta, scale(w[x + j], psi)), add(theta_rate, scale(w[u + j], psi))
-            theta_acc = add(theta_acc, scale(w[du + j], psi))
-        numbers = m.PORT_NUMBERS.row(h, p)
-        local = add(at(f, numbers), s)
-        turned = product(exponential(theta), at9(f, numbers + 3))
+            s = add(s, scale(x, (phi[0] + 0.5 * drawn, phi[1], phi[2])))
+            s_rate, s_acc = add(s_rate, scale(u, bent)), add(s_acc, scale(du, bent))
+            s_acc = add(s_acc, (u * shortening(d, p, j, d.interface_u, c), 0.0, 0.0))
+            theta, theta_rate = add(theta, scale(x, psi)), add(theta_rate, scale(u, psi))
+            theta_acc = add(theta_acc, scale(du, psi))
+        local = add(undeformed.origin, s)
+        turned = product(exponential(theta), undeformed.axes)
         alpha = add(tangent_rate(theta, theta_rate), tangent(theta, theta_acc))
         return local, turned, tangent(theta, theta_rate), s_rate, alpha, s_acc, theta
 
     @kernel
-    def modal_columns(h, f, w, p, R, origin, theta, sign, first):
+    def modal_columns(d, p, R, origin, theta, sign, first):
         """Twist of port p's frame relative to the body, per rate of a moving shape, about the kernels' origin.
 
         Added with `sign` to the columns from `first` on; R, origin: axes of the body, place of the port.
         """
-        k = m.PORTS.flex(h, p)
-        n, c = moving(h, k)
-        move, x = h[m.PORT_DATA.place] + m.PORTS.shapes(h, p), h[m.INTERFACE_X] + c
+        port = d.ports[p]
+        n, c = moving(d.flexes[port.flex])
         spin = product(R, tangent_matrix(theta))
         for j in range(n):
-            phi = _shape(f, move, n, j)
-            bent = (phi[0] + shortening(h, f, w, p, j, x), phi[1], phi[2])
-            angular = scale(sign, turn(spin, _shape(f, move + 3 * n, n, j)))
+            phi = of_mode(d.port_data, port.shapes, n, j)
+            bent = (phi[0] + shortening(d, p, j, d.interface_x, c), phi[1], phi[2])
+            angular = scale(sign, turn(spin, of_mode(d.port_data, port.shapes + 3 * n, n, j)))
             linear = scale(sign, turn(R, bent))
-            o = m.COLUMNS.row(h, first + j)
-            accumulate(w, o, angular)
-            accumulate(w, o + 3, add(linear, cross(origin, angular)))
+            add_twist(d.columns[first + j], angular, add(linear, cross(origin, angular)))
 
     @kernel
-    def site(h, f, w, s):
+    def site(d, s):
         """Motion of a site on a flexible link, and the columns of its port."""
-        p = m.SITES.port(h, s)
-        k = m.PORTS.flex(h, p)
-        local, turned, omega_l, v_l, alpha_l, a_l, theta = relative_motion(h, f, w, p)
-        frame = m.LINK_FRAMES.row(h, m.FLEXES.link(h, k))
-        R, omega, alpha = at9(w, frame + m.FRAME.axes), at(w, frame + m.FRAME.omega), at(w, frame + m.FRAME.alpha)
+        p = d.sites[s].port
+        port = d.ports[p]
+        body = d.flexes[port.flex]
+        local, turned, omega_l, v_l, alpha_l, a_l, theta = relative_motion(d, p)
+        frame, here = d.link_frames[body.link], d.site_frames[s]
+        R, omega, alpha = frame.axes, frame.omega, frame.alpha
         arm, turning, sliding = turn(R, local), turn(R, omega_l), turn(R, v_l)
-        origin, swing = add(at(w, frame + m.FRAME.origin), arm), cross(omega, arm)
-        a = add(at(w, frame + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, swing)))
+        origin, swing = add(frame.origin, arm), cross(omega, arm)
+        a = add(frame.acceleration, add(cross(alpha, arm), cross(omega, swing)))
         a = add(a, add(scale(2.0, cross(omega, sliding)), turn(R, a_l)))
-        o = m.SITE_FRAMES.row(h, s)
-        put(w, o + m.FRAME.origin, origin)
-        put9(w, o + m.FRAME.axes, product(R, turned))
-        put(w, o + m.FRAME.omega, add(omega, turning))
-        put(w, o + m.FRAME.velocity, add(at(w, frame + m.FRAME.velocity), add(swing, sliding)))
-        put(w, o + m.FRAME.alpha, add(alpha, add(turn(R, alpha_l), cross(omega, turning))))
-        put(w, o + m.FRAME.acceleration, a)
-        moves, first = m.FLEXES.inboard(h, k), m.PORTS.column(h, p)
-        n, c = moving(h, k)
+        here.origin, here.axes = origin, product(R, turned)
+        here.omega, here.velocity = add(omega, turning), add(frame.velocity, add(swing, sliding))
+        here.alpha, here.acceleration = add(alpha, add(turn(R, alpha_l), cross(omega, turning))), a
+        n, c = moving(body)
         for j in range(n):
-            for e in range(6):
-                w[m.COLUMNS.row(h, first + j) + e] = w[m.COLUMNS.row(h, c + j) + e] if moves else 0.0
-        modal_columns(h, f, w, p, R, origin, theta, 1.0, first)
+            column, of_body = d.columns[port.column + j], d.columns[c + j]
+            column.angular = of_body.angular if body.inboard else ZERO
+            column.linear = of_body.linear if body.inboard else ZERO
+        modal_columns(d, p, R, origin, theta, 1.0, port.column)
 
     @kernel
-    def inboard(h, f, w, i, origin, R, omega, v, alpha, a):
+    def inboard(d, i, origin, R, omega, v, alpha, a):
         """From the inboard joint frame G, which the modes may move in the body, to the body frame."""
-        p = m.LINKS.inboard_port(h, i)
-        k = m.PORTS.flex(h, p)
-        if m.FLEXES.inboard(h, k) == 0:
+        p = d.links[i].inboard_port
+        body = d.flexes[d.ports[p].flex]
+        if body.inboard == 0:
             # the reference condition holds this frame still in the body: a rigid step
-            numbers = m.PORT_NUMBERS.row(h, p)
-            R_WB = product(R, transpose(at9(f, numbers + 3)))
-            arm = turn(R_WB, at(f, numbers))
+            R_WB = product(R, transpose(d.port_numbers[p].axes))
+            arm = turn(R_WB, d.port_numbers[p].origin)
             swing = cross(omega, arm)
             a_B = sub(a, add(cross(alpha, arm), cross(omega, swing)))
             return sub(origin, arm), R_WB, omega, sub(v, swing), alpha, a_B
-        local, turned, omega_l, v_l, alpha_l, a_l, theta = relative_motion(h, f, w, p)
+        local, turned, omega_l, v_l, alpha_l, a_l, theta = relative_motion(d, p)
         R_WB = product(R, transpose(turned))
         arm, turning, sliding = turn(R_WB, local), turn(R_WB, omega_l), turn(R_WB, v_l)
         omega_B = sub(omega, turning)
@@ -140,11 +121,11 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
         v_B = sub(v, add(swing, sliding))
         a_B = sub(a, add(cross(alpha_B, arm), cross(omega_B, swing)))
         a_B = sub(a_B, add(scale(2.0, cross(omega_B, sliding)), turn(R_WB, a_l)))
-        n, c = moving(h, k)
+        n, c = moving(body)
         for j in range(n):
-            for e in range(6):
-                w[m.COLUMNS.row(h, c + j) + e] = 0.0
-        modal_columns(h, f, w, p, R_WB, origin, theta, -1.0, c)
+            column = d.columns[c + j]
+            column.angular, column.linear = ZERO, ZERO
+        modal_columns(d, p, R_WB, origin, theta, -1.0, c)
         return sub(origin, arm), R_WB, omega_B, v_B, alpha_B, a_B
 
     return site, inboard

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
-    accumulate,
     add,
-    at,
+    add_wrench,
     at6,
-    at9,
     congruence,
     cross,
     dot,
-    put,
     scale,
     turn,
     turn_symmetric,
@@ -21,73 +17,64 @@ from flexclear.pipeline.dynamics.vectors import (
 
 
 @kernel
-def spatial(w, o, mass, c, J):
-    """Store the spatial inertia of a mass at c with inertia J about it, world axes."""
+def spatial(own, mass, c, J):
+    """Store the spatial inertia (a row of OWN) of a mass at c with inertia J about it, world axes."""
     x, y, z = c
-    w[o] = mass
-    put(w, o + 1, scale(mass, c))
-    w[o + 4] = J[0] + mass * (y * y + z * z)
-    w[o + 5] = J[1] + mass * (x * x + z * z)
-    w[o + 6] = J[2] + mass * (x * x + y * y)
-    w[o + 7] = J[3] - mass * x * y
-    w[o + 8] = J[4] - mass * x * z
-    w[o + 9] = J[5] - mass * y * z
+    own.mass, own.moment = mass, scale(mass, c)
+    own.inertia[0] = J[0] + mass * (y * y + z * z)
+    own.inertia[1] = J[1] + mass * (x * x + z * z)
+    own.inertia[2] = J[2] + mass * (x * x + y * y)
+    own.inertia[3] = J[3] - mass * x * y
+    own.inertia[4] = J[4] - mass * x * z
+    own.inertia[5] = J[5] - mass * y * z
 
 
 @kernel
-def inertia(h, f, w, i):
+def inertia(d, i):
     """Spatial inertia of link i (OWN) and the wrench on it (moment about the origin, force).
 
     The wrench is what the accelerations now in its frame need, gravity being an acceleration of
     the ground.
     """
-    frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
-    R = at9(w, frame + m.FRAME.axes)
-    omega, alpha = at(w, frame + m.FRAME.omega), at(w, frame + m.FRAME.alpha)
-    arm = turn(R, at(f, numbers + m.LINK_NUMBERS.com))
-    c = add(at(w, frame + m.FRAME.origin), arm)
-    mass = f[numbers + m.LINK_NUMBERS.mass]
-    J = congruence(R, at6(f, numbers + m.LINK_NUMBERS.inertia))
-    spatial(w, m.OWN.row(h, i), mass, c, J)
-    a = add(at(w, frame + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, cross(omega, arm))))
+    frame, link, wrench = d.link_frames[i], d.link_numbers[i], d.wrench[i]
+    R, omega, alpha, mass = frame.axes, frame.omega, frame.alpha, link.mass
+    arm = turn(R, link.com)
+    c = add(frame.origin, arm)
+    J = congruence(R, at6(link.inertia, 0))
+    spatial(d.own[i], mass, c, J)
+    a = add(frame.acceleration, add(cross(alpha, arm), cross(omega, cross(omega, arm))))
     force = scale(mass, a)
     moment = add(turn_symmetric(J, alpha), cross(omega, turn_symmetric(J, omega)))
-    o = m.WRENCH.row(h, i)
-    put(w, o, add(moment, cross(c, force)))
-    put(w, o + 3, force)
+    wrench.moment, wrench.force = add(moment, cross(c, force)), force
 
 
 @kernel
-def kinetic_energy(h, f, w, i):
+def kinetic_energy(d, i):
     """Kinetic energy [J] of a rigid link."""
-    frame, numbers = m.LINK_FRAMES.row(h, i), m.LINK_NUMBERS.row(h, i)
-    R = at9(w, frame + m.FRAME.axes)
-    omega = at(w, frame + m.FRAME.omega)
-    v = add(at(w, frame + m.FRAME.velocity), cross(omega, turn(R, at(f, numbers + m.LINK_NUMBERS.com))))
-    J = congruence(R, at6(f, numbers + m.LINK_NUMBERS.inertia))
-    return 0.5 * (f[numbers + m.LINK_NUMBERS.mass] * dot(v, v) + dot(omega, turn_symmetric(J, omega)))
+    frame, link = d.link_frames[i], d.link_numbers[i]
+    R, omega = frame.axes, frame.omega
+    v = add(frame.velocity, cross(omega, turn(R, link.com)))
+    J = congruence(R, at6(link.inertia, 0))
+    return 0.5 * (link.mass * dot(v, v) + dot(omega, turn_symmetric(J, omega)))
 
 
 @kernel
-def carry(h, w, i, k):
+def carry(d, i, k):
     """Store the momentum of the subtree of link i moving with column k."""
-    I, s, o = m.INERTIA.row(h, i), m.COLUMNS.row(h, k), m.MOMENTA.row(h, k)
-    omega, v, c = at(w, s), at(w, s + 3), at(w, I + m.INERTIA.moment)
-    put(w, o, add(turn_symmetric(at6(w, I + m.INERTIA.inertia), omega), cross(c, v)))
-    put(w, o + 3, add(scale(w[I + m.INERTIA.mass], v), cross(omega, c)))
+    tree, column, momentum = d.inertia[i], d.columns[k], d.momenta[k]
+    omega, v, c = column.angular, column.linear, tree.moment
+    momentum.angular = add(turn_symmetric(at6(tree.inertia, 0), omega), cross(c, v))
+    momentum.linear = add(scale(tree.mass, v), cross(omega, c))
 
 
 @kernel
-def apply_wrench(h, w, s, moment, force):
+def apply_wrench(d, s, moment, force):
     """Apply a wrench (moment about the kernels' origin, force; world) on the link, and its modes, of site s."""
-    o = m.WRENCH.row(h, m.SITES.link(h, s))
-    accumulate(w, o, scale(-1.0, moment))
-    accumulate(w, o + 3, scale(-1.0, force))
-    p = m.SITES.port(h, s)
-    if p >= 0:
-        b = m.PORTS.flex(h, p)
-        held, first = m.FLEXES.n_held(h, b), m.PORTS.column(h, p)
-        bias = h[m.MODAL_BIAS] + m.FLEXES.c0(h, b) + held
-        for j in range(m.FLEXES.n_modes(h, b) - held):
-            o = m.COLUMNS.row(h, first + j)
-            w[bias + j] -= dot(at(w, o), moment) + dot(at(w, o + 3), force)
+    site = d.sites[s]
+    add_wrench(d.wrench[site.link], scale(-1.0, moment), scale(-1.0, force))
+    if site.port >= 0:
+        port = d.ports[site.port]
+        body = d.flexes[port.flex]
+        for j in range(body.n_modes - body.n_held):
+            column = d.columns[port.column + j]
+            d.modal_bias[body.c0 + body.n_held + j] -= dot(column.angular, moment) + dot(column.linear, force)

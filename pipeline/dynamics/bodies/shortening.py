@@ -15,35 +15,37 @@ International Journal for Numerical Methods in Engineering 32, 1833-1850.
 
 from __future__ import annotations
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel
-def _form(f, w, o, n, vector):
-    """A row of a form, from place o, times a vector in w."""
+def _form(numbers, o, n, vector, first):
+    """A row of a form, the n values of a table from row o on, times n entries of a stretch from `first` on."""
     total = 0.0
     for i in range(n):
-        total += f[o + i] * w[vector + i]
+        total += numbers[o + i].value * vector[first + i]
     return total
 
 
 @kernel
-def first_moment(h, f, w, k, j, vector):
-    """Row j of int rho B of body k, times a vector in w."""
-    n = m.FLEXES.n_modes(h, k)
-    return _form(f, w, h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + (14 + n + j) * n, n, vector)
+def first_moment(d, k, j, vector, first):
+    """Row j of int rho B of body k, times a stretch from `first` on."""
+    body = d.flexes[k]
+    n = body.n_modes
+    return _form(d.flex_data, body.data0 + (14 + n + j) * n, n, vector, first)
 
 
 @kernel
-def second_moment(h, f, w, k, j, vector):
-    """Row j of int rho x B of body k, times a vector in w."""
-    n = m.FLEXES.n_modes(h, k)
-    return _form(f, w, h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + (14 + 2 * n + j) * n, n, vector)
+def second_moment(d, k, j, vector, first):
+    """Row j of int rho x B of body k, times a stretch from `first` on."""
+    body = d.flexes[k]
+    n = body.n_modes
+    return _form(d.flex_data, body.data0 + (14 + 2 * n + j) * n, n, vector, first)
 
 
 @kernel
-def at_port(h, f, w, p, j, vector):
-    """Row j of B at port p, times a vector in w."""
-    n = m.FLEXES.n_modes(h, m.PORTS.flex(h, p))
-    return _form(f, w, h[m.PORT_DATA.place] + m.PORTS.shapes(h, p) + (6 + j) * n, n, vector)
+def at_port(d, p, j, vector, first):
+    """Row j of B at port p, times a stretch from `first` on."""
+    port = d.ports[p]
+    n = d.flexes[port.flex].n_modes
+    return _form(d.port_data, port.shapes + (6 + j) * n, n, vector, first)

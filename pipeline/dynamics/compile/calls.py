@@ -24,14 +24,14 @@ _INTEGERS, _FLOATS, _PLACE = types.CPointer(types.int64), types.CPointer(types.f
 _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
 _FLOAT, _INTEGER = types.float64, types.int64
 _TABLE = (_FLOATS, _INTEGER, _INTEGER)  #: a table of floats: its first entry, rows, columns
-#: C signatures. Of what compiled code calls: (h, f, w, n, t, y, dy), with tolerance; (h, w, y, retractment, out,
+#: C signatures. Of what compiled code calls: (h, f, w, n, t, y, dy), with tolerance; (h, f, w, n, y, retractment, out,
 #: total). Of what Python calls (`functions`): (h, f, w, n, rows, pieces with rows and columns, tolerance, out with its
 #: length); (h, f, w, n, t, repeat, outputs with their number, rows, events);
 #: (table, places, numbers, address of `stacks`' function)
 SIGNATURES = {
     "evaluate": types.int64(*_TABLES, types.float64, _PLACE, _PLACE),
     "project": types.int64(*_TABLES, types.float64, _PLACE, _PLACE, types.float64),
-    "retract": types.int64(_INTEGERS, _FLOATS, _PLACE, _PLACE, _PLACE, _PLACE),
+    "retract": types.int64(*_TABLES, _PLACE, _PLACE, _PLACE, _PLACE),
     "observe": types.int64(*_TABLES, *_TABLE, _INTEGERS, _INTEGER, _INTEGER, _FLOAT, _FLOATS, _INTEGER),
     "advance": types.int64(*_TABLES, _FLOAT, _INTEGER, _FLOATS, _INTEGER, *_TABLE, *_TABLE),
     "lanes": types.int64(_INTEGERS, _INTEGERS, _FLOATS, _INTEGER),
@@ -81,9 +81,9 @@ def evaluate(h, f, w, n, t, y, dy):
 
 
 @kernel
-def rates(h, f, w, n, t, y, dy):
+def rates(d, t, y, dy):
     """The right-hand side of which steps need only the rates."""
-    call(h[m.RATES], (h, f, w, n, float(t), y, dy))
+    call(d.h[m.RATES], (d.h, d.f, d.w, d.n, float(t), y, dy))
 
 
 @kernel
@@ -93,6 +93,6 @@ def project(h, f, w, n, t, y, dy, tolerance):
 
 
 @kernel
-def retract(h, w, y, retractment, out, total):
+def retract(d, y, retractment, out, total):
     """Positions after a retractment: `equations.retraction`."""
-    call(h[m.RETRACT], (h, w, y, retractment, out, total))
+    call(d.h[m.RETRACT], (d.h, d.f, d.w, d.n, y, retractment, out, total))

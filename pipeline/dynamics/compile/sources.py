@@ -168,20 +168,14 @@ def _events(imports: Imports, parts: Parts, scheme: Scheme) -> str:
     touching, chosen = parts.surfaces or parts.stops, not scheme.fixed
     if touching and not scheme.located:
         return _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
-    kinks = []
-    if parts.frictions and chosen:
-        kinks.append(_import(imports, f"{INTEGRATORS}.friction_kinks", "CONTACT_KINKS"))
-    if parts.joint_frictions and chosen:
-        kinks.append(_import(imports, f"{INTEGRATORS}.joint_friction_kinks", "BEARING_KINKS"))
-    if parts.load_kinks and chosen:
-        kinks.append(_import(imports, f"{INTEGRATORS}.load_kinks", "LOAD_FRICTION_KINKS"))
+    guarded = chosen and (parts.frictions or parts.joint_frictions or parts.load_kinks)
     if touching:
         located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
-        regimes = _import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")
-        return f"{located}({', '.join([regimes, *kinks])})"
-    if kinks:
-        return f"{_import(imports, f'{INTEGRATORS}.friction_kinks', 'kinks_alone')}({', '.join(kinks)})"
-    return ""
+        given = [_import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")]
+        if guarded:
+            given.append(_import(imports, f"{INTEGRATORS}.guards", "AMONG_CONTACTS"))
+        return f"{located}({', '.join(given)})"
+    return _import(imports, f"{INTEGRATORS}.guards", "GUARDS") if guarded else ""
 
 
 def _joints(parts: Parts) -> tuple[dict[str, str], Imports]:
@@ -284,8 +278,8 @@ def project(h, f, w, n, t, y, dy, tolerance):
     return projection(h, f, w, n, t, y, dy, tolerance)
 """
 RETRACT = """@calls.exported("retract")
-def retract(h, w, y, displacement, out, total):
-    retraction(h, w, y, displacement, out, total)
+def retract(h, f, w, n, y, displacement, out, total):
+    retraction(h, f, w, n, y, displacement, out, total)
     return 0
 """
 OBSERVE = """@calls.exported("observe")

@@ -9,38 +9,36 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies.rigid import apply_wrench
 from flexclear.pipeline.dynamics.contact.forces import make_normal_force
 from flexclear.pipeline.dynamics.gauge import counted
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import put, scale
+from flexclear.pipeline.dynamics.vectors import ZERO, scale
 
 
 def make_stops(forms: tuple[Any, ...]) -> Callable:
-    """The kernel stops(h, f, w, n) that applies all stops; forms: of normal forces, with `force` and `stored`."""
+    """The kernel stops(d) that applies all stops; forms: of normal forces, with `force` and `stored`."""
     normal_force = make_normal_force(forms)
 
     @kernel
-    def stop(h, f, w, n, c):
+    def stop(d, c):
         """Gap and rate of contact c, which is an end of a coordinate, and its force when it is closed."""
-        o, numbers = m.TOUCH.row(h, c), m.CONTACT_NUMBERS.row(h, c)
-        value, rate, moment, force = counted(h, w, m.CONTACTS.surfaces(h, c))
-        limit, sense = f[numbers + m.CONTACT_NUMBERS.shape], f[numbers + m.CONTACT_NUMBERS.shape + 1]
+        contact, numbers, touch = d.contacts[c], d.contact_numbers[c], d.touch[c]
+        value, rate, moment, force = counted(d, contact.surfaces)
+        limit, sense = numbers.shape[0], numbers.shape[1]
         gap = sense * (limit - value)
-        w[o + m.TOUCH.gap], w[o + m.TOUCH.rate] = gap, sense * rate
-        for k in range(m.TOUCH.normal_force, m.TOUCH.size):
-            w[o + k] = 0.0
-        w[o + m.TOUCH.offset] = f[numbers + m.CONTACT_NUMBERS.clearance] - gap
-        if n[n[m.MODE] + c] == 1:
-            size = -sense * normal_force(h, f, w, c)
-            put(w, o + m.TOUCH.force, scale(size, force))
-            apply_wrench(h, w, m.CONTACTS.inner(h, c), scale(size, moment), scale(size, force))
-            apply_wrench(h, w, m.CONTACTS.outer(h, c), scale(-size, moment), scale(-size, force))
+        touch.gap, touch.rate, touch.normal_force, touch.friction_power = gap, sense * rate, 0.0, 0.0
+        touch.damping_power, touch.stored, touch.bent, touch.slip = 0.0, 0.0, 0.0, 0.0
+        touch.force, touch.offset, touch.point = ZERO, (numbers.clearance - gap, 0.0, 0.0), ZERO
+        if d.mode[c] == 1:
+            size = -sense * normal_force(d, c)
+            touch.force = scale(size, force)
+            apply_wrench(d, contact.inner, scale(size, moment), scale(size, force))
+            apply_wrench(d, contact.outer, scale(-size, moment), scale(-size, force))
 
     @kernel
-    def stops(h, f, w, n):
-        for c in range(h[m.N_SURFACES], h[m.N_CONTACTS]):
-            stop(h, f, w, n, c)
+    def stops(d):
+        for c in range(d.n_surfaces, d.n_contacts):
+            stop(d, c)
 
     return stops

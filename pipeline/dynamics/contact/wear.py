@@ -14,35 +14,33 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.contact.forces import point_velocity, tangential
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import at, dot, scale, sub
+from flexclear.pipeline.dynamics.vectors import dot, scale, sub
 
 
 def wearing(contacts: Callable) -> Callable:
     """The kernel of the contacts that also books sliding distance and load path of those that wear."""
 
     @kernel
-    def wear(h, f, w, k):
+    def wear(d, k):
         """Rates of contact k among those that wear, which is closed: sliding speed, and normal force times it."""
-        c = m.WORN.contact(h, k)
-        o, numbers = m.TOUCH.row(h, c), m.CONTACT_NUMBERS.row(h, c)
-        outer, inner = m.SITE_FRAMES.row(h, m.CONTACTS.outer(h, c)), m.SITE_FRAMES.row(h, m.CONTACTS.inner(h, c))
-        point = at(w, o + m.TOUCH.point)
-        radius = f[numbers + m.CONTACT_NUMBERS.radius]
-        normal = scale(1.0 / radius, sub(point, at(w, inner + m.FRAME.origin)))
-        slip = tangential(normal, sub(point_velocity(w, inner, point), point_velocity(w, outer, point)))
-        speed, slots = np.sqrt(dot(slip, slip)), h[m.LEDGER_RATE] + h[m.WEAR_SLOT] + m.WEAR_LEDGER.size * k
-        w[slots + m.WEAR_LEDGER.sliding] = speed
-        w[slots + m.WEAR_LEDGER.load_path] = speed * w[o + m.TOUCH.normal_force]
+        c = d.worn[k].contact
+        contact, touch = d.contacts[c], d.touch[c]
+        outer, inner, point = d.site_frames[contact.outer], d.site_frames[contact.inner], touch.point
+        normal = scale(1.0 / d.contact_numbers[c].radius, sub(point, inner.origin))
+        slip = tangential(normal, sub(point_velocity(inner, point), point_velocity(outer, point)))
+        speed, slots = np.sqrt(dot(slip, slip)), d.wear_slot + m.WEAR_LEDGER.size * k
+        d.ledger_rate[slots + m.WEAR_LEDGER.sliding] = speed
+        d.ledger_rate[slots + m.WEAR_LEDGER.load_path] = speed * touch.normal_force
 
     @kernel
-    def wear_if_closed(h, f, w, n, k):
-        if n[n[m.MODE] + m.WORN.contact(h, k)] == 1:
-            wear(h, f, w, k)
+    def wear_if_closed(d, k):
+        if d.mode[d.worn[k].contact] == 1:
+            wear(d, k)
 
     @kernel
-    def with_wear(h, f, w, n):
-        contacts(h, f, w, n)
-        for k in range(h[m.N_WORN]):
-            wear_if_closed(h, f, w, n, k)
+    def with_wear(d):
+        contacts(d)
+        for k in range(d.n_worn):
+            wear_if_closed(d, k)
 
     return with_wear

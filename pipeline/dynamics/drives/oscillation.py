@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel
-def oscillate(h, f, w, law, piece, s):
-    """Add the harmonics of a piece, s seconds after its start, to the value and rates stored from `law`."""
-    first = m.PIECE_HARMONICS.harmonic0(h, piece)
-    for k in range(first, first + m.PIECE_HARMONICS.n_harmonics(h, piece)):
-        o = m.HARMONICS.row(h, k)
-        amplitude, omega = f[o + m.HARMONICS.amplitude], f[o + m.HARMONICS.frequency]
-        phase = omega * s + f[o + m.HARMONICS.phase]
+def oscillate(d, k, piece, s):
+    """Add the harmonics of a piece, s seconds after its start, to value and rates of law k."""
+    law, its = d.law[k], d.piece_harmonics[piece]
+    for i in range(its.harmonic0, its.harmonic0 + its.n_harmonics):
+        harmonic = d.harmonics[i]
+        amplitude, omega = harmonic.amplitude, harmonic.frequency
+        phase = omega * s + harmonic.phase
         sine = amplitude * np.sin(phase)
-        w[law] += sine
-        w[law + 1] += amplitude * omega * np.cos(phase)
-        w[law + 2] -= omega * omega * sine
+        law.value += sine
+        law.rate += amplitude * omega * np.cos(phase)
+        law.second_rate -= omega * omega * sine

@@ -15,266 +15,260 @@ rows of a closure come first among its rows, the residuals of all are known (`as
 from __future__ import annotations
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations.envelope import backward, base, factor, forward
+from flexclear.pipeline.dynamics.equations.envelope import backward, factor, forward
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import ZERO, accumulate, add, at, at9, axis, cross, dot, dot6, put, scale, sub
+from flexclear.pipeline.dynamics.vectors import ZERO, accumulate, add, at, axis, cross, dot, dot_wrench, put, scale, sub
 
 #: pivots of J M^-1 J^T below this share of their diagonal mean a singular configuration
 SINGULAR_PIVOT = 1e-13
 
 
 @kernel
-def rows(h, w, c):
+def rows(d, c):
     """Wrenches, residuals [m or -], their rates, and acceleration biases of closure c."""
-    a, b = m.SITE_FRAMES.row(h, m.CLOSURES.site_a(h, c)), m.SITE_FRAMES.row(h, m.CLOSURES.site_b(h, c))
-    A, B = at9(w, a + m.FRAME.axes), at9(w, b + m.FRAME.axes)
-    omega_a, omega_b = at(w, a + m.FRAME.omega), at(w, b + m.FRAME.omega)
-    p_b = at(w, b + m.FRAME.origin)
-    r = sub(p_b, at(w, a + m.FRAME.origin))
-    slide = sub(sub(at(w, b + m.FRAME.velocity), at(w, a + m.FRAME.velocity)), cross(omega_a, r))
-    bias = sub(
-        sub(at(w, b + m.FRAME.acceleration), at(w, a + m.FRAME.acceleration)), cross(at(w, a + m.FRAME.alpha), r)
-    )
+    closure = d.closures[c]
+    a, b = d.site_frames[closure.site_a], d.site_frames[closure.site_b]
+    A, B, omega_a, omega_b, p_b = a.axes, b.axes, a.omega, b.omega, b.origin
+    r = sub(p_b, a.origin)
+    slide = sub(sub(b.velocity, a.velocity), cross(omega_a, r))
+    bias = sub(sub(b.acceleration, a.acceleration), cross(a.alpha, r))
     bias = sub(bias, add(cross(omega_a, cross(omega_a, r)), scale(2.0, cross(omega_a, slide))))
-    turning, turning_rate = sub(omega_b, omega_a), sub(at(w, b + m.FRAME.alpha), at(w, a + m.FRAME.alpha))
-    first = m.CLOSURES.row0(h, c)
-    for k in range(first, first + m.CLOSURES.n_rows(h, c)):
-        o, along = m.ROWS.row(h, k), axis(A, m.CLOSURE_ROWS.a(h, k))
-        if m.CLOSURE_ROWS.kind(h, k) == 0:
-            put(w, o, cross(p_b, along))
-            put(w, o + 3, along)
-            w[h[m.RESIDUAL] + k] = dot(along, r)
-            w[h[m.RESIDUAL_RATE] + k] = dot(along, slide)
-            w[h[m.GAMMA] + k] = -dot(along, bias)
+    turning, turning_rate = sub(omega_b, omega_a), sub(b.alpha, a.alpha)
+    for k in range(closure.row0, closure.row0 + closure.n_rows):
+        row, wrench = d.closure_rows[k], d.rows[k]
+        along = axis(A, row.a)
+        if row.kind == 0:
+            wrench.moment, wrench.force = cross(p_b, along), along
+            d.residual[k] = dot(along, r)
+            d.residual_rate[k] = dot(along, slide)
+            d.gamma[k] = -dot(along, bias)
         else:
-            against = axis(B, m.CLOSURE_ROWS.b(h, k))
+            against = axis(B, row.b)
             about = cross(against, along)
             swing = add(cross(cross(omega_b, against), along), cross(against, cross(omega_a, along)))
-            put(w, o, about)
-            put(w, o + 3, (0.0, 0.0, 0.0))
-            w[h[m.RESIDUAL] + k] = dot(along, against)
-            w[h[m.RESIDUAL_RATE] + k] = dot(turning, about)
-            w[h[m.GAMMA] + k] = -dot(turning_rate, about) - dot(turning, swing)
+            wrench.moment, wrench.force = about, ZERO
+            d.residual[k] = dot(along, against)
+            d.residual_rate[k] = dot(turning, about)
+            d.gamma[k] = -dot(turning_rate, about) - dot(turning, swing)
 
 
 @kernel
-def at_some(w, i, count):
-    """The first `count` entries of a vector stored from place i, zeros for those that are not there."""
-    return (w[i], w[i + 1] if count > 1 else 0.0, w[i + 2] if count > 2 else 0.0)
+def at_some(a, i, count):
+    """The first `count` entries of a vector stored from index i, zeros for those that are not there."""
+    return (a[i], a[i + 1] if count > 1 else 0.0, a[i + 2] if count > 2 else 0.0)
 
 
 @kernel
-def put_some(w, i, v, count):
-    """Store the first `count` entries of a vector from place i."""
-    w[i] = v[0]
+def put_some(a, i, v, count):
+    """Store the first `count` entries of a vector from index i."""
+    a[i] = v[0]
     if count > 1:
-        w[i + 1] = v[1]
+        a[i + 1] = v[1]
     if count > 2:
-        w[i + 2] = v[2]
+        a[i + 2] = v[2]
 
 
 @kernel
-def three(h, stored, c, t):
-    """Where JACOBIAN or SPREAD (`stored`) keeps the t-th three rows of closure c: slot after slot, side by side."""
-    return h[stored] + m.CLOSURES.jacobian0(h, c) + 3 * t * m.CLOSURES.n_support(h, c)
+def three(closure, t):
+    """Index in JACOBIAN or SPREAD of the t-th three rows of a closure: slot after slot, side by side."""
+    return closure.jacobian0 + 3 * t * closure.n_support
 
 
 @kernel
-def jacobian(h, w, c):
+def jacobian(d, c):
     """J^T of closure c on its support."""
-    count, wrenches, first = m.CLOSURES.n_kept(h, c), m.ROWS.row(h, m.CLOSURES.row0(h, c)), m.CLOSURES.entry0(h, c)
-    for t in range(m.CLOSURES.threes(h, c)):
-        start, o, second, third = three(h, m.JACOBIAN, c, t), wrenches + 18 * t, 3 * t + 1 < count, 3 * t + 2 < count
-        for k in range(start, start + 3 * m.CLOSURES.n_support(h, c)):
-            w[k] = 0.0
-        moment0, force0 = at(w, o), at(w, o + 3)
-        moment1, force1 = at(w, o + 6) if second else ZERO, at(w, o + 9) if second else ZERO
-        moment2, force2 = at(w, o + 12) if third else ZERO, at(w, o + 15) if third else ZERO
-        for e in range(first, first + m.CLOSURES.n_entries(h, c)):
-            col, sign = m.COLUMNS.row(h, m.ENTRIES.column(h, e)), float(m.ENTRIES.sign(h, e))
-            angular, linear = at(w, col), at(w, col + 3)
+    closure = d.closures[c]
+    for t in range(closure.threes):
+        start, k = three(closure, t), closure.row0 + 3 * t
+        second, third = 3 * t + 1 < closure.n_kept, 3 * t + 2 < closure.n_kept
+        for e in range(start, start + 3 * closure.n_support):
+            d.jacobian[e] = 0.0
+        moment0, force0 = d.rows[k].moment, d.rows[k].force
+        moment1, force1 = d.rows[k + 1].moment if second else ZERO, d.rows[k + 1].force if second else ZERO
+        moment2, force2 = d.rows[k + 2].moment if third else ZERO, d.rows[k + 2].force if third else ZERO
+        for e in range(closure.entry0, closure.entry0 + closure.n_entries):
+            entry = d.entries[e]
+            column = d.columns[entry.column]
             share = (
-                dot(moment0, angular) + dot(force0, linear),
-                dot(moment1, angular) + dot(force1, linear),
-                dot(moment2, angular) + dot(force2, linear),
+                dot(moment0, column.angular) + dot(force0, column.linear),
+                dot(moment1, column.angular) + dot(force1, column.linear),
+                dot(moment2, column.angular) + dot(force2, column.linear),
             )
-            accumulate(w, start + 3 * m.ENTRIES.slot(h, e), scale(sign, share))
+            accumulate(d.jacobian, start + 3 * entry.slot, scale(float(entry.sign), share))
 
 
 @kernel
-def spread(h, w, c):
+def spread(d, c):
     """L^-1 J^T of closure c, laid out like J^T."""
-    size, support = m.CLOSURES.n_support(h, c), m.CLOSURES.support0(h, c)
-    for t in range(m.CLOSURES.threes(h, c)):
-        J, S = three(h, m.JACOBIAN, c, t), three(h, m.SPREAD, c, t)
-        for a in range(size):
-            i = m.SUPPORT.coordinate(h, support + a)
-            first, row, value = m.ENVELOPE.first(h, i), base(h, h[m.ENVELOPE.place], h[m.MASS], i), at(w, J + 3 * a)
+    closure = d.closures[c]
+    for t in range(closure.threes):
+        start = three(closure, t)
+        for a in range(closure.n_support):
+            i = d.support[closure.support0 + a].coordinate
+            first, row, value = d.envelope[i].first, d.envelope[i].origin, at(d.jacobian, start + 3 * a)
             for b in range(a - 1, -1, -1):
-                k = m.SUPPORT.coordinate(h, support + b)
+                k = d.support[closure.support0 + b].coordinate
                 if k < first:
                     break  # in increasing order
-                value = sub(value, scale(w[row + k], at(w, S + 3 * b)))
-            put(w, S + 3 * a, scale(w[row + i], value))
+                value = sub(value, scale(d.mass[row + k], at(d.spread, start + 3 * b)))
+            put(d.spread, start + 3 * a, scale(d.mass[row + i], value))
 
 
 @kernel
-def put_couplings(h, w, row, column, values, count):
+def put_couplings(d, row, column, values, count):
     """The first `count` of three entries of J M^-1 J^T."""
-    put_some(w, base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], row) + column, values, count)
+    put_some(d.schur, d.closure_envelope[row].origin + column, values, count)
 
 
 @kernel
-def couple(h, w, p):
+def couple(d, p):
     """The block of J M^-1 J^T between the closures of pair p, three by three entries after the other."""
-    a, b, common = m.CLOSURE_PAIRS.a(h, p), m.CLOSURE_PAIRS.b(h, p), m.CLOSURE_PAIRS.common0(h, p)
-    for t in range(m.CLOSURES.threes(h, b)):
-        right = three(h, m.SPREAD, b, t)
-        row, rows = m.CLOSURES.kept0(h, b) + 3 * t, m.CLOSURES.n_kept(h, b) - 3 * t
-        for u in range(t + 1 if a == b else m.CLOSURES.threes(h, a)):
-            left, first, second, third = three(h, m.SPREAD, a, u), ZERO, ZERO, ZERO
-            for k in range(common, common + m.CLOSURE_PAIRS.n_common(h, p)):
-                values, factors = at(w, left + 3 * m.COMMON.a(h, k)), at(w, right + 3 * m.COMMON.b(h, k))
+    pair = d.closure_pairs[p]
+    a, b = d.closures[pair.a], d.closures[pair.b]
+    for t in range(b.threes):
+        right, row, rows = three(b, t), b.kept0 + 3 * t, b.n_kept - 3 * t
+        for u in range(t + 1 if pair.a == pair.b else a.threes):
+            left, first, second, third = three(a, u), ZERO, ZERO, ZERO
+            for k in range(pair.common0, pair.common0 + pair.n_common):
+                slots = d.common[k]
+                values, factors = at(d.spread, left + 3 * slots.a), at(d.spread, right + 3 * slots.b)
                 first = add(first, scale(factors[0], values))
                 second = add(second, scale(factors[1], values))
                 third = add(third, scale(factors[2], values))
-            column, columns, diagonal = (
-                m.CLOSURES.kept0(h, a) + 3 * u,
-                m.CLOSURES.n_kept(h, a) - 3 * u,
-                a == b and t == u,
-            )
-            put_couplings(h, w, row, column, first, 1 if diagonal else columns)
+            column, columns, diagonal = a.kept0 + 3 * u, a.n_kept - 3 * u, pair.a == pair.b and t == u
+            put_couplings(d, row, column, first, 1 if diagonal else columns)
             if rows > 1:
-                put_couplings(h, w, row + 1, column, second, 2 if diagonal else columns)
+                put_couplings(d, row + 1, column, second, 2 if diagonal else columns)
             if rows > 2:
-                put_couplings(h, w, row + 2, column, third, 3 if diagonal else columns)
+                put_couplings(d, row + 2, column, third, 3 if diagonal else columns)
 
 
 @kernel
-def complete(h, w, n):
+def complete(d):
     """The factor of J M^-1 J^T, of Jacobians that are there; needs the factor of M."""
-    for c in range(h[m.N_CLOSURES]):
-        spread(h, w, c)
-    for k in range(h[m.SCHUR], h[m.SCHUR] + h[m.SCHUR_SIZE]):
-        w[k] = 0.0
-    for p in range(h[m.N_CLOSURE_PAIRS]):
-        couple(h, w, p)
-    for r in range(h[m.N_KEPT_ROWS]):
-        size = w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r]
-        w[h[m.ROW_SCALE] + h[m.N_CLOSURE_ROWS] + r] = size
-    sound = factor(h, h[m.CLOSURE_ENVELOPE.place], w, h[m.SCHUR], h[m.N_KEPT_ROWS], SINGULAR_PIVOT)
-    pivot = independence(h, w) if sound else 0.0
-    w[h[m.PIVOT] + m.LAST_PIVOT] = pivot
-    n[m.EVALUATION] = m.OK if pivot > SINGULAR_PIVOT else m.SINGULAR
+    for c in range(d.n_closures):
+        spread(d, c)
+    for k in range(d.schur_size):
+        d.schur[k] = 0.0
+    for p in range(d.n_closure_pairs):
+        couple(d, p)
+    for r in range(d.n_kept_rows):
+        d.row_scale[d.n_closure_rows + r] = d.schur[d.closure_envelope[r].origin + r]
+    sound = factor(d.h, d.h[m.CLOSURE_ENVELOPE.place], d.w, d.h[m.SCHUR], d.n_kept_rows, SINGULAR_PIVOT)
+    pivot = independence(d) if sound else 0.0
+    d.pivot[m.LAST_PIVOT] = pivot
+    d.evaluation = m.OK if pivot > SINGULAR_PIVOT else m.SINGULAR
 
 
 @kernel
-def independence(h, w):
+def independence(d):
     """Smallest pivot of J M^-1 J^T as share of the largest that its row's diagonal entry has been on the way."""
     most = 1.0
-    for r in range(h[m.N_KEPT_ROWS]):
-        inverse = w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r]
-        o = h[m.ROW_SCALE] + r
-        most = max(most, inverse * inverse * max(w[o], w[o + h[m.N_CLOSURE_ROWS]]))
+    for r in range(d.n_kept_rows):
+        inverse = d.schur[d.closure_envelope[r].origin + r]
+        most = max(most, inverse * inverse * max(d.row_scale[r], d.row_scale[d.n_closure_rows + r]))
     return 1.0 / most
 
 
 @kernel
-def add_spread(h, w, y, weight):
+def add_spread(d, y, weight):
     """Y <- y + weight L^-1 J^T lambda, y in w."""
-    for c in range(h[m.N_CLOSURES]):
-        support, first = m.CLOSURES.support0(h, c), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
-        for t in range(m.CLOSURES.threes(h, c)):
-            S, forces = three(h, m.SPREAD, c, t), at_some(w, first + 3 * t, m.CLOSURES.n_kept(h, c) - 3 * t)
-            forces = scale(weight, forces)
-            for a in range(m.CLOSURES.n_support(h, c)):
-                w[y + m.SUPPORT.coordinate(h, support + a)] += dot(forces, at(w, S + 3 * a))
+    for c in range(d.n_closures):
+        closure = d.closures[c]
+        for t in range(closure.threes):
+            start = three(closure, t)
+            forces = scale(weight, at_some(d.multiplier, closure.kept0 + 3 * t, closure.n_kept - 3 * t))
+            for a in range(closure.n_support):
+                k = d.support[closure.support0 + a].coordinate
+                d.w[y + k] += dot(forces, at(d.spread, start + 3 * a))
 
 
 @kernel
-def take_spread(h, w, y):
+def take_spread(d, y):
     """Lambda <- lambda - (L^-1 J^T)^T y, y in w."""
-    for c in range(h[m.N_CLOSURES]):
-        support, first = m.CLOSURES.support0(h, c), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
-        for t in range(m.CLOSURES.threes(h, c)):
-            S, count = three(h, m.SPREAD, c, t), m.CLOSURES.n_kept(h, c) - 3 * t
-            total = at_some(w, first + 3 * t, count)
-            for a in range(m.CLOSURES.n_support(h, c)):
-                total = sub(total, scale(w[y + m.SUPPORT.coordinate(h, support + a)], at(w, S + 3 * a)))
-            put_some(w, first + 3 * t, total, count)
+    for c in range(d.n_closures):
+        closure = d.closures[c]
+        for t in range(closure.threes):
+            start, first, count = three(closure, t), closure.kept0 + 3 * t, closure.n_kept - 3 * t
+            total = at_some(d.multiplier, first, count)
+            for a in range(closure.n_support):
+                k = d.support[closure.support0 + a].coordinate
+                total = sub(total, scale(d.w[y + k], at(d.spread, start + 3 * a)))
+            put_some(d.multiplier, first, total, count)
 
 
 @kernel
-def gather_rows(h, w, values):
+def gather_rows(d, values):
     """The kept ones of the rows' values from w[values] on, as a right-hand side for the multipliers."""
-    for c in range(h[m.N_CLOSURES]):
-        row, kept = values + m.CLOSURES.row0(h, c), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
-        for k in range(m.CLOSURES.n_kept(h, c)):
-            w[kept + k] = w[row + k]
+    for c in range(d.n_closures):
+        closure = d.closures[c]
+        for k in range(closure.n_kept):
+            d.multiplier[closure.kept0 + k] = d.w[values + closure.row0 + k]
 
 
 @kernel
-def solve(h, w):
+def solve(d):
     """Multipliers from their right-hand side, in place."""
-    forward(h, h[m.CLOSURE_ENVELOPE.place], w, h[m.SCHUR], h[m.N_KEPT_ROWS], h[m.MULTIPLIER])
-    backward(h, h[m.CLOSURE_ENVELOPE.place], w, h[m.SCHUR], h[m.N_KEPT_ROWS], h[m.MULTIPLIER])
+    forward(d.h, d.h[m.CLOSURE_ENVELOPE.place], d.w, d.h[m.SCHUR], d.n_kept_rows, d.h[m.MULTIPLIER])
+    backward(d.h, d.h[m.CLOSURE_ENVELOPE.place], d.w, d.h[m.SCHUR], d.n_kept_rows, d.h[m.MULTIPLIER])
 
 
 @kernel
-def respond(h, w):
+def respond(d):
     """Multipliers of what is asked of the rows (there, in place) and of FORCE, which holds L^-1 f and is completed by
     them: L^-T then gives the accelerations."""
-    take_spread(h, w, h[m.FORCE])
-    solve(h, w)
-    add_spread(h, w, h[m.FORCE], 1.0)
+    take_spread(d, d.h[m.FORCE])
+    solve(d)
+    add_spread(d, d.h[m.FORCE], 1.0)
 
 
 @kernel
-def finish(h, w):
+def finish(d):
     """Multipliers of the rows' biases and of FORCE; see `respond`."""
-    gather_rows(h, w, h[m.GAMMA])
-    respond(h, w)
+    gather_rows(d, d.h[m.GAMMA])
+    respond(d)
 
 
 @kernel
-def close(h, f, w, n):
+def close(d):
     """Rows, Jacobians and multipliers of all closures; see `finish`."""
-    for c in range(h[m.N_CLOSURES]):
-        rows(h, w, c)
-        jacobian(h, w, c)
-    complete(h, w, n)
-    if n[m.EVALUATION] == m.OK:
-        finish(h, w)
+    for c in range(d.n_closures):
+        rows(d, c)
+        jacobian(d, c)
+    complete(d)
+    if d.evaluation == m.OK:
+        finish(d)
 
 
 @kernel
-def take_share(h, w, e, wrenches):
+def take_share(d, e, first):
     """Take what a closure's multipliers do along one known column (entry e) out of its drive's force.
 
-    wrenches: place of those of the closure's kept rows in w.
+    first: of the wrenches of the closure's kept rows.
     """
-    c, d, sign = m.KNOWN_ENTRIES.closure(h, e), m.KNOWN_ENTRIES.drive(h, e), m.KNOWN_ENTRIES.sign(h, e)
-    col, first = m.COLUMNS.row(h, m.KNOWN_ENTRIES.column(h, e)), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
-    for k in range(m.CLOSURES.n_kept(h, c)):
-        w[h[m.DRIVE_FORCE] + d] -= sign * dot6(w, wrenches + 6 * k, w, col) * w[first + k]
+    known = d.known_entries[e]
+    closure, column = d.closures[known.closure], d.columns[known.column]
+    for k in range(closure.n_kept):
+        wrench, size = d.rows[first + k], d.multiplier[closure.kept0 + k]
+        d.drive_force[known.drive] -= known.sign * dot_wrench(wrench, column) * size
 
 
 @kernel
-def known_forces(h, w):
+def known_forces(d):
     """Take the closures' share out of the forces that the drives must supply."""
-    for e in range(h[m.N_KNOWN_ENTRIES]):
-        take_share(h, w, e, m.ROWS.row(h, m.CLOSURES.row0(h, m.KNOWN_ENTRIES.closure(h, e))))
+    for e in range(d.n_known_entries):
+        take_share(d, e, d.closures[d.known_entries[e].closure].row0)
 
 
 @kernel
-def correction(h, w, residual, step):
+def correction(d, residual, step):
     """The least correction of the coordinates, in the metric of M, that undoes a residual.
 
     step <- -M^-1 J^T (J M^-1 J^T)^-1 residual, both places in w, with the factors of `complete`.
     """
-    gather_rows(h, w, residual)
-    solve(h, w)
-    for k in range(h[m.NV]):
-        w[step + k] = 0.0
-    add_spread(h, w, step, -1.0)
-    backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], step)
+    gather_rows(d, residual)
+    solve(d)
+    for k in range(d.nv):
+        d.w[step + k] = 0.0
+    add_spread(d, step, -1.0)
+    backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, step)

@@ -13,85 +13,81 @@ from flexclear.pipeline.dynamics.equations import closures
 from flexclear.pipeline.dynamics.equations.closures import complete, finish
 from flexclear.pipeline.dynamics.gauge import bias, counted
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import accumulate, at, dot6, put, scale
+from flexclear.pipeline.dynamics.vectors import add_wrench, dot_wrench, scale
 
 correction = closures.correction
 
 
 @kernel
-def wrench_row(h, c, part):
-    """Where the wrench of coupling c on its second joint stands (part 0), and that on its first one (part 1)."""
-    return m.ROWS.row(h, m.CLOSURES.row0(h, c) if part == 0 else h[m.N_CLOSURE_ROWS] + m.CLOSURES.coupling(h, c))
+def wrench_row(d, c, part):
+    """Row of ROWS with the wrench of coupling c on its second joint (part 0), or on its first one (part 1)."""
+    return d.closures[c].row0 if part == 0 else d.n_closure_rows + d.closures[c].coupling
 
 
 @kernel
-def row(h, f, w, c):
+def row(d, c):
     """Wrenches, residual, its rate, and acceleration bias of coupling c."""
-    g, k = m.CLOSURES.coupling(h, c), m.CLOSURES.row0(h, c)
-    numbers = m.COUPLING_NUMBERS.row(h, g)
-    ratio, offset = f[numbers + m.COUPLING_NUMBERS.ratio], f[numbers + m.COUPLING_NUMBERS.offset]
-    first, second = m.COUPLINGS.first(h, g), m.COUPLINGS.second(h, g)
-    q1, u1, moment1, force1 = counted(h, w, first)
-    q2, u2, moment2, force2 = counted(h, w, second)
-    put(w, wrench_row(h, c, 0), moment2)
-    put(w, wrench_row(h, c, 0) + 3, force2)
-    put(w, wrench_row(h, c, 1), scale(-ratio, moment1))
-    put(w, wrench_row(h, c, 1) + 3, scale(-ratio, force1))
-    w[h[m.RESIDUAL] + k] = q2 - ratio * q1 - offset
-    w[h[m.RESIDUAL_RATE] + k] = u2 - ratio * u1
-    w[h[m.GAMMA] + k] = ratio * bias(h, w, first) - bias(h, w, second)
+    closure = d.closures[c]
+    coupling, numbers, k = d.couplings[closure.coupling], d.coupling_numbers[closure.coupling], closure.row0
+    ratio, on_second, on_first = numbers.ratio, d.rows[wrench_row(d, c, 0)], d.rows[wrench_row(d, c, 1)]
+    q1, u1, moment1, force1 = counted(d, coupling.first)
+    q2, u2, moment2, force2 = counted(d, coupling.second)
+    on_second.moment, on_second.force = moment2, force2
+    on_first.moment, on_first.force = scale(-ratio, moment1), scale(-ratio, force1)
+    d.residual[k] = q2 - ratio * q1 - numbers.offset
+    d.residual_rate[k] = u2 - ratio * u1
+    d.gamma[k] = ratio * bias(d, coupling.first) - bias(d, coupling.second)
 
 
 @kernel
-def jacobian(h, w, c):
+def jacobian(d, c):
     """J^T of coupling c on its support, if it is solved for."""
-    start = h[m.JACOBIAN] + m.CLOSURES.jacobian0(h, c)
-    if m.CLOSURES.n_kept(h, c) == 0:
+    closure = d.closures[c]
+    start = closure.jacobian0
+    if closure.n_kept == 0:
         return
-    for k in range(start, start + 3 * m.CLOSURES.n_support(h, c)):
-        w[k] = 0.0
-    first = m.CLOSURES.entry0(h, c)
-    for e in range(first, first + m.CLOSURES.n_entries(h, c)):
-        col, o = m.COLUMNS.row(h, m.ENTRIES.column(h, e)), wrench_row(h, c, m.ENTRIES.part(h, e))
-        w[start + 3 * m.ENTRIES.slot(h, e)] += m.ENTRIES.sign(h, e) * dot6(w, o, w, col)
+    for k in range(start, start + 3 * closure.n_support):
+        d.jacobian[k] = 0.0
+    for e in range(closure.entry0, closure.entry0 + closure.n_entries):
+        entry = d.entries[e]
+        wrench = d.rows[wrench_row(d, c, entry.part)]
+        d.jacobian[start + 3 * entry.slot] += entry.sign * dot_wrench(wrench, d.columns[entry.column])
 
 
 @kernel
-def close(h, f, w, n):
+def close(d):
     """See `closures.close`."""
-    for c in range(h[m.N_CLOSURES]):
-        if m.CLOSURES.coupling(h, c) < 0:
-            closures.rows(h, w, c)
-            closures.jacobian(h, w, c)
+    for c in range(d.n_closures):
+        if d.closures[c].coupling < 0:
+            closures.rows(d, c)
+            closures.jacobian(d, c)
         else:
-            row(h, f, w, c)
-            jacobian(h, w, c)
-    complete(h, w, n)
-    if n[m.EVALUATION] == m.OK:
-        finish(h, w)
+            row(d, c)
+            jacobian(d, c)
+    complete(d)
+    if d.evaluation == m.OK:
+        finish(d)
 
 
 @kernel
-def known_forces(h, w):
+def known_forces(d):
     """See `closures.known_forces`."""
-    for e in range(h[m.N_KNOWN_ENTRIES]):
-        c = m.KNOWN_ENTRIES.closure(h, e)
-        o = m.ROWS.row(h, m.CLOSURES.row0(h, c))
-        if m.CLOSURES.coupling(h, c) >= 0:
-            o = wrench_row(h, c, m.KNOWN_ENTRIES.part(h, e))
-        closures.take_share(h, w, e, o)
+    for e in range(d.n_known_entries):
+        c = d.known_entries[e].closure
+        first = d.closures[c].row0
+        if d.closures[c].coupling >= 0:
+            first = wrench_row(d, c, d.known_entries[e].part)
+        closures.take_share(d, e, first)
 
 
 @kernel
-def take_off_first_joints(h, w):
+def take_off_first_joints(d):
     """Take what couplings do to their first joints off the links that they act on."""
-    for c in range(h[m.N_CLOSURES]):
-        g = m.CLOSURES.coupling(h, c)
-        if g >= 0 and m.CLOSURES.n_kept(h, c) > 0:
-            size, o = w[h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)], wrench_row(h, c, 1)
-            first = m.COUPLINGS.first(h, g)
-            a = m.WRENCH.row(h, m.SITES.link(h, m.GAUGES.a(h, first)))
-            b = m.WRENCH.row(h, m.SITES.link(h, m.GAUGES.b(h, first)))
-            for half in range(0, 6, 3):
-                accumulate(w, b + half, scale(-size, at(w, o + half)))
-                accumulate(w, a + half, scale(size, at(w, o + half)))
+    for c in range(d.n_closures):
+        closure = d.closures[c]
+        if closure.coupling >= 0 and closure.n_kept > 0:
+            size, wrench = d.multiplier[closure.kept0], d.rows[wrench_row(d, c, 1)]
+            gauge = d.gauges[d.couplings[closure.coupling].first]
+            a, b = d.wrench[d.sites[gauge.a].link], d.wrench[d.sites[gauge.b].link]
+            add_wrench(b, scale(-size, wrench.moment), scale(-size, wrench.force))
+            add_wrench(a, scale(size, wrench.moment), scale(size, wrench.force))

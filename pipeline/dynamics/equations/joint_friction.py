@@ -41,13 +41,12 @@ from flexclear.pipeline.dynamics.vectors import (
     ZERO,
     accumulate,
     add,
+    add_wrench,
     at,
     at6,
-    at9,
     axis,
     cross,
     dot,
-    dot6,
     put,
     scale,
     sub,
@@ -65,156 +64,153 @@ SINGULAR_SLOPES = 1e-12
 
 
 @kernel
-def bearing_axis(h, w, e):
-    """Unit vector along bearing e, world axes."""
-    j = m.BEARINGS.joint(h, e)
-    site = m.RUBBING.site_a(h, j) if m.BEARINGS.side(h, e) == 0 else m.RUBBING.site_b(h, j)
-    return axis(at9(w, m.SITE_FRAMES.row(h, site) + m.FRAME.axes), m.BEARINGS.axis(h, e))
+def bearing_frame(d, e):
+    """Frame that carries the axis of bearing e."""
+    bearing = d.bearings[e]
+    joint = d.rubbing[bearing.joint]
+    return d.site_frames[joint.site_a if bearing.side == 0 else joint.site_b]
 
 
 @kernel
-def relative_twist(h, w, j):
-    """Angular velocity of the second frame of joint j against the first, and velocity of its origin there."""
-    a, b = m.SITE_FRAMES.row(h, m.RUBBING.site_a(h, j)), m.SITE_FRAMES.row(h, m.RUBBING.site_b(h, j))
-    omega, r = at(w, a + m.FRAME.omega), sub(at(w, b + m.FRAME.origin), at(w, a + m.FRAME.origin))
-    slide = sub(at(w, b + m.FRAME.velocity), add(at(w, a + m.FRAME.velocity), cross(omega, r)))
-    return sub(at(w, b + m.FRAME.omega), omega), slide
+def bearing_axis(d, e):
+    """Unit vector along bearing e, world axes."""
+    return axis(bearing_frame(d, e).axes, d.bearings[e].axis)
+
+
+@kernel
+def relative_twist(a, b):
+    """Angular velocity of frame b against frame a, and velocity of its origin there."""
+    omega, r = a.omega, sub(b.origin, a.origin)
+    slide = sub(b.velocity, add(a.velocity, cross(omega, r)))
+    return sub(b.omega, omega), slide
 
 
 def make_unit_wrench(traction: Callable) -> Callable:
-    """The kernel unit_wrench(h, f, w, n, e) that writes BEARING: friction of bearing e per normal force."""
+    """The kernel unit_wrench(d, e) that writes BEARING: friction of bearing e per normal force."""
 
     @kernel
-    def unit_wrench(h, f, w, n, e):
-        o, numbers, j = m.BEARING.row(h, e), m.BEARING_NUMBERS.row(h, e), m.BEARINGS.joint(h, e)
-        kind, radius, along = m.BEARINGS.kind(h, e), f[numbers + m.BEARING_NUMBERS.radius], bearing_axis(h, w, e)
-        turning, sliding = relative_twist(h, w, j)
-        a, b = m.SITE_FRAMES.row(h, m.RUBBING.site_a(h, j)), m.SITE_FRAMES.row(h, m.RUBBING.site_b(h, j))
-        axes = at9(w, a + m.FRAME.axes)
+    def unit_wrench(d, e):
+        bearing, numbers, now = d.bearings[e], d.bearing_numbers[e], d.bearing[e]
+        joint, kind, radius, along = d.rubbing[bearing.joint], bearing.kind, numbers.radius, bearing_axis(d, e)
+        a, b = d.site_frames[joint.site_a], d.site_frames[joint.site_b]
+        turning, sliding = relative_twist(a, b)
+        axes = a.axes
         if kind == BALL:
             slip = turn_back(axes, scale(radius, turning))
         else:
             forth = dot(along, sliding) if kind != PIN else 0.0
             slip = (forth, radius * dot(along, turning) if kind != SLIDER else 0.0, 0.0)
-        place, z = m.BEARINGS.bristle(h, e), ZERO
-        if place >= 0:
-            z = at(w, n[m.STATE] + place)
-        p = numbers + m.BEARING_NUMBERS.law
-        law = (f[p], f[p + 1], f[p + 2], f[p + 3], f[p + 4], f[p + 5])
-        force, _, _, z_rate = traction(m.BEARINGS.law(h, e), z, slip, 1.0, law)
-        if place >= 0:
-            put(w, h[m.LEDGER_RATE] + place - h[m.NQ] - h[m.NV], z_rate)
+        z = ZERO
+        if bearing.bristle >= 0:
+            z = at(d.w, d.state + bearing.bristle)
+        force, _, _, z_rate = traction(bearing.law, z, slip, 1.0, numbers.law)
+        if bearing.bristle >= 0:
+            put(d.ledger_rate, bearing.bristle - d.nq - d.nv, z_rate)
         push, moment = ZERO, ZERO
         if kind == BALL:
             moment = scale(radius, turn(axes, force))
         else:
             push = scale(force[0], along)
-            moment = add(scale(radius * force[1], along), cross(at(w, b + m.FRAME.origin), push))
-        put(w, m.BENDS.row(h, e) + m.BENDS.sliding, slip)
-        put(w, o + m.BEARING.unit_moment, moment)
-        put(w, o + m.BEARING.unit_force, push)
-        w[o + m.BEARING.slip], w[o + m.BEARING.loss] = np.sqrt(dot(slip, slip)), -dot(force, slip)
+            moment = add(scale(radius * force[1], along), cross(b.origin, push))
+        bends = d.bends[e]
+        bends.sliding, now.unit_moment, now.unit_force = slip, moment, push
+        now.slip, now.loss = np.sqrt(dot(slip, slip)), -dot(force, slip)
 
     return unit_wrench
 
 
 @kernel
-def tree_response(h, w):
+def tree_response(d):
     """Accelerations in FORCE from the generalised forces there; no loop is closed."""
-    forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
-    backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
+    forward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
+    backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
 
 
 @kernel
-def closed_response(h, w):
+def closed_response(d):
     """Accelerations in FORCE from the generalised forces there, and their multipliers; loops stay closed."""
-    forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
-    for k in range(h[m.N_KEPT_ROWS]):
-        w[h[m.MULTIPLIER] + k] = 0.0
-    respond(h, w)
-    backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], h[m.FORCE])
+    forward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
+    for k in range(d.n_kept_rows):
+        d.multiplier[k] = 0.0
+    respond(d)
+    backward(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, d.h[m.FORCE])
 
 
 @kernel
-def load_coordinates(h, w, e, size):
+def unit_power(bearing, column):
+    """Friction of a bearing (BEARING) per normal force, along a column."""
+    return dot(bearing.unit_moment, column.angular) + dot(bearing.unit_force, column.linear)
+
+
+@kernel
+def load_coordinates(d, e, size):
     """Add the generalised forces of the friction of bearing e, at the normal force `size`, to FORCE."""
-    j, o = m.BEARINGS.joint(h, e), m.BEARING.row(h, e) + m.BEARING.unit_moment
-    first = m.RUBBING.entry0(h, j)
-    for k in range(first, first + m.RUBBING.n_entries(h, j)):
-        c, col = m.RUBBING_ENTRIES.coordinate(h, k), m.COLUMNS.row(h, m.RUBBING_ENTRIES.column(h, k))
-        value = size * m.RUBBING_ENTRIES.sign(h, k) * dot6(w, o, w, col)
-        if c < h[m.NV]:
-            w[h[m.FORCE] + c] += value
+    joint = d.rubbing[d.bearings[e].joint]
+    for k in range(joint.entry0, joint.entry0 + joint.n_entries):
+        entry = d.rubbing_entries[k]
+        value = size * entry.sign * unit_power(d.bearing[e], d.columns[entry.column])
+        if entry.coordinate < d.nv:
+            d.force[entry.coordinate] += value
 
 
 @kernel
-def closure_wrench(h, w, c, part):
+def closure_wrench(d, c, part):
     """Wrench of closure c on its second body, or of a coupling on its first joint (part 1)."""
-    moment, force = ZERO, ZERO
-    o = m.ROWS.row(h, m.CLOSURES.row0(h, c))
-    if part == 1:
-        o = m.ROWS.row(h, h[m.N_CLOSURE_ROWS] + m.CLOSURES.coupling(h, c))
-    for k in range(m.CLOSURES.n_kept(h, c)):
-        size = w[h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c) + k]
-        moment, force = add(moment, scale(size, at(w, o + 6 * k))), add(force, scale(size, at(w, o + 6 * k + 3)))
+    closure, moment, force = d.closures[c], ZERO, ZERO
+    first = d.n_closure_rows + closure.coupling if part == 1 else closure.row0
+    for k in range(closure.n_kept):
+        size, row = d.multiplier[closure.kept0 + k], d.rows[first + k]
+        moment, force = add(moment, scale(size, row.moment)), add(force, scale(size, row.force))
     return moment, force
 
 
 @kernel
-def demand(h, w, j, acceleration):
+def demand(d, j, acceleration):
     """What the links beyond joint j need through it for accelerations of the free coordinates (place in w)."""
-    moment, force, angular, linear = ZERO, ZERO, ZERO, ZERO
-    first = m.RUBBING.momentum0(h, j)
-    for k in range(first, first + m.RUBBING.n_momenta(h, j)):
-        o = m.MOMENTA.row(h, m.REACTION_TERMS.column(h, k))
-        size = w[acceleration + m.REACTION_TERMS.coordinate(h, k)]
-        moment, force = add(moment, scale(size, at(w, o))), add(force, scale(size, at(w, o + 3)))
-    first = m.RUBBING.column0(h, j)
-    for k in range(first, first + m.RUBBING.n_columns(h, j)):
-        o = m.COLUMNS.row(h, m.REACTION_TERMS.column(h, k))
-        size = w[acceleration + m.REACTION_TERMS.coordinate(h, k)]
-        angular, linear = add(angular, scale(size, at(w, o))), add(linear, scale(size, at(w, o + 3)))
-    tree = m.INERTIA.row(h, m.RUBBING.link(h, j))
-    centre = at(w, tree + m.INERTIA.moment)
-    turned = add(turn_symmetric(at6(w, tree + m.INERTIA.inertia), angular), cross(centre, linear))
-    moved = add(scale(w[tree + m.INERTIA.mass], linear), cross(angular, centre))
+    joint, moment, force, angular, linear = d.rubbing[j], ZERO, ZERO, ZERO, ZERO
+    for k in range(joint.momentum0, joint.momentum0 + joint.n_momenta):
+        term = d.reaction_terms[k]
+        momentum, size = d.momenta[term.column], d.w[acceleration + term.coordinate]
+        moment, force = add(moment, scale(size, momentum.angular)), add(force, scale(size, momentum.linear))
+    for k in range(joint.column0, joint.column0 + joint.n_columns):
+        term = d.reaction_terms[k]
+        column, size = d.columns[term.column], d.w[acceleration + term.coordinate]
+        angular, linear = add(angular, scale(size, column.angular)), add(linear, scale(size, column.linear))
+    tree = d.inertia[joint.link]
+    centre = tree.moment
+    turned = add(turn_symmetric(at6(tree.inertia, 0), angular), cross(centre, linear))
+    moved = add(scale(tree.mass, linear), cross(angular, centre))
     return add(moment, turned), add(force, moved)
 
 
 @kernel
-def reaction(h, w, j, acceleration, bearing):
+def reaction(d, j, acceleration, bearing):
     """Write the reaction of joint j at these accelerations and the present multipliers to REACTIONS.
 
     bearing: -1 for all but friction, else the friction alone of that bearing, of unit normal force.
     """
-    closure, link = m.RUBBING.closure(h, j), m.RUBBING.link(h, j)
-    rubbed = m.RUBBING.closure(h, m.BEARINGS.joint(h, bearing)) if bearing >= 0 else -1
-    if closure >= 0:
-        moment, force = closure_wrench(h, w, closure, 0)
-        if rubbed == closure:
-            o = m.BEARING.row(h, bearing)
-            moment = add(moment, at(w, o + m.BEARING.unit_moment))
-            force = add(force, at(w, o + m.BEARING.unit_force))
+    joint = d.rubbing[j]
+    rubbed = d.rubbing[d.bearings[bearing].joint].closure if bearing >= 0 else -1
+    if joint.closure >= 0:
+        moment, force = closure_wrench(d, joint.closure, 0)
+        if rubbed == joint.closure:
+            moment = add(moment, d.bearing[bearing].unit_moment)
+            force = add(force, d.bearing[bearing].unit_force)
     else:
-        moment, force = demand(h, w, j, acceleration)
+        moment, force = demand(d, j, acceleration)
         if bearing < 0:
-            o = m.WRENCH.row(h, link)
-            moment, force = add(moment, at(w, o)), add(force, at(w, o + 3))
-        first = m.RUBBING.loop0(h, j)
-        for k in range(first, first + m.RUBBING.n_loops(h, j)):
-            c, part = m.REACTION_LOOPS.closure(h, k), m.REACTION_LOOPS.part(h, k)
-            sign, (around, along) = -1.0 * m.REACTION_LOOPS.sign(h, k), closure_wrench(h, w, c, part)
-            if rubbed == c and part == 0:
-                o = m.BEARING.row(h, bearing)
-                around = add(around, at(w, o + m.BEARING.unit_moment))
-                along = add(along, at(w, o + m.BEARING.unit_force))
+            moment, force = add(moment, d.wrench[joint.link].moment), add(force, d.wrench[joint.link].force)
+        for k in range(joint.loop0, joint.loop0 + joint.n_loops):
+            loop = d.reaction_loops[k]
+            sign, (around, along) = -1.0 * loop.sign, closure_wrench(d, loop.closure, loop.part)
+            if rubbed == loop.closure and loop.part == 0:
+                around = add(around, d.bearing[bearing].unit_moment)
+                along = add(along, d.bearing[bearing].unit_force)
             moment, force = add(moment, scale(sign, around)), add(force, scale(sign, along))
-        if m.RUBBING.reversed(h, j):
+        if joint.reversed:
             moment, force = scale(-1.0, moment), scale(-1.0, force)
-    middle = at(w, m.SITE_FRAMES.row(h, m.RUBBING.site_b(h, j)) + m.FRAME.origin)
-    o = m.REACTIONS.row(h, j * (1 + h[m.N_BEARINGS]) + 1 + bearing)
-    put(w, o, sub(moment, cross(middle, force)))
-    put(w, o + 3, force)
+    reacted = d.reactions[j * (1 + d.n_bearings) + 1 + bearing]
+    reacted.moment, reacted.force = sub(moment, cross(d.site_frames[joint.site_b].origin, force)), force
 
 
 @kernel
@@ -225,33 +221,29 @@ def _sized(v):
 
 
 @kernel
-def note_bends(h, w, e, along, about, one_end, other_end):
+def note_bends(d, e, along, about, one_end, other_end):
     """Write what bearing e carries to BENDS; forces at its ends by their components across the axis."""
-    o, j, k = m.BENDS.row(h, e), m.BEARINGS.joint(h, e), m.BEARINGS.axis(h, e)
-    site = m.RUBBING.site_a(h, j) if m.BEARINGS.side(h, e) == 0 else m.RUBBING.site_b(h, j)
-    axes = at9(w, m.SITE_FRAMES.row(h, site) + m.FRAME.axes)
+    bends, axes, k = d.bends[e], bearing_frame(d, e).axes, d.bearings[e].axis
     one, other = axis(axes, (k + 1) % 3), axis(axes, (k + 2) % 3)
-    w[o + m.BENDS.along], w[o + m.BENDS.about] = along, about
-    w[o + m.BENDS.one_end], w[o + m.BENDS.one_end + 1] = dot(one, one_end), dot(other, one_end)
-    w[o + m.BENDS.other_end], w[o + m.BENDS.other_end + 1] = dot(one, other_end), dot(other, other_end)
+    bends.along, bends.about = along, about
+    bends.one_end[0], bends.one_end[1] = dot(one, one_end), dot(other, one_end)
+    bends.other_end[0], bends.other_end[1] = dot(one, other_end), dot(other, other_end)
 
 
 @kernel
-def load(h, f, w, e, M, F):
+def load(d, e, M, F):
     """Normal force of bearing e for what its joint carries, and its gradients by M and F."""
-    o = m.BEARING_NUMBERS.row(h, e)
-    preload = f[o + m.BEARING_NUMBERS.preload]
-    if m.BEARINGS.kind(h, e) == BALL:
+    numbers = d.bearing_numbers[e]
+    if d.bearings[e].kind == BALL:
         size, along_F = _sized(F)
-        return size + preload, ZERO, along_F
-    n, lever = bearing_axis(h, w, e), f[o + m.BEARING_NUMBERS.lever]
+        return size + numbers.preload, ZERO, along_F
+    n, lever, axial, torsion = bearing_axis(d, e), numbers.lever, numbers.axial, numbers.torsion
     along, about = dot(n, F), dot(n, M)
     half, tilt = scale(0.5, sub(F, scale(along, n))), scale(lever, cross(n, M))
     near, at_near = _sized(sub(half, tilt))
     far, at_far = _sized(add(half, tilt))
-    axial, torsion = f[o + m.BEARING_NUMBERS.axial], f[o + m.BEARING_NUMBERS.torsion]
-    note_bends(h, w, e, axial * along, torsion * about, sub(half, tilt), add(half, tilt))
-    size = near + far + axial * abs(along) + torsion * abs(about) + preload
+    note_bends(d, e, axial * along, torsion * about, sub(half, tilt), add(half, tilt))
+    size = near + far + axial * abs(along) + torsion * abs(about) + numbers.preload
     by_M = scale(lever, cross(sub(at_far, at_near), n))
     by_M = add(by_M, scale(torsion if about >= 0.0 else -torsion, n))
     # both ends' forces lie across the axis
@@ -260,68 +252,69 @@ def load(h, f, w, e, M, F):
 
 
 @kernel
-def balance(h, f, w, share):
+def balance(d, share):
     """Residuals of the bearings' loads, and their slopes, with a share of the friction's influence on the reactions."""
-    bearings = h[m.N_BEARINGS]
+    bearings = d.n_bearings
     for e in range(bearings):
-        first = m.REACTIONS.row(h, m.BEARINGS.joint(h, e) * (1 + bearings))
-        M, F = at(w, first), at(w, first + 3)
+        first = d.bearings[e].joint * (1 + bearings)
+        M, F = d.reactions[first].moment, d.reactions[first].force
         for k in range(bearings):
-            o, size = first + 6 * (1 + k), share * w[m.BEARING.row(h, k)]
-            M, F = add(M, scale(size, at(w, o))), add(F, scale(size, at(w, o + 3)))
-        value, by_M, by_F = load(h, f, w, e, M, F)
-        row = h[m.BEARING_SLOPES] + bearings * e
+            part, size = d.reactions[first + 1 + k], share * d.bearing[k].load
+            M, F = add(M, scale(size, part.moment)), add(F, scale(size, part.force))
+        value, by_M, by_F = load(d, e, M, F)
+        row = bearings * e
         for k in range(bearings):
-            o = first + 6 * (1 + k)
-            w[row + k] = -share * (dot(by_M, at(w, o)) + dot(by_F, at(w, o + 3)))
-        w[row + e] += 1.0
-        w[h[m.BEARING_RESIDUALS] + e] = w[m.BEARING.row(h, e)] - value
+            part = d.reactions[first + 1 + k]
+            d.bearing_slopes[row + k] = -share * (dot(by_M, part.moment) + dot(by_F, part.force))
+        d.bearing_slopes[row + e] += 1.0
+        d.bearing_residuals[e] = d.bearing[e].load - value
 
 
 @kernel
-def eliminate(w, A, b, size):
+def eliminate(A, b, size):
     """Solve A x = b in place (Gauss, partial pivoting); the sign of the determinant of A, 0 where it is singular."""
     sign = 1.0
     for k in range(size):
         p = k
         for i in range(k + 1, size):
-            if abs(w[A + size * i + k]) > abs(w[A + size * p + k]):
+            if abs(A[size * i + k]) > abs(A[size * p + k]):
                 p = i
-        if not abs(w[A + size * p + k]) > SINGULAR_SLOPES:
+        if not abs(A[size * p + k]) > SINGULAR_SLOPES:
             return 0.0
         if p != k:
             sign = -sign
             for j in range(size):
-                w[A + size * k + j], w[A + size * p + j] = w[A + size * p + j], w[A + size * k + j]
-            w[b + k], w[b + p] = w[b + p], w[b + k]
-        pivot = w[A + size * k + k]
+                A[size * k + j], A[size * p + j] = A[size * p + j], A[size * k + j]
+            b[k], b[p] = b[p], b[k]
+        pivot = A[size * k + k]
         if pivot < 0.0:
             sign = -sign
         for i in range(k + 1, size):
-            factor = w[A + size * i + k] / pivot
+            factor = A[size * i + k] / pivot
             for j in range(k, size):
-                w[A + size * i + j] -= factor * w[A + size * k + j]
-            w[b + i] -= factor * w[b + k]
+                A[size * i + j] -= factor * A[size * k + j]
+            b[i] -= factor * b[k]
     for k in range(size - 1, -1, -1):
         for j in range(k + 1, size):
-            w[b + k] -= w[A + size * k + j] * w[b + j]
-        w[b + k] /= w[A + size * k + k]
+            b[k] -= A[size * k + j] * b[j]
+        b[k] /= A[size * k + k]
     return sign
 
 
 @kernel
-def iterate(h, f, w, share):
+def iterate(d, share):
     """Newton's method for the loads from those that are there; whether it finds the solution that friction grows to."""
-    size, A, b, before = h[m.N_BEARINGS], h[m.BEARING_SLOPES], h[m.BEARING_RESIDUALS], np.inf
+    size, before = d.n_bearings, np.inf
     for _ in range(ITERATIONS):
-        balance(h, f, w, share)
-        sign = eliminate(w, A, b, size)
+        balance(d, share)
+        sign = eliminate(d.bearing_slopes, d.bearing_residuals, size)
         if sign == 0.0:
             return False
         change, largest = 0.0, 0.0
         for e in range(size):
-            w[m.BEARING.row(h, e)] -= w[b + e]
-            change, largest = max(change, abs(w[b + e])), max(largest, abs(w[m.BEARING.row(h, e)]))
+            bearing, correction = d.bearing[e], d.bearing_residuals[e]
+            bearing.load -= correction
+            change, largest = max(change, abs(correction)), max(largest, abs(bearing.load))
         if not largest < np.inf:
             return False
         if change <= CONVERGED * largest or (change <= ROUNDED * largest and change > 0.5 * before):
@@ -331,30 +324,28 @@ def iterate(h, f, w, share):
 
 
 @kernel
-def without_feedback(h, f, w):
+def without_feedback(d):
     """Loads of the bearings from the reactions without friction."""
-    bearings = h[m.N_BEARINGS]
-    for e in range(bearings):
-        o = m.REACTIONS.row(h, m.BEARINGS.joint(h, e) * (1 + bearings))
-        value, _, _ = load(h, f, w, e, at(w, o), at(w, o + 3))
-        w[m.BEARING.row(h, e)] = value
+    for e in range(d.n_bearings):
+        bearing, smooth = d.bearing[e], d.reactions[d.bearings[e].joint * (1 + d.n_bearings)]
+        bearing.load, _, _ = load(d, e, smooth.moment, smooth.force)
 
 
 @kernel
-def find_loads(h, f, w):
+def find_loads(d):
     """Loads of all bearings; False where friction jams the joints."""
-    without_feedback(h, f, w)
-    if iterate(h, f, w, 1.0):
+    without_feedback(d)
+    if iterate(d, 1.0):
         return True
-    without_feedback(h, f, w)
+    without_feedback(d)
     found = True
     for k in range(1, STRIDES + 1):
-        found = found and iterate(h, f, w, k / STRIDES)
+        found = found and iterate(d, k / STRIDES)
     return found
 
 
 def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callable:
-    """The kernel joint_friction(h, f, w, n): accelerations, multipliers and ledger, completed by friction in joints.
+    """The kernel joint_friction(d): accelerations, multipliers and ledger, completed by friction in joints.
 
     To be called when accelerations and multipliers are there, before the drives' forces are.  tractions: kernels of the
     laws present (`contact.friction`).  closed: whether there are closures.
@@ -363,73 +354,70 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool) -> Callab
     respond = closed_response if closed else tree_response
 
     @kernel
-    def influences(h, w):
+    def influences(d):
         """Reactions of all joints: of the present accelerations, then of the friction of each bearing alone."""
-        for j in range(h[m.N_RUBBING]):
-            reaction(h, w, j, h[m.DU], -1)
-        for k in range(h[m.N_KEPT_ROWS]):
-            w[h[m.SMOOTH_MULTIPLIER] + k] = w[h[m.MULTIPLIER] + k]
-        for e in range(h[m.N_BEARINGS]):
-            for k in range(h[m.NV]):
-                w[h[m.FORCE] + k] = 0.0
-            load_coordinates(h, w, e, 1.0)
-            respond(h, w)
-            for j in range(h[m.N_RUBBING]):
-                reaction(h, w, j, h[m.FORCE], e)
+        for j in range(d.n_rubbing):
+            reaction(d, j, d.h[m.DU], -1)
+        for k in range(d.n_kept_rows):
+            d.smooth_multiplier[k] = d.multiplier[k]
+        for e in range(d.n_bearings):
+            for k in range(d.nv):
+                d.force[k] = 0.0
+            load_coordinates(d, e, 1.0)
+            respond(d)
+            for j in range(d.n_rubbing):
+                reaction(d, j, d.h[m.FORCE], e)
 
     @kernel
-    def joint_friction(h, f, w, n):
-        if n[m.EVALUATION] != m.OK:
+    def joint_friction(d):
+        if d.evaluation != m.OK:
             return
-        for e in range(h[m.N_BEARINGS]):
-            unit_wrench(h, f, w, n, e)
-        influences(h, w)
-        if not find_loads(h, f, w):
-            n[m.EVALUATION] = m.JAMMED
+        for e in range(d.n_bearings):
+            unit_wrench(d, e)
+        influences(d)
+        if not find_loads(d):
+            d.evaluation = m.JAMMED
             return
-        for k in range(h[m.NV]):
-            w[h[m.FORCE] + k] = 0.0
-        for e in range(h[m.N_BEARINGS]):
-            size = w[m.BEARING.row(h, e)]
-            load_coordinates(h, w, e, size)
-            slot = h[m.LEDGER_RATE] + h[m.RUBBING_SLOT] + m.BEARINGS.joint(h, e)
-            w[slot] += size * w[m.BEARING.row(h, e) + m.BEARING.loss]
-        respond(h, w)
-        for k in range(h[m.NV]):
-            w[h[m.DU] + k] += w[h[m.FORCE] + k]
-        for k in range(h[m.N_KEPT_ROWS]):
-            w[h[m.MULTIPLIER] + k] += w[h[m.SMOOTH_MULTIPLIER] + k]
+        for k in range(d.nv):
+            d.force[k] = 0.0
+        for e in range(d.n_bearings):
+            bearing = d.bearing[e]
+            load_coordinates(d, e, bearing.load)
+            d.ledger_rate[d.rubbing_slot + d.bearings[e].joint] += bearing.load * bearing.loss
+        respond(d)
+        for k in range(d.nv):
+            d.du[k] += d.force[k]
+        for k in range(d.n_kept_rows):
+            d.multiplier[k] += d.smooth_multiplier[k]
 
     return joint_friction
 
 
 @kernel
-def load_drives(h, w):
+def load_drives(d):
     """Take friction out of the forces that the drives must supply: they work against it."""
-    for j in range(h[m.N_RUBBING]):
-        first = m.RUBBING.entry0(h, j)
-        for k in range(first, first + m.RUBBING.n_entries(h, j)):
-            d = m.RUBBING_ENTRIES.coordinate(h, k) - h[m.NV]
-            if d < 0:
+    for j in range(d.n_rubbing):
+        joint = d.rubbing[j]
+        for k in range(joint.entry0, joint.entry0 + joint.n_entries):
+            entry = d.rubbing_entries[k]
+            drive = entry.coordinate - d.nv
+            if drive < 0:
                 continue
-            sign, col = m.RUBBING_ENTRIES.sign(h, k), m.COLUMNS.row(h, m.RUBBING_ENTRIES.column(h, k))
-            for e in range(m.RUBBING.bearing0(h, j), m.RUBBING.bearing0(h, j) + m.RUBBING.n_bearings(h, j)):
-                o = m.BEARING.row(h, e)
-                w[h[m.DRIVE_FORCE] + d] -= sign * w[o] * dot6(w, o + m.BEARING.unit_moment, w, col)
+            for e in range(joint.bearing0, joint.bearing0 + joint.n_bearings):
+                bearing = d.bearing[e]
+                d.drive_force[drive] -= entry.sign * bearing.load * unit_power(bearing, d.columns[entry.column])
 
 
 @kernel
-def take_off_closures(h, w, out, column):
+def take_off_closures(d, out, column):
     """Add friction of joints that close loops to the wrenches of these in out[column:]; take it off their links."""
-    for e in range(h[m.N_BEARINGS]):
-        j = m.BEARINGS.joint(h, e)
-        c, o = m.RUBBING.closure(h, j), m.BEARING.row(h, e)
-        if c < 0:
+    for e in range(d.n_bearings):
+        joint, bearing = d.rubbing[d.bearings[e].joint], d.bearing[e]
+        if joint.closure < 0:
             continue
-        a = m.WRENCH.row(h, m.SITES.link(h, m.RUBBING.site_a(h, j)))
-        b = m.WRENCH.row(h, m.SITES.link(h, m.RUBBING.site_b(h, j)))
-        for half in range(0, 6, 3):
-            part = scale(w[o], at(w, o + m.BEARING.unit_moment + half))
-            accumulate(out, column + 6 * c + half, part)
-            accumulate(w, b + half, scale(-1.0, part))
-            accumulate(w, a + half, part)
+        a, b = d.wrench[d.sites[joint.site_a].link], d.wrench[d.sites[joint.site_b].link]
+        moment, force = scale(bearing.load, bearing.unit_moment), scale(bearing.load, bearing.unit_force)
+        accumulate(out, column + 6 * joint.closure, moment)
+        accumulate(out, column + 6 * joint.closure + 3, force)
+        add_wrench(b, scale(-1.0, moment), scale(-1.0, force))
+        add_wrench(a, moment, force)

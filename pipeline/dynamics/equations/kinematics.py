@@ -31,17 +31,17 @@ def rigid_site(d, s):
 
 
 @kernel
-def no_port(h, f, w, s):
+def no_port(d, s):
     """No body is flexible."""
 
 
 @kernel
-def undeformed(h, f, w):
+def undeformed(d):
     """No modes."""
 
 
 @kernel
-def rigid_inboard(h, f, w, i, p, R, omega, v, alpha, a):
+def rigid_inboard(d, i, p, R, omega, v, alpha, a):
     """A rigid link's frame is its inboard joint frame."""
     return p, R, omega, v, alpha, a
 
@@ -85,14 +85,14 @@ def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
         a = add(a, add(scale(2.0, cross(omega_F, sliding)), speeding))
         omega, R = add(omega_F, turning), product(F, R_FG)
         if link.flex >= 0:
-            p, R, omega, v, alpha, a = inboard(d.h, d.f, d.w, i, p, R, omega, v, alpha, a)
+            p, R, omega, v, alpha, a = inboard(d, i, p, R, omega, v, alpha, a)
         _store(d.link_frames[i], p, R, omega, v, alpha, a)
 
     @kernel
     def locate(d, s):
         """Site s from its link."""
         if d.sites[s].port >= 0:
-            port_site(d.h, d.f, d.w, s)
+            port_site(d, s)
         else:
             rigid_site(d, s)
 
@@ -105,7 +105,7 @@ def make_kinematics(joints: tuple[Any, ...], flexible: Any = None) -> Callable:
         """
         ground = d.link_frames[0]
         ground.acceleration = scale(-1.0, d.gravity[0].acceleration)
-        deform(d.h, d.f, d.w)
+        deform(d)
         for i in range(1, d.n_links):
             locate(d, i - 1)
             place(d, i)

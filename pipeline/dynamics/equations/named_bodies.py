@@ -7,13 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
     add,
-    at,
     at6,
-    at9,
     cross,
     product,
     put,
@@ -51,26 +48,24 @@ def put_quaternion(out, o, R):
 
 
 @kernel
-def put_bodies(h, f, w, out, first, every, r):
+def put_bodies(d, out, first, every, r):
     """Store the motion of the centres of mass and axes of all bodies, row r of `every`, from out[first] on."""
-    bodies, gravity = h[m.N_BODIES], at(f, h[m.GRAVITY.place])
+    bodies, gravity = d.n_bodies, d.gravity[0].acceleration
     for k in range(bodies):
-        o, numbers = m.LINK_FRAMES.row(h, m.BODIES.link(h, k)), m.BODY_NUMBERS.row(h, k)
-        R = at9(w, o + m.FRAME.axes)
-        omega, alpha = at(w, o + m.FRAME.omega), at(w, o + m.FRAME.alpha)
-        arm = turn(R, at(f, numbers + m.BODY_NUMBERS.com))
-        swing, p = cross(omega, arm), add(at(w, o + m.FRAME.origin), arm)
-        a = add(at(w, o + m.FRAME.acceleration), add(cross(alpha, arm), cross(omega, swing)))
+        frame, body = d.link_frames[d.bodies[k].link], d.body_numbers[k]
+        R, omega, alpha, mass = frame.axes, frame.omega, frame.alpha, body.mass
+        arm = turn(R, body.com)
+        swing, p = cross(omega, arm), add(frame.origin, arm)
+        a = add(frame.acceleration, add(cross(alpha, arm), cross(omega, swing)))
         here, size = first + 3 * (bodies * r + k), every * bodies
         put(out, here, p)
-        put_quaternion(out, here + 3 * size + bodies * r + k, product(R, at9(f, numbers + m.BODY_NUMBERS.axes)))
-        put(out, here + 7 * size, add(at(w, o + m.FRAME.velocity), swing))
+        put_quaternion(out, here + 3 * size + bodies * r + k, product(R, body.axes))
+        put(out, here + 7 * size, add(frame.velocity, swing))
         put(out, here + 10 * size, omega)
         put(out, here + 13 * size, add(a, gravity))
         put(out, here + 16 * size, alpha)
-        mass = f[numbers + m.BODY_NUMBERS.mass]
         if mass > 0.0:
-            J, turning, force = at6(f, numbers + m.BODY_NUMBERS.inertia), turn_back(R, omega), scale(mass, a)
+            J, turning, force = at6(body.inertia, 0), turn_back(R, omega), scale(mass, a)
             spin = add(turn_symmetric(J, turn_back(R, alpha)), cross(turning, turn_symmetric(J, turning)))
             here += 19 * size + 3 * (bodies * r + k)
             put(out, here, add(turn(R, spin), cross(p, force)))
@@ -78,9 +73,8 @@ def put_bodies(h, f, w, out, first, every, r):
 
 
 @kernel
-def put_frames(h, f, w, out, first):
+def put_frames(d, out, first):
     """Store the origins of all frames from out[first] on."""
-    for k in range(h[m.N_FRAMES]):
-        o = m.LINK_FRAMES.row(h, m.FRAMES.link(h, k))
-        arm = turn(at9(w, o + m.FRAME.axes), at(f, m.NAMED_FRAME_NUMBERS.row(h, k)))
-        put(out, first + 3 * k, add(at(w, o + m.FRAME.origin), arm))
+    for k in range(d.n_frames):
+        frame = d.link_frames[d.frames[k].link]
+        put(out, first + 3 * k, add(frame.origin, turn(frame.axes, d.named_frame_numbers[k].origin)))

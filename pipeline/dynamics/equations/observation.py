@@ -13,11 +13,11 @@ from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
 from flexclear.pipeline.dynamics.equations.named_bodies import OF_BODIES, SIZE, put_bodies, put_frames
 from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
-from flexclear.pipeline.dynamics.equations.projection import BLIND, keep_scales, largest, widest
+from flexclear.pipeline.dynamics.equations.projection import BLIND, keep_scales, largest, open_by
 from flexclear.pipeline.dynamics.equations.right_hand_side import make_forces, nothing, spread_state
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import accumulate, at, dot
+from flexclear.pipeline.dynamics.vectors import ZERO, add, add_wrench, dot, put, scale
 
 #: of an independent mechanism: kinetic energy, potential energy of gravity, that stored in bodies, springs and contacts
 #: [J]
@@ -155,27 +155,27 @@ def _named(kind: Any, count: int, block: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def no_energy(h, f, w, component):
+def no_energy(d, component):
     """Kinetic and elastic energy where no body is flexible."""
     return 0.0, 0.0
 
 
 @kernel
-def no_couplings(h, w):
+def no_couplings(d):
     """No closure acts on four links."""
 
 
 @kernel
-def no_friction(h, w, out, column):
+def no_friction(d, out, column):
     """No joint rubs."""
 
 
 @kernel
-def columns_before_state(h):
+def columns_before_state(d):
     """Columns of what is worked out, and of the frames of links and sites."""
-    worked_out = m.WRENCH.size * h[m.N_CLOSURES] + SIZE * h[m.N_BODIES] + 3 * h[m.N_FRAMES] + 2
-    worked_out += ENERGY.size * h[m.N_COMPONENTS]
-    return worked_out + m.FRAME.size * (h[m.N_LINKS] + h[m.N_SITES])
+    worked_out = m.WRENCH.size * d.n_closures + SIZE * d.n_bodies + 3 * d.n_frames + 2
+    worked_out += ENERGY.size * d.n_components
+    return worked_out + m.FRAME.size * (d.n_links + d.n_sites)
 
 
 @kernel
@@ -196,20 +196,14 @@ def even(rows, first, last):
 
 
 @kernel
-def open_by(h, f, w):
-    """How far loops are open, or how fast they open, at the evaluated state [m, or m/s]."""
-    return max(widest(h, f, w, h[m.RESIDUAL], True), widest(h, f, w, h[m.RESIDUAL_RATE], True))
-
-
-@kernel
-def component_of(h, a, b):
+def component_of(d, a, b):
     """Independent mechanism to which what acts between sites belongs; a: may be -1."""
-    other = m.LINKS.component(h, m.SITES.link(h, a)) if a >= 0 else -1
-    return max(other, m.LINKS.component(h, m.SITES.link(h, b)))
+    other = d.links[d.sites[a].link].component if a >= 0 else -1
+    return max(other, d.links[d.sites[b].link].component)
 
 
 @kernel
-def foresee(h, w, rows, r, state, closed, states):
+def foresee(d, rows, r, state, closed, states):
     """Add to Y, which is as recorded, what closing the loops is to change there; whether that is anything.
 
     By how much loops are open grows and falls within a step as smoothly as the motion: the cubic through the changes
@@ -218,14 +212,14 @@ def foresee(h, w, rows, r, state, closed, states):
     before, most = r - r % APART, 0.0
     s = (r - before) / APART
     outer, inner = -s * (1.0 - s) / 6.0, (1.0 + s) * (2.0 - s) / 2.0
-    for k in range(h[m.NQ] + h[m.NV]):
+    for k in range(d.nq + d.nv):
         change = 0.0
         for j in range(-1, 3):
             row = before + APART * j
             # of Lagrange's interpolation between -1, 0, 1 and 2
             weight = inner * (1.0 - s if j == 0 else s) if 0 <= j <= 1 else outer * (2.0 - s if j < 0 else 1.0 + s)
-            change += weight * (closed[states + h[m.NY] * row + k] - rows[row, state + k])
-        w[h[m.Y] + k] += change
+            change += weight * (closed[states + d.ny * row + k] - rows[row, state + k])
+        d.y[k] += change
         most = max(most, abs(change))
     return most > 0.0
 
@@ -257,152 +251,151 @@ def make_observation(
     flexible_energy = no_energy if flexible is None else flexible.energies
 
     @kernel
-    def closure_wrenches(h, w, out, o):
+    def closure_wrenches(d, out, o):
         """Wrench of every closure on its second body, from out[o] on; taken off the links that it acts on."""
-        for c in range(h[m.N_CLOSURES]):
-            for e in range(6):
-                total = 0.0
-                for k in range(m.CLOSURES.n_kept(h, c)):
-                    wrench_row = m.ROWS.row(h, m.CLOSURES.row0(h, c) + k)
-                    total += w[wrench_row + e] * w[h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c) + k]
-                out[o + 6 * c + e] = total
-                w[m.WRENCH.row(h, m.SITES.link(h, m.CLOSURES.site_b(h, c))) + e] -= total
-                w[m.WRENCH.row(h, m.SITES.link(h, m.CLOSURES.site_a(h, c))) + e] += total
-        couple(h, w)
-        rub(h, w, out, o)
+        for c in range(d.n_closures):
+            closure, moment, force = d.closures[c], ZERO, ZERO
+            for k in range(closure.n_kept):
+                row, size = d.rows[closure.row0 + k], d.multiplier[closure.kept0 + k]
+                moment, force = add(moment, scale(size, row.moment)), add(force, scale(size, row.force))
+            put(out, o + 6 * c, moment)
+            put(out, o + 6 * c + 3, force)
+            on_a, on_b = d.wrench[d.sites[closure.site_a].link], d.wrench[d.sites[closure.site_b].link]
+            add_wrench(on_b, scale(-1.0, moment), scale(-1.0, force))
+            add_wrench(on_a, moment, force)
+        couple(d)
+        rub(d, out, o)
 
     @kernel
-    def joint_wrenches(h, f, w, n, out, o):
+    def joint_wrenches(d, out, o):
         """Wrench on every link through its inboard joint, at the accelerations of its frames (Newton-Euler).
 
         Wrenches of closures are stored from out[o] on.
         """
-        forces(data(h, f, w, n))
-        modal_inertia(h, f, w, n)
-        closure_wrenches(h, w, out, o)
-        for i in range(h[m.N_LINKS] - 1, 0, -1):
-            up = m.WRENCH.row(h, m.LINKS.parent(h, i))
-            accumulate(w, up, at(w, m.WRENCH.row(h, i)))
-            accumulate(w, up + 3, at(w, m.WRENCH.row(h, i) + 3))
+        forces(d)
+        modal_inertia(d)
+        closure_wrenches(d, out, o)
+        for i in range(d.n_links - 1, 0, -1):
+            add_wrench(d.wrench[d.links[i].parent], d.wrench[i].moment, d.wrench[i].force)
 
     @kernel
-    def energies(h, f, w, out, o):
+    def energies(d, out, o):
         """Kinetic energy, potential of gravity, energy stored in bodies and contacts, from out[o] on."""
-        for component in range(h[m.N_COMPONENTS]):
-            kinetic, elastic = flexible_energy(h, f, w, component)
+        for component in range(d.n_components):
+            kinetic, elastic = flexible_energy(d, component)
             potential, row = 0.0, o + ENERGY.size * component
-            for i in range(1, h[m.N_LINKS]):
-                if m.LINKS.component(h, i) != component:
+            for i in range(1, d.n_links):
+                if d.links[i].component != component:
                     continue
-                if m.LINKS.flex(h, i) < 0:
-                    kinetic += rigid.kinetic_energy(h, f, w, i)
-                potential -= dot(at(f, h[m.GRAVITY.place]), at(w, m.OWN.row(h, i) + m.OWN.moment))
-            for c in range(h[m.N_CONTACTS]):
-                if component_of(h, m.CONTACTS.outer(h, c), m.CONTACTS.inner(h, c)) == component:
-                    elastic += w[m.TOUCH.row(h, c) + m.TOUCH.stored] + w[m.TOUCH.row(h, c) + m.TOUCH.bent]
-            for k in range(h[m.N_LOADS]):
-                if component_of(h, m.LOADS.a(h, k), m.LOADS.b(h, k)) == component:
-                    elastic += w[m.LOAD.row(h, k) + m.LOAD.stored]
+                if d.links[i].flex < 0:
+                    kinetic += rigid.kinetic_energy(d, i)
+                potential -= dot(d.gravity[0].acceleration, d.own[i].moment)
+            for c in range(d.n_contacts):
+                if component_of(d, d.contacts[c].outer, d.contacts[c].inner) == component:
+                    elastic += d.touch[c].stored + d.touch[c].bent
+            for k in range(d.n_loads):
+                if component_of(d, d.loads[k].a, d.loads[k].b) == component:
+                    elastic += d.load[k].stored
             out[row], out[row + 1], out[row + 2] = kinetic, potential, elastic
 
     @kernel
-    def place(h, f, w, n, t):
+    def place(d, t):
         """Positions and speeds of the state in Y."""
-        laws(h, f, w, n, t)
-        d = data(h, f, w, n)
-        spread_state(d, h[m.Y])
+        laws(d.h, d.f, d.w, d.n, t)
+        spread_state(d, d.h[m.Y])
         prescribe(d)
 
     @kernel
-    def copy(h, w, out, every, r, column, frames):
+    def copy(d, out, every, r, column, frames):
         """Copy the stretches of w that are recorded as they are, each to its row in its block.
 
         column: number of columns before them.  frames: whether only those of links and sites.
         """
-        known = h[m.N_DRIVES]
+        h, known = d.h, d.n_drives
         stretches = (
-            (h[m.LINK_FRAMES.place], m.FRAME.size * h[m.N_LINKS]),
-            (h[m.SITE_FRAMES.place], m.FRAME.size * h[m.N_SITES]),
-            (h[m.Y], h[m.NY]),
-            (h[m.X], h[m.NQ] + known),
-            (h[m.U], h[m.NV] + known),
-            (h[m.SLOPES] + h[m.NQ], h[m.NV]),
-            (h[m.DU] + h[m.NV], known),
-            (h[m.WRENCH.place], m.WRENCH.size * h[m.N_LINKS]),
-            (h[m.TOUCH.place], m.TOUCH.size * h[m.N_CONTACTS]),
-            (h[m.LOAD.place], m.LOAD.size * h[m.N_LOADS]),
-            (h[m.BEARING.place], m.BEARING.size * h[m.N_BEARINGS]),
+            (h[m.LINK_FRAMES.place], m.FRAME.size * d.n_links),
+            (h[m.SITE_FRAMES.place], m.FRAME.size * d.n_sites),
+            (h[m.Y], d.ny),
+            (h[m.X], d.nq + known),
+            (h[m.U], d.nv + known),
+            (h[m.SLOPES] + d.nq, d.nv),
+            (h[m.DU] + d.nv, known),
+            (h[m.WRENCH.place], m.WRENCH.size * d.n_links),
+            (h[m.TOUCH.place], m.TOUCH.size * d.n_contacts),
+            (h[m.LOAD.place], m.LOAD.size * d.n_loads),
+            (h[m.BEARING.place], m.BEARING.size * d.n_bearings),
             (h[m.DRIVE_FORCE], known),
-            (h[m.JACOBIAN], h[m.JACOBIAN_SIZE]),
+            (h[m.JACOBIAN], d.jacobian_size),
         )
         for s in range(2 if frames else len(stretches)):  # one loop: several would each be compiled
             first, count = stretches[s]
             o = every * column + count * r
             for k in range(count):
-                out[o + k] = w[first + k]
+                out[o + k] = d.w[first + k]
             column += count
 
     @kernel
-    def store(h, f, w, n, out, every, r):
+    def store(d, out, every, r):
         """Store what is worked out of a row that has been evaluated; the number of columns that it takes."""
-        status, residual = n[m.EVALUATION], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS])
-        column = m.WRENCH.size * h[m.N_CLOSURES]
-        joint_wrenches(h, f, w, n, out, column * r)
-        put_bodies(h, f, w, out, every * column, every, r)
-        column += SIZE * h[m.N_BODIES]
-        put_frames(h, f, w, out, every * column + 3 * h[m.N_FRAMES] * r)
-        column += 3 * h[m.N_FRAMES]
-        energies(h, f, w, out, every * column + ENERGY.size * h[m.N_COMPONENTS] * r)
-        column += ENERGY.size * h[m.N_COMPONENTS]
+        status, residual = d.evaluation, largest(d.residual, d.n_closure_rows)
+        column = m.WRENCH.size * d.n_closures
+        joint_wrenches(d, out, column * r)
+        put_bodies(d, out, every * column, every, r)
+        column += SIZE * d.n_bodies
+        put_frames(d, out, every * column + 3 * d.n_frames * r)
+        column += 3 * d.n_frames
+        energies(d, out, every * column + ENERGY.size * d.n_components * r)
+        column += ENERGY.size * d.n_components
         out[every * column + r], out[every * (column + 1) + r] = residual, status
         return column + 2
 
     @kernel
-    def select(h, w, n, row, pieces):
+    def select(d, row, pieces):
         """State, contacts' modes and pieces of the laws of a row of the record."""
-        mode, latched, state = m.record_columns(h[m.N_CONTACTS])
-        for c in range(h[m.N_CONTACTS]):
-            n[n[m.MODE] + c] = int(row[mode + c])
-            w[h[m.LATCHED] + c] = row[latched + c]
-        for k in range(h[m.N_LAWS]):
-            n[n[m.ACTIVE] + k] = pieces[k]
-        for k in range(h[m.NY]):
-            w[h[m.Y] + k] = row[state + k]
+        mode, latched, state = m.record_columns(d.n_contacts)
+        for c in range(d.n_contacts):
+            d.mode[c] = int(row[mode + c])
+            d.latched[c] = row[latched + c]
+        for k in range(d.n_laws):
+            d.active[k] = pieces[k]
+        for k in range(d.ny):
+            d.y[k] = row[state + k]
         return state
 
     @kernel
-    def close(h, f, w, n, t, tolerance):
+    def close(d, t, tolerance):
         """Close the loops of the state in Y, which has been evaluated, to `tolerance`."""
-        if n[m.EVALUATION] == m.OK and project(h, f, w, n, t, h[m.Y], h[m.SLOPES], tolerance) < 0:
-            n[m.EVALUATION] = m.NOT_CLOSED
-        if n[m.EVALUATION] == m.OK and h[m.N_KEPT_ROWS] > 0 and w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
-            n[m.EVALUATION] = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
-        if n[m.EVALUATION] == m.OK:
-            keep_scales(h, w)
+        if d.evaluation == m.OK and project(d.h, d.f, d.w, d.n, t, d.h[m.Y], d.h[m.SLOPES], tolerance) < 0:
+            d.evaluation = m.NOT_CLOSED
+        if d.evaluation == m.OK and d.n_kept_rows > 0 and d.pivot[m.LAST_PIVOT] < BLIND:
+            d.evaluation = m.SINGULAR  # multipliers so near to a singular pose are mostly rounding
+        if d.evaluation == m.OK:
+            keep_scales(d)
 
     @kernel
     def observe(h, f, w, n, rows, pieces, tolerance, out):
-        every, uneven, states = rows.shape[0], -1, rows.shape[0] * columns_before_state(h)
+        d = data(h, f, w, n)
+        every, uneven, states = rows.shape[0], -1, rows.shape[0] * columns_before_state(d)
         for turn in range(every):
             r = place_of(turn, every)
             first, last = r - r % APART - APART, r - r % APART + 2 * APART
             foreseen = tolerance != AS_RECORDED and r % APART > 0 and first >= 0 and last < every and first != uneven
             foreseen = foreseen and even(rows, first, last)
             while True:
-                state = select(h, w, n, rows[r], pieces[r])
+                state = select(d, rows[r], pieces[r])
                 if tolerance == AS_RECORDED:
-                    place(h, f, w, n, rows[r, 0])
+                    place(d, rows[r, 0])
                     break
-                foreseen = foreseen and foresee(h, w, rows, r, state, out, states)
+                foreseen = foreseen and foresee(d, rows, r, state, out, states)
                 evaluate(h, f, w, n, rows[r, 0], h[m.Y], h[m.SLOPES])
-                if not foreseen or (n[m.EVALUATION] == m.OK and open_by(h, f, w) <= tolerance):
-                    close(h, f, w, n, rows[r, 0], tolerance)
+                if not foreseen or (d.evaluation == m.OK and open_by(d) <= tolerance):
+                    close(d, rows[r, 0], tolerance)
                     break
                 uneven, foreseen = first, False  # as where a step ends
-            kinematics(data(h, f, w, n))  # at the accelerations in DU
+            kinematics(d)  # at the accelerations in DU
             if tolerance == AS_RECORDED:
-                copy(h, w, out, every, r, 0, True)
+                copy(d, out, every, r, 0, True)
             else:
-                copy(h, w, out, every, r, store(h, f, w, n, out, every, r), False)
+                copy(d, out, every, r, store(d, out, every, r), False)
 
     return observe

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
+
+#: of the polynomials of the laws' pieces
+DEGREE = 7
 
 
 @kernel
-def no_harmonics(h, f, w, law, piece, s):
+def no_harmonics(d, k, piece, s):
     """Polynomials only."""
 
 
@@ -24,23 +27,23 @@ def prescribe(d):
 
 
 def make_laws(harmonics: Callable | None = None) -> Callable:
-    """The kernel laws(h, f, w, n, t); harmonics(h, f, w, law, piece, s) adds to value, rate, second rate."""
+    """The kernel laws(h, f, w, n, t); harmonics(d, k, piece, s) adds those of law k in a piece."""
     add_harmonics = no_harmonics if harmonics is None else harmonics
 
     @kernel
     def laws(h, f, w, n, t):
         """Value, rate and second rate of every law, from its piece in force."""
-        for k in range(h[m.N_LAWS]):
-            piece = n[n[m.ACTIVE] + k]
-            o = m.PIECES.row(h, piece)
-            s = t - f[o + m.PIECES.start]
-            x, v, a = f[o + m.PIECES.size - 1], 0.0, 0.0
-            for c in range(m.PIECES.size - 2, 0, -1):
+        d = data(h, f, w, n)
+        for k in range(d.n_laws):
+            active = d.active[k]
+            piece, law = d.pieces[active], d.law[k]
+            s = t - piece.start
+            x, v, a = piece.coefficients[DEGREE], 0.0, 0.0
+            for c in range(DEGREE - 1, -1, -1):
                 a = a * s + 2.0 * v
                 v = v * s + x
-                x = x * s + f[o + c]
-            law = m.LAW.row(h, k)
-            w[law], w[law + 1], w[law + 2] = x, v, a
-            add_harmonics(h, f, w, law, piece, s)
+                x = x * s + piece.coefficients[c]
+            law.value, law.rate, law.second_rate = x, v, a
+            add_harmonics(d, k, active, s)
 
     return laws

@@ -10,8 +10,9 @@ from collections.abc import Callable
 from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations.envelope import base, factor, multiply
+from flexclear.pipeline.dynamics.equations.envelope import factor, multiply
 from flexclear.pipeline.dynamics.equations.retraction import make_position_rates
+from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 
 ITERATIONS = 8
@@ -27,30 +28,36 @@ SLOWLY = 0.1
 
 
 @kernel
-def largest(w, first, count):
-    """Largest magnitude of a stretch of w; NaN counts as infinite."""
+def largest(values, count):
+    """Largest magnitude of the first `count` entries of a stretch; NaN counts as infinite."""
     result = 0.0
-    for k in range(first, first + count):
-        if not abs(w[k]) <= result:
-            result = abs(w[k]) if w[k] == w[k] else 1e300
+    for k in range(count):
+        if not abs(values[k]) <= result:
+            result = abs(values[k]) if values[k] == values[k] else 1e300
     return result
 
 
 @kernel
-def widest(h, f, w, values, solved):
-    """Largest of the closure rows' values from w[values] on, a turn counting with the mechanism's size [m, or m/s].
+def widest(d, values, solved):
+    """Largest of the closure rows' values, a turn counting with the mechanism's size [m, or m/s].
 
     solved: whether only of the rows that are solved for.  Lengths of an independent mechanism that is smaller than all
     that there is count for more by that much.
     """
-    result, arm = 0.0, w[h[m.CONTROL] + m.LENGTH]
-    for c in range(h[m.N_CLOSURES]):
-        first, weight = m.CLOSURES.row0(h, c), f[m.CLOSURE_NUMBERS.row(h, c)]
-        for k in range(first, first + (m.CLOSURES.n_kept(h, c) if solved else m.CLOSURES.n_rows(h, c))):
-            size = abs(w[values + k]) * (weight if m.CLOSURE_ROWS.kind(h, k) == 0 else arm)
+    result, arm = 0.0, d.control[m.LENGTH]
+    for c in range(d.n_closures):
+        closure, weight = d.closures[c], d.closure_numbers[c].weight
+        for k in range(closure.row0, closure.row0 + (closure.n_kept if solved else closure.n_rows)):
+            size = abs(values[k]) * (weight if d.closure_rows[k].kind == 0 else arm)
             if not size <= result:
                 result = size if size == size else 1e300
     return result
+
+
+@kernel
+def open_by(d):
+    """How far loops are open, or how fast they open, at the evaluated state [m, or m/s]."""
+    return max(widest(d, d.residual, True), widest(d, d.residual_rate, True))
 
 
 @kernel
@@ -60,43 +67,42 @@ def no_projection(h, f, w, n, t, y, dy, tolerance):
 
 
 @kernel
-def keep_scales(h, w):
+def keep_scales(d):
     """Sizes of the closure rows at an accepted step; a rejected trial far away must not count."""
-    for r in range(h[m.N_KEPT_ROWS]):
-        o = h[m.ROW_SCALE] + r
-        w[o] = max(w[o], w[o + h[m.N_CLOSURE_ROWS]])
+    for r in range(d.n_kept_rows):
+        d.row_scale[r] = max(d.row_scale[r], d.row_scale[d.n_closure_rows + r])
 
 
 @kernel
-def rigid_bodies(h, f, w, n):
+def rigid_bodies(d):
     """No mode."""
 
 
 @kernel
-def no_modes(h, f, w, b):
+def no_modes(d, b):
     """No mode."""
 
 
 def make_stiffen(closures: Any) -> Callable:
-    """The kernel stiffen(h, f, w, n): the factors of an evaluation, with the modal stiffness beside the mass.
+    """The kernel stiffen(d): the factors of an evaluation, with the modal stiffness beside the mass.
 
     closures: the module of that name.
     """
 
     @kernel
-    def stiffen(h, f, w, n):
-        rows, matrix, size = h[m.ENVELOPE.place], h[m.MASS], h[m.NV]
-        multiply(h, rows, w, matrix, size)
-        for k in range(h[m.N_FLEX]):
-            modes, held, c0 = m.FLEXES.n_modes(h, k), m.FLEXES.n_held(h, k), m.FLEXES.c0(h, k)
-            stiffness = h[m.INTERFACE_DATA.place] + m.FLEXES.interface0(h, k) + (3 + modes) * modes
-            for i in range(modes):
-                row = base(h, rows, matrix, c0 + i) + c0
+    def stiffen(d):
+        multiply(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv)
+        for k in range(d.n_flex):
+            body = d.flexes[k]
+            n, c0 = body.n_modes, body.c0
+            stiffness = body.interface0 + (3 + n) * n
+            for i in range(n):
+                row = d.envelope[c0 + i].origin + c0
                 # without held shapes, shapes are eigenmodes
-                for j in range(0 if i >= held > 0 else i, i + 1):
-                    w[row + j] += SLOWLY**2 * f[stiffness + modes * i + j]
-        factor(h, rows, w, matrix, size, 0.0)
-        closures.complete(h, w, n)
+                for j in range(0 if i >= body.n_held > 0 else i, i + 1):
+                    d.mass[row + j] += SLOWLY**2 * d.interface_data[stiffness + n * i + j].value
+        factor(d.h, d.h[m.ENVELOPE.place], d.w, d.h[m.MASS], d.nv, 0.0)
+        closures.complete(d)
 
     return stiffen
 
@@ -116,13 +122,13 @@ def make_projection(
     position_rates, correction = make_position_rates(joints), closures.correction
 
     @kernel
-    def move(h, w, y, step):
+    def move(d, y, step):
         """Add to the positions of y the change that a small displacement of the coordinates means."""
-        for k in range(h[m.NV]):
-            w[h[m.U] + k] = w[step + k]
-        position_rates(h, w)
-        for k in range(h[m.NQ]):
-            w[y + k] += w[h[m.POSITION_RATE] + k]
+        for k in range(d.nv):
+            d.u[k] = d.w[step + k]
+        position_rates(d)
+        for k in range(d.nq):
+            d.w[y + k] += d.position_rate[k]
 
     @kernel
     def project(h, f, w, n, t, y, dy, tolerance):
@@ -132,31 +138,31 @@ def make_projection(
         of evaluations, or -1 when the loops do not close.  So near to a singular pose that a
         residual says little about the error behind it, nothing is changed.
         """
-        step, used, apart = h[m.CORRECTION], 0, APART * w[h[m.CONTROL] + m.LENGTH]
-        if w[h[m.PIVOT] + m.LAST_PIVOT] < BLIND:
+        d = data(h, f, w, n)
+        step, used, apart = h[m.CORRECTION], 0, APART * d.control[m.LENGTH]
+        if d.pivot[m.LAST_PIVOT] < BLIND:
             return 0
         for _ in range(ITERATIONS):
-            worst = max(widest(h, f, w, h[m.RESIDUAL], True), widest(h, f, w, h[m.RESIDUAL_RATE], True))
-            if worst <= tolerance:
-                return used if widest(h, f, w, h[m.RESIDUAL], False) <= max(apart, tolerance) else -1
-            if n[m.ABRIDGED]:
+            if open_by(d) <= tolerance:
+                return used if widest(d, d.residual, False) <= max(apart, tolerance) else -1
+            if d.abridged:
                 evaluate(h, f, w, n, t, y, dy)  # for its factors
-            stiffen(h, f, w, n)
-            if n[m.EVALUATION] != m.OK:
+            stiffen(d)
+            if d.evaluation != m.OK:
                 return -1
-            correction(h, w, h[m.RESIDUAL_RATE], step)
-            to_modes(h, f, w, step)
-            for k in range(h[m.NV]):
-                w[y + h[m.NQ] + k] += w[step + k]
-            correction(h, w, h[m.RESIDUAL], step)
-            to_modes(h, f, w, step)
-            move(h, w, y, step)
+            correction(d, h[m.RESIDUAL_RATE], step)
+            to_modes(d, step)
+            for k in range(d.nv):
+                w[y + d.nq + k] += w[step + k]
+            correction(d, h[m.RESIDUAL], step)
+            to_modes(d, step)
+            move(d, y, step)
             evaluate(h, f, w, n, t, y, dy)
             used += 1
-            if n[m.EVALUATION] != m.OK:
+            if d.evaluation != m.OK:
                 return -1
-        if not widest(h, f, w, h[m.RESIDUAL], True) <= ROUNDING * tolerance:
+        if not widest(d, d.residual, True) <= ROUNDING * tolerance:
             return -1
-        return used if widest(h, f, w, h[m.RESIDUAL], False) <= max(apart, ROUNDING * tolerance) else -1
+        return used if widest(d, d.residual, False) <= max(apart, ROUNDING * tolerance) else -1
 
     return project

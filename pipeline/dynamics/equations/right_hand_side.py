@@ -24,38 +24,18 @@ MASSLESS_PIVOT = 1e-15
 
 
 @kernel
-def nothing(h, f, w, n):
+def nothing(d):
     """Stands for the forces of parts that a mechanism does not have."""
 
 
 @kernel
-def no_modal_mass(h, f, w):
+def no_modal_rates(d, dy):
     """No modes."""
 
 
 @kernel
-def no_modal_forces(h, w):
-    """No modes."""
-
-
-@kernel
-def no_modal_rates(h, f, w, dy):
-    """No modes."""
-
-
-@kernel
-def no_link_load(h, w, i):
+def no_link_load(d, i):
     """No link is carried by a flexible one."""
-
-
-@kernel
-def no_closures(h, f, w, n):
-    """A tree needs no multipliers."""
-
-
-@kernel
-def no_known_forces(h, w):
-    """No closure loads a drive."""
 
 
 @kernel
@@ -85,7 +65,7 @@ def gather(d, i):
     """Force and momentum of link i's coordinates; then take its subtree to its parent."""
     link, wrench = d.links[i], d.wrench[i]
     for k in range(link.c0, link.c0 + link.n_speeds):
-        carry(d.h, d.w, i, k)
+        carry(d, i, k)
         column = d.columns[k]
         d.bias[k] = dot(column.angular, wrench.moment) + dot(column.linear, wrench.force)
     above = d.wrench[link.parent]
@@ -137,11 +117,11 @@ def make_forces(
         ground.moment, ground.force = ZERO, ZERO
         for i in range(1, d.n_links):
             if d.links[i].flex < 0:
-                rigid.inertia(d.h, d.f, d.w, i)
-        flexible_inertia(d.h, d.f, d.w, d.n)
-        contact_forces(d.h, d.f, d.w, d.n)
-        applied(d.h, d.f, d.w, d.n)
-        stop_forces(d.h, d.f, d.w, d.n)
+                rigid.inertia(d, i)
+        flexible_inertia(d)
+        contact_forces(d)
+        applied(d)
+        stop_forces(d)
 
     return forces
 
@@ -180,12 +160,12 @@ def make_rates(
     kinematics = make_kinematics(joints, flexible)
     forces = make_forces(flexible, contacts, loads, stops)
     port_load = no_link_load if flexible is None else flexible.port_load
-    modal_mass = no_modal_mass if flexible is None else flexible.mass_matrix
+    modal_mass = nothing if flexible is None else flexible.mass_matrix
     modal_rates = no_modal_rates if flexible is None else flexible.modal_rates
-    modal = no_modal_forces if flexible is None else flexible.modal_forces
-    close = no_closures if closures is None else closures.close
-    known_forces = no_known_forces if closures is None else closures.known_forces
-    rub, rub_drives = (nothing, no_known_forces) if friction is None else friction
+    modal = nothing if flexible is None else flexible.modal_forces
+    close = nothing if closures is None else closures.close
+    known_forces = nothing if closures is None else closures.known_forces
+    rub, rub_drives = (nothing, nothing) if friction is None else friction
 
     @kernel
     def gather_forces(d):
@@ -193,12 +173,12 @@ def make_rates(
         for k in range(d.mass_size):
             d.mass[k] = 0.0
         forces(d)
-        modal_mass(d.h, d.f, d.w)
+        modal_mass(d)
         copy_inertia(d)
         for i in range(d.n_links - 1, 0, -1):
-            port_load(d.h, d.w, i)
+            port_load(d, i)
             gather(d, i)
-        modal(d.h, d.w)
+        modal(d)
 
     @kernel
     def store_rates(d, dy):
@@ -209,7 +189,7 @@ def make_rates(
             d.w[dy + k] = d.position_rate[k]
         for k in range(d.nv):
             d.w[dy + d.nq + k] = d.du[k]
-        modal_rates(d.h, d.f, d.w, dy)
+        modal_rates(d, dy)
         for k in range(d.n_ledger):
             d.w[dy + d.nq + d.nv + k] = d.ledger_rate[k]
 
@@ -231,14 +211,14 @@ def make_rates(
         for k in range(d.nv):
             d.force[k] = -d.bias[k]
         forward(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, h[m.FORCE])
-        close(h, f, w, n)
+        close(d)
         backward(h, h[m.ENVELOPE.place], w, h[m.MASS], d.nv, h[m.FORCE])
         for k in range(d.nv):
             d.du[k] = d.force[k]
-        rub(h, f, w, n)
+        rub(d)
         drive_forces(d)
-        known_forces(h, w)
-        rub_drives(h, w)
+        known_forces(d)
+        rub_drives(d)
         store_rates(d, dy)
 
     return rates

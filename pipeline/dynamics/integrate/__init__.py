@@ -2,8 +2,9 @@
 order test, and parameters of its own, if it has any, in `pipeline.core.scene.solver`.
 
 `stepper` runs any method, with steps that `adaptive` or `fixed` choose; `contact_events` locates contacts in its steps
-(`step_end_events` does not), `contact_phases` follows what happens inside them, `singular_step` steps over singular
-poses, `recording` writes down. Methods share `runge_kutta`, `newton`, `hermite` and `norms`.
+(`step_end_events` does not), `contact_phases` follows what happens inside them, `guards` end steps where friction
+bends, `singular_step` steps over singular poses, `recording` writes down. Methods share `runge_kutta`, `newton`,
+`hermite` and `norms`.
 """
 
 from flexclear.pipeline.core.integrators import INTEGRATORS

@@ -35,29 +35,29 @@ def memory(h: np.ndarray) -> int:
 
 
 @kernel
-def begin(h, f, w, n):
+def begin(d):
     """Forget all earlier slopes."""
-    w[h[m.MEMORY] + COUNT] = 0.0
+    d.memory[COUNT] = 0.0
 
 
 @kernel
-def alike(h, w, step):
+def alike(d, step):
     """Whether a step is as long as those between the slopes that are kept."""
-    distance = w[h[m.MEMORY] + DISTANCE]
+    distance = d.memory[DISTANCE]
     return abs(step - distance) <= ALIKE * distance
 
 
 @kernel
-def keep(h, f, w, n, step):
+def keep(d, step):
     """Remember the slope where an accepted step started."""
-    o, size = h[m.MEMORY], h[m.NY]
-    if w[o + COUNT] == 0.0 or not alike(h, w, step):
-        w[o + COUNT], w[o + DISTANCE] = 0.0, step
+    size = d.ny
+    if d.memory[COUNT] == 0.0 or not alike(d, step):
+        d.memory[COUNT], d.memory[DISTANCE] = 0.0, step
     for c in range(size):
-        w[o + KEPT + 2 * size + c] = w[o + KEPT + size + c]
-        w[o + KEPT + size + c] = w[o + KEPT + c]
-        w[o + KEPT + c] = w[slope(h, 0) + c]
-    w[o + COUNT] = min(w[o + COUNT] + 1.0, MOST)
+        d.memory[KEPT + 2 * size + c] = d.memory[KEPT + size + c]
+        d.memory[KEPT + size + c] = d.memory[KEPT + c]
+        d.memory[KEPT + c] = d.w[slope(d, 0) + c]
+    d.memory[COUNT] = min(d.memory[COUNT] + 1.0, MOST)
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
@@ -65,23 +65,23 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     _, runge_kutta_step = make_stages(evaluate, rk4.A, rk4.B, rk4.C)
 
     @kernel
-    def attempt(h, f, w, n, step):
+    def attempt(d, step):
         """State Y_NEW after a step from Y; False when there is no slope at the predicted state."""
-        o, size, now, predicted = h[m.MEMORY], h[m.NY], slope(h, 0), slope(h, 1)
-        if w[o + COUNT] < MOST or not alike(h, w, step):
-            return runge_kutta_step(h, f, w, n, step)
+        o, size, now, predicted = d.at_memory, d.ny, slope(d, 0), slope(d, 1)
+        if d.memory[COUNT] < MOST or not alike(d, step):
+            return runge_kutta_step(d, step)
         one, two, three = o + KEPT, o + KEPT + size, o + KEPT + 2 * size
         for c in range(size):
-            ahead = 55.0 * w[now + c] - 59.0 * w[one + c]
-            ahead += 37.0 * w[two + c] - 9.0 * w[three + c]
-            w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + step / 24.0 * ahead
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_STAGE], predicted)
-        n[m.EVALUATIONS] += 1
+            ahead = 55.0 * d.w[now + c] - 59.0 * d.w[one + c]
+            ahead += 37.0 * d.w[two + c] - 9.0 * d.w[three + c]
+            d.y_stage[c] = d.y[c] + step / 24.0 * ahead
+        evaluate(d, d.time + step, d.at_y_stage, predicted)
+        d.evaluations += 1
         for c in range(size):
-            ahead = 9.0 * w[predicted + c] + 19.0 * w[now + c]
-            ahead += w[two + c] - 5.0 * w[one + c]
-            w[h[m.Y_NEW] + c] = w[h[m.Y] + c] + step / 24.0 * ahead
-        return n[m.EVALUATION] == m.OK
+            ahead = 9.0 * d.w[predicted + c] + 19.0 * d.w[now + c]
+            ahead += d.w[two + c] - 5.0 * d.w[one + c]
+            d.y_new[c] = d.y[c] + step / 24.0 * ahead
+        return d.evaluation == m.OK
 
     return begin, attempt, None, hermite.make_extend(LAST), keep
 

@@ -37,57 +37,56 @@ def make_step_control(
     watch_start, any_closed = contacts
 
     @kernel
-    def first_step(h, f, w, n):
+    def first_step(d):
         """Slope at the start of a segment, and a first step; False when the equations have no solution here."""
-        c, y, slope = h[m.CONTROL], h[m.Y], h[m.SLOPES]
-        other = slope + h[m.NY]
-        evaluate(h, f, w, n, w[c + m.TIME], y, slope)
-        n[m.EVALUATIONS] += 2
-        if n[m.EVALUATION] != m.OK or not finite(h, w, slope):
-            n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.OK else m.NO_START
+        y, slope = d.at_y, d.at_slopes
+        other = slope + d.ny
+        evaluate(d, d.time, y, slope)
+        d.evaluations += 2
+        if d.evaluation != m.OK or not finite(d, slope):
+            d.status = m.NOT_A_NUMBER if d.evaluation == m.OK else m.NO_START
             return False
-        watch_start(h, w)
-        set_error_scales(h, f, w, y)
-        size, steepness = scaled_norm(h, w, y), scaled_norm(h, w, slope)
-        step = 1e-6 * w[c + m.SPAN]
+        watch_start(d)
+        set_error_scales(d, y)
+        size, steepness = scaled_norm(d, y), scaled_norm(d, slope)
+        step = 1e-6 * d.span
         if size > 1.0 and steepness > 0.0:  # a state below its tolerance, rounding of zero, sets no scale
-            step = min(0.01 * size / steepness, 0.01 * w[c + m.SPAN])
-        step = min(step, w[c + m.END] - w[c + m.TIME])
-        for k in range(h[m.NY]):
-            w[h[m.Y_STAGE] + k] = w[y + k] + step * w[slope + k]
-        evaluate(h, f, w, n, w[c + m.TIME] + step, h[m.Y_STAGE], other)
-        if n[m.EVALUATION] == m.OK:
-            for k in range(h[m.NY]):
-                w[other + k] -= w[slope + k]
-            steepness = max(steepness, scaled_norm(h, w, other) / step)
+            step = min(0.01 * size / steepness, 0.01 * d.span)
+        step = min(step, d.end - d.time)
+        for k in range(d.ny):
+            d.y_stage[k] = d.w[y + k] + step * d.w[slope + k]
+        evaluate(d, d.time + step, d.at_y_stage, other)
+        if d.evaluation == m.OK:
+            for k in range(d.ny):
+                d.w[other + k] -= d.w[slope + k]
+            steepness = max(steepness, scaled_norm(d, other) / step)
             if steepness > 0.0:
                 step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
-        if any_closed(h, n) and w[c + m.TOUCHED_STEP] > 0.0:
-            step = min(step, w[c + m.TOUCHED_STEP])
-        w[c + m.STEP] = step
-        w[c + m.FIRST], w[c + m.REJECTED_STEP] = 1.0, 0.0
-        w[c + m.LAST_NORM], w[c + m.MOST_GROWTH] = LEAST_NORM, GROW
-        n[m.FRESH] = 0
-        begin(h, f, w, n)
+        if any_closed(d) and d.touched_step > 0.0:
+            step = min(step, d.touched_step)
+        d.step = step
+        d.first, d.rejected_step = 1.0, 0.0
+        d.last_norm, d.most_growth = LEAST_NORM, GROW
+        d.fresh = 0
+        begin(d)
         return True
 
     @kernel
-    def error_norm(h, f, w, n, step):
+    def error_norm(d, step):
         """Error norm of the step to Y_NEW, 1 at the tolerance."""
-        set_error_scales(h, f, w, h[m.Y_NEW])
-        if any_closed(h, n):
-            for g in range(h[m.N_GROUPS]):
-                w[h[m.MAGNITUDE] + g] /= STRICTER
-        return error(h, f, w, n, step)
+        set_error_scales(d, d.at_y_new)
+        if any_closed(d):
+            for g in range(d.n_groups):
+                d.magnitude[g] /= STRICTER
+        return error(d, step)
 
     @kernel
-    def seen_order(h, w, step, norm):
+    def seen_order(d, step, norm):
         """Power of the step with which the error falls, as this rejected step and the one before it say.
 
         Where a contact begins or friction turns, the solution has less derivatives than the method asks for.
         """
-        c = h[m.CONTROL]
-        longer, worse = w[c + m.REJECTED_STEP], w[c + m.REJECTED_NORM]
+        longer, worse = d.rejected_step, d.rejected_norm
         if longer == 0.0 or worse >= FAILED:
             return 1.0 * order
         if norm >= worse:
@@ -95,25 +94,23 @@ def make_step_control(
         return min(max(np.log(worse / norm) / np.log(longer / step), 1.0), 1.0 * order)
 
     @kernel
-    def after_rejection(h, w, n, step, norm):
+    def after_rejection(d, step, norm):
         """Try again with a shorter step."""
-        c = h[m.CONTROL]
-        w[c + m.STEP] = step * max(SHRINK, SAFETY * norm ** (-1.0 / seen_order(h, w, step, norm)))
-        w[c + m.REJECTED_STEP], w[c + m.REJECTED_NORM] = step, norm
-        w[c + m.MOST_GROWTH] = 1.0
+        d.step = step * max(SHRINK, SAFETY * norm ** (-1.0 / seen_order(d, step, norm)))
+        d.rejected_step, d.rejected_norm = step, norm
+        d.most_growth = 1.0
         return True
 
     @kernel
-    def next_step(h, w, n, step, norm):
+    def next_step(d, step, norm):
         """Length of the step after the one that has just been accepted."""
-        c = h[m.CONTROL]
         norm = max(norm, LEAST_NORM)
-        growth = SAFETY * norm**remembering * w[c + m.LAST_NORM] ** MEMORY
-        growth = min(w[c + m.MOST_GROWTH], max(SHRINK, growth))
-        if w[c + m.FIRST] > 0.0 and any_closed(h, n):
-            w[c + m.TOUCHED_STEP] = step * growth
-        w[c + m.FIRST], w[c + m.REJECTED_STEP] = 0.0, 0.0
-        w[c + m.LAST_NORM], w[c + m.MOST_GROWTH] = norm, GROW
+        growth = SAFETY * norm**remembering * d.last_norm**MEMORY
+        growth = min(d.most_growth, max(SHRINK, growth))
+        if d.first > 0.0 and any_closed(d):
+            d.touched_step = step * growth
+        d.first, d.rejected_step = 0.0, 0.0
+        d.last_norm, d.most_growth = norm, GROW
         return step if 1.0 <= growth < steady else step * growth
 
     return first_step, error_norm, after_rejection, next_step

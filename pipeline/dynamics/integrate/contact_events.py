@@ -13,11 +13,9 @@ from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
-from flexclear.pipeline.dynamics.integrate.friction_kinks import Kinks, make_end_on_kink, together
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.mode_changes import (
     NEVER,
-    clearance,
     cubic_tells,
     ends_tell,
     make_locate_change,
@@ -25,7 +23,7 @@ from flexclear.pipeline.dynamics.integrate.mode_changes import (
     zero_gap,
 )
 from flexclear.pipeline.dynamics.integrate.recording import add_event
-from flexclear.pipeline.dynamics.integrate.stepper import AGAIN, RESTART, watch_nothing
+from flexclear.pipeline.dynamics.integrate.stepper import AGAIN, NO_GUARDS, RESTART
 from flexclear.pipeline.dynamics.integrate.within_step import make_evaluate_at, make_repeat
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -45,92 +43,91 @@ FURTHER = 10.0
 
 # Modes ---------------------------------------------------------------------------------------------------------------
 @kernel
-def watch_start(h, w):
+def watch_start(d):
     """Note what the contacts do where a segment starts, which has just been evaluated."""
-    for c in range(h[m.N_CONTACTS]):
-        o, now = m.WATCH.row(h, c), m.TOUCH.row(h, c)
-        w[o + m.WATCH.gap0], w[o + m.WATCH.rate0] = w[now + m.TOUCH.gap], w[now + m.TOUCH.rate]
-        w[o + m.WATCH.force0], w[o + m.WATCH.slip0] = w[now + m.TOUCH.normal_force], w[now + m.TOUCH.slip]
-        w[o + m.WATCH.slip_rate0] = 0.0
+    for c in range(d.n_contacts):
+        watch, now = d.watch[c], d.touch[c]
+        watch.gap0, watch.rate0 = now.gap, now.rate
+        watch.force0, watch.slip0 = now.normal_force, now.slip
+        watch.slip_rate0 = 0.0
 
 
 @kernel
-def any_closed(h, n):
+def any_closed(d):
     """Whether some contact is closed."""
     result = False
-    for c in range(h[m.N_CONTACTS]):
-        result |= n[n[m.MODE] + c] == 1
+    for c in range(d.n_contacts):
+        result |= d.mode[c] == 1
     return result
 
 
 @kernel
-def relax_bristles(h, w, c):
+def relax_bristles(d, c):
     """The bristles of a contact that begins bear nothing yet."""
-    place = m.CONTACTS.bristle(h, c)
+    place = d.contacts[c].bristle
     if place >= 0:
         for k in range(3):
-            w[h[m.Y_NEW] + place + k] = 0.0
+            d.y_new[place + k] = 0.0
 
 
 @kernel
-def change_mode(h, w, n, events, c, t):
+def change_mode(d, events, c, t):
     """Change the mode of contact c at time t, latch its impact rate, and write the event down."""
-    o = m.WATCH.row(h, c)
-    rate = w[o + m.WATCH.rate1]
-    if n[n[m.MODE] + c] == 0:
-        n[n[m.MODE] + c] = 1
-        w[h[m.LATCHED] + c] = max(rate, 0.0)
-        relax_bristles(h, w, c)
-        row = add_event(events, n, c, m.CLOSING, t)
+    watch = d.watch[c]
+    rate = watch.rate1
+    if d.mode[c] == 0:
+        d.mode[c] = 1
+        d.latched[c] = max(rate, 0.0)
+        relax_bristles(d, c)
+        row = add_event(d, events, c, m.CLOSING, t)
         event = events[row]
         event[m.EVENT.speed], event[m.EVENT.peak_force], event[m.EVENT.peak_depth] = rate, 0.0, 0.0
-        w[o + m.WATCH.event_row], w[o + m.WATCH.trend0] = row, m.STEEPLY
+        watch.event_row, watch.trend0 = row, m.STEEPLY
     else:
-        n[n[m.MODE] + c] = 0
-        ended = events[add_event(events, n, c, m.OPENING, t)]
+        d.mode[c] = 0
+        ended = events[add_event(d, events, c, m.OPENING, t)]
         ended[m.EVENT.speed] = -rate
-        begun = events[int(w[o + m.WATCH.event_row])]
+        begun = events[int(watch.event_row)]
         begun[m.EVENT.duration] = t - begun[m.EVENT.time]
 
 
 # Events of a step ----------------------------------------------------------------------------------------------------
 @kernel
-def give_up(n, status, c):
+def give_up(d, status, c):
     """What resolve_events returns when contact c ends the run."""
-    n[m.STATUS], n[m.CULPRIT] = status, c
+    d.status, d.culprit = status, c
     return -1
 
 
 @kernel
-def try_again(n, c):
+def try_again(d, c):
     """What it returns when the step cannot be made with its end on an event of contact c."""
-    give_up(n, m.LOST_CLOSURE, c)
+    give_up(d, m.LOST_CLOSURE, c)
     return AGAIN
 
 
 @kernel
-def stepped_over(h, f, w, n, c):
+def stepped_over(d, c):
     """Whether contact c, about to change its mode where a step starts, has begun long before."""
-    gap, length = w[m.TOUCH.row(h, c) + m.TOUCH.gap], f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.length]
-    deep = DEEP * clearance(h, f, c) + ERRORS * w[h[m.CONTROL] + m.RTOL] * length
-    return gap < -deep and n[n[m.MODE] + c] == 0
+    gap, length = d.touch[c].gap, d.contact_numbers[c].length
+    deep = DEEP * d.contact_numbers[c].clearance + ERRORS * d.rtol * length
+    return gap < -deep and d.mode[c] == 0
 
 
 @kernel
-def backwards(h, w, n, c, rate):
+def backwards(d, c, rate):
     """Whether contact c would change its mode on the way back: a graze that a shorter step is to decide.
 
     Steps of a chosen length, and polynomials, cannot be made shorter.
     """
-    o = h[m.CONTROL]
-    return side(n, c) * rate < 0.0 and w[o + m.FIXED] == 0.0 and w[o + m.COLLOCATED] == 0.0
+    return side(d, c) * rate < 0.0 and d.fixed == 0.0 and d.collocated == 0.0
 
 
 @kernel
-def resolvable(h, f, w, c, step):
+def resolvable(d, c, step):
     """Whether contact c moves further in a step than its gap at the start is uncertain."""
-    o = m.WATCH.row(h, c)
-    return abs(w[o + m.WATCH.rate0]) * step > FURTHER * max(abs(w[o + m.WATCH.gap0]), zero_gap(h, f, w, c))
+    watch = d.watch[c]
+    return abs(watch.rate0) * step > FURTHER * max(abs(watch.gap0), zero_gap(d, c))
 
 
 def make_resolve_events(
@@ -140,26 +137,26 @@ def make_resolve_events(
     project: Callable,
     method: Any,
     regimes: Callable,
-    kinks: Kinks | None,
+    guards: tuple[Callable, ...],
 ) -> Callable:
-    """The kernel resolve_events(h, f, w, n, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
+    """The kernel resolve_events(d, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
     last = method.last
     evaluate_at, repeat = make_evaluate_at(evaluate, method), make_repeat(evaluate, attempt, project, method)
     follow_contacts = make_follow_contacts(evaluate, evaluate_at, extend, method, regimes)
     locate_change = make_locate_change(evaluate_at)
 
     @kernel
-    def end_on_event(h, f, w, n, step, c):
+    def end_on_event(d, step, c):
         """Repeat the step so that it ends on the event: its length, or -1 when that fails, and whether it is there.
 
         Grazes are approached slowly: what is not there after three steps is left to shorter ones.
         """
         off = 0.0
         for _ in range(3):
-            if not repeat(h, f, w, n, step):
+            if not repeat(d, step):
                 return -1.0, False
-            gap, rate = w[m.TOUCH.row(h, c) + m.TOUCH.gap], w[m.TOUCH.row(h, c) + m.TOUCH.rate]
-            if abs(gap) <= zero_gap(h, f, w, c):
+            gap, rate = d.touch[c].gap, d.touch[c].rate
+            if abs(gap) <= zero_gap(d, c):
                 return step, True
             if not abs(gap) < 0.1 * abs(rate) * step:
                 return step, False
@@ -167,101 +164,100 @@ def make_resolve_events(
             step += off
         return step, abs(off) <= CLOSE * step
 
-    end_on_kink = make_end_on_kink(evaluate_at, extend, repeat, kinks)
-    end, accept = (kinks.end, kinks.accept) if kinks else (watch_nothing, watch_nothing)
+    _, note_end, accept, make_end_on_guard = guards
+    end_on_guard = make_end_on_guard(evaluate_at, extend, repeat)
 
     @kernel
-    def first_change(h, f, w, n, step):
+    def first_change(d, step):
         """Contact and share of the step of its first mode change, and whether the dense output is ready."""
         ready, first, which = False, NEVER, -1
-        for c in range(h[m.N_CONTACTS]):
-            if not (ends_tell(h, w, n, c) or cubic_tells(h, w, n, c, step)):
+        for c in range(d.n_contacts):
+            if not (ends_tell(d, c) or cubic_tells(d, c, step)):
                 continue
             if not ready:
-                extend(h, f, w, n, step)
+                extend(d, step)
                 ready = True
-            theta = locate_change(h, f, w, n, step, c)
+            theta = locate_change(d, step, c)
             if theta < first:
                 first, which = theta, c
         return which, first, ready
 
     @kernel
-    def change_at_start(h, f, w, n, c, events):
+    def change_at_start(d, c, events):
         """A mode change where the step starts: no step is made."""
-        n[m.IMMEDIATE] += 1
-        t = w[h[m.CONTROL] + m.TIME]
-        for k in range(h[m.NY]):
-            w[h[m.Y_NEW] + k] = w[h[m.Y] + k]
-        evaluate(h, f, w, n, t, h[m.Y_NEW], slope(h, last))
-        n[m.EVALUATIONS] += 1
-        if stepped_over(h, f, w, n, c):
-            return give_up(n, m.STEPPED_OVER, c)
-        w[m.WATCH.row(h, c) + m.WATCH.rate1] = w[m.TOUCH.row(h, c) + m.TOUCH.rate]
-        change_mode(h, w, n, events, c, t)
-        return give_up(n, m.STUCK_EVENT, c) if n[m.IMMEDIATE] > MOST_IMMEDIATE else RESTART
+        d.immediate += 1
+        t = d.time
+        for k in range(d.ny):
+            d.y_new[k] = d.y[k]
+        evaluate(d, t, d.at_y_new, slope(d, last))
+        d.evaluations += 1
+        if stepped_over(d, c):
+            return give_up(d, m.STEPPED_OVER, c)
+        d.watch[c].rate1 = d.touch[c].rate
+        change_mode(d, events, c, t)
+        return give_up(d, m.STUCK_EVENT, c) if d.immediate > MOST_IMMEDIATE else RESTART
 
     @kernel
-    def resolve_events(h, f, w, n, step, t_new, rows, events):
-        t = w[h[m.CONTROL] + m.TIME]
+    def resolve_events(d, step, t_new, rows, events):
+        t = d.time
         for shortened in range(MOST_SHORTENED + 1):
-            watch_end(h, w)
-            end(h, w)
-            which, first, ready = first_change(h, f, w, n, step)
-            length = end_on_kink(h, f, w, n, step, first if which >= 0 else 1.0, ready)
+            watch_end(d)
+            note_end(d)
+            which, first, ready = first_change(d, step)
+            length = end_on_guard(d, step, first if which >= 0 else 1.0, ready)
             if length < 0.0:
-                return try_again(n, max(which, 0)), ready, t_new, step
+                return try_again(d, max(which, 0)), ready, t_new, step
             if length > 0.0:
-                n[m.IMMEDIATE] = 0
-                watch_end(h, w)
-                end(h, w)
-                accept(h, w)
-                extend(h, f, w, n, length)
-                return 0, follow_contacts(h, f, w, n, length, True, rows, events), t + length, length
+                d.immediate = 0
+                watch_end(d)
+                note_end(d)
+                accept(d)
+                extend(d, length)
+                return 0, follow_contacts(d, length, True, rows, events), t + length, length
             if which < 0:
-                n[m.IMMEDIATE] = 0
-                accept(h, w)
-                return 0, follow_contacts(h, f, w, n, step, ready, rows, events), t_new, step
+                d.immediate = 0
+                accept(d)
+                return 0, follow_contacts(d, step, ready, rows, events), t_new, step
             if first * step <= 1e-15 * max(abs(t), step):
-                back = backwards(h, w, n, which, w[m.WATCH.row(h, which) + m.WATCH.rate0])
-                if back and resolvable(h, f, w, which, step):
-                    return try_again(n, which), ready, t_new, step
-                return change_at_start(h, f, w, n, which, events), True, t, step
-            length, there = end_on_event(h, f, w, n, first * step, which)
+                back = backwards(d, which, d.watch[which].rate0)
+                if back and resolvable(d, which, step):
+                    return try_again(d, which), ready, t_new, step
+                return change_at_start(d, which, events), True, t, step
+            length, there = end_on_event(d, first * step, which)
             if length < 0.0:
-                return try_again(n, which), ready, t_new, step
+                return try_again(d, which), ready, t_new, step
             if there or shortened == MOST_SHORTENED:
                 break
             step *= min(0.5, max(SHORTER, 2.0 * first))
             t_new = t + step
-            if not repeat(h, f, w, n, step):
-                return try_again(n, which), ready, t_new, step
-        if backwards(h, w, n, which, w[m.TOUCH.row(h, which) + m.TOUCH.rate]):
-            return try_again(n, which), ready, t_new, step
-        n[m.IMMEDIATE] = 0
-        watch_end(h, w)
-        extend(h, f, w, n, length)  # before the mode changes: the outputs of this step belong to the old one
-        follow_contacts(h, f, w, n, length, True, rows, events)
-        change_mode(h, w, n, events, which, t + length)
+            if not repeat(d, step):
+                return try_again(d, which), ready, t_new, step
+        if backwards(d, which, d.touch[which].rate):
+            return try_again(d, which), ready, t_new, step
+        d.immediate = 0
+        watch_end(d)
+        extend(d, length)  # before the mode changes: the outputs of this step belong to the old one
+        follow_contacts(d, length, True, rows, events)
+        change_mode(d, events, which, t + length)
         return RESTART, True, t + length, length
 
     return resolve_events
 
 
-def located(regimes: Callable, *families: Kinks) -> tuple[Callable, Callable, Callable]:
+def located(regimes: Callable, guards: tuple[Callable, ...] = NO_GUARDS) -> tuple[Callable, Callable, Callable]:
     """What the stepper calls at the start of a segment, the maker of what it calls after each step, and `any_closed`.
 
     regimes: whether contacts have regimes of sticking (`contact_phases.regimes` or `contact_phases.no_regimes`).
-    families: of the kinks of friction on which steps end.
+    guards: on which steps end as well (`guards.AMONG_CONTACTS`).
     """
-    kinks = together(families)
-    start_kinks = kinks.start if kinks else watch_nothing
+    note_start = guards[0]
 
     @kernel
-    def start(h, w):
-        watch_start(h, w)
-        start_kinks(h, w)
+    def start(d):
+        watch_start(d)
+        note_start(d)
 
     def make(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
-        return make_resolve_events(evaluate, attempt, extend, project, method, regimes, kinks)
+        return make_resolve_events(evaluate, attempt, extend, project, method, regimes, guards)
 
     return start, make, any_closed

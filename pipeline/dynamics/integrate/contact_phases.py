@@ -14,7 +14,7 @@ from typing import Any
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.recording import add_event, snapshot
-from flexclear.pipeline.dynamics.integrate.within_step import make_locate_level, make_maximum
+from flexclear.pipeline.dynamics.integrate.within_step import make_locate, make_maximum
 from flexclear.pipeline.dynamics.kernels import kernel
 
 #: share of the step over which trends at its end are measured; a force's peak nearer to the end than this is
@@ -24,65 +24,59 @@ BACK = 1e-3
 
 # What is watched at the ends of a step -------------------------------------------------------------------------------
 @kernel
-def watch_end(h, w):
+def watch_end(d):
     """Note what the contacts do at the end of the step, where it has just been evaluated."""
-    for c in range(h[m.N_CONTACTS]):
-        o, now = m.WATCH.row(h, c), m.TOUCH.row(h, c)
-        w[o + m.WATCH.gap1], w[o + m.WATCH.rate1] = w[now + m.TOUCH.gap], w[now + m.TOUCH.rate]
-        w[o + m.WATCH.force1], w[o + m.WATCH.slip1] = w[now + m.TOUCH.normal_force], w[now + m.TOUCH.slip]
+    for c in range(d.n_contacts):
+        watch, now = d.watch[c], d.touch[c]
+        watch.gap1, watch.rate1 = now.gap, now.rate
+        watch.force1, watch.slip1 = now.normal_force, now.slip
 
 
 @kernel
-def end_becomes_start(h, w):
+def end_becomes_start(d):
     """The end of an accepted step is the start of the next."""
-    for c in range(h[m.N_CONTACTS]):
-        o = m.WATCH.row(h, c)
-        w[o + m.WATCH.gap0], w[o + m.WATCH.rate0] = w[o + m.WATCH.gap1], w[o + m.WATCH.rate1]
-        w[o + m.WATCH.force0], w[o + m.WATCH.trend0] = w[o + m.WATCH.force1], w[o + m.WATCH.trend1]
-        w[o + m.WATCH.slip0], w[o + m.WATCH.slip_rate0] = w[o + m.WATCH.slip1], w[o + m.WATCH.slip_rate1]
+    for c in range(d.n_contacts):
+        watch = d.watch[c]
+        watch.gap0, watch.rate0 = watch.gap1, watch.rate1
+        watch.force0, watch.trend0 = watch.force1, watch.trend1
+        watch.slip0, watch.slip_rate0 = watch.slip1, watch.slip_rate1
 
 
 @kernel
-def record_here(h, w, n, step, theta, rows):
-    """A row of the motion at a share of the step whose dense output is in Y_STAGE."""
-    snapshot(h, w, n, rows, w[h[m.CONTROL] + m.TIME] + theta * step, h[m.Y_STAGE])
+def touch_at(d, c, field):
+    """Index in w of a field of TOUCH of contact c."""
+    return d.at_touch + m.TOUCH.size * c + field
 
 
 # Regimes of friction -------------------------------------------------------------------------------------------------
 @kernel
-def no_regimes(h, f, c):
+def no_regimes(d, c):
     """No friction: neither sticking nor slipping."""
     return False
 
 
 @kernel
-def regimes(h, f, c):
+def regimes(d, c):
     """Whether contact c has a sliding speed below which its law sticks."""
-    return stick_speed(h, f, c) > 0.0
+    return d.contact_numbers[c].stick_speed > 0.0
 
 
 @kernel
-def stick_speed(h, f, c):
-    """Sliding speed below which the law of contact c sticks; 0 for laws without that."""
-    return f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.stick_speed]
-
-
-@kernel
-def passes_level(w, o, level):
+def passes_level(watch, level):
     """Whether the sliding speed passes a level between the ends of a step."""
-    return (w[o + m.WATCH.slip0] - level) * (w[o + m.WATCH.slip1] - level) < 0.0
+    return (watch.slip0 - level) * (watch.slip1 - level) < 0.0
 
 
 @kernel
-def may_touch_level(w, o, level, step):
+def may_touch_level(watch, level, step):
     """Whether a sliding speed that ends a step on the same side of a level may have been on the other meanwhile.
 
     It must approach the level at the start and leave it at the end; where it turns, the tangents at both ends meet
     beyond it, since a speed is convex where it passes its least value and concave at its largest.
     """
-    first, second = w[o + m.WATCH.slip0] - level, w[o + m.WATCH.slip1] - level
+    first, second = watch.slip0 - level, watch.slip1 - level
     side = 1.0 if first > 0.0 else -1.0
-    falls, rises = side * w[o + m.WATCH.slip_rate0] * step, side * w[o + m.WATCH.slip_rate1] * step
+    falls, rises = side * watch.slip_rate0 * step, side * watch.slip_rate1 * step
     if side * second <= 0.0 or falls > 0.0 or rises <= 0.0:
         return False
     meet = 0.0 if falls == 0.0 else (side * (second - first) - rises) / (falls - rises)
@@ -92,132 +86,140 @@ def may_touch_level(w, o, level, step):
 def make_follow_contacts(
     evaluate: Callable, evaluate_at: Callable, extend: Callable, method: Any, has_regimes: Callable
 ) -> Callable:
-    """The kernel follow_contacts(h, f, w, n, step, ready, rows, events) -> dense output ready?, after an accepted step.
+    """The kernel follow_contacts(d, step, ready, rows, events) -> dense output ready?, after an accepted step.
 
-    evaluate_at(h, f, w, n, step, theta): evaluates the dense output at a share of the step.
+    evaluate_at(d, step, theta): evaluates the dense output at a share of the step.
     has_regimes: `regimes` or `no_regimes`.
     """
     last, spare, interpolate = method.last, method.slopes - 1, method.interpolate
-    locate_level, maximum = make_locate_level(evaluate_at), make_maximum(evaluate_at)
+    maximum = make_maximum(evaluate_at)
 
     @kernel
-    def measure_trends(h, f, w, n, step):
+    def value_at(d, step, theta, index):
+        """What w holds at an index, at a fraction of the step."""
+        evaluate_at(d, step, theta)
+        return d.w[index]
+
+    locate = make_locate(value_at)
+
+    @kernel
+    def measure_trends(d, step):
         """At what rates each force and each sliding speed grow at the end of the step."""
-        final = slope(h, last)
-        for k in range(h[m.NY]):
-            w[h[m.Y_STAGE] + k] = w[h[m.Y_NEW] + k] - BACK * step * w[final + k]
-        t = w[h[m.CONTROL] + m.TIME] + (1.0 - BACK) * step
-        evaluate(h, f, w, n, t, h[m.Y_STAGE], slope(h, spare))
-        n[m.EVALUATIONS] += 1
-        for c in range(h[m.N_CONTACTS]):
-            o, before = m.WATCH.row(h, c), m.TOUCH.row(h, c)
-            w[o + m.WATCH.trend1] = (w[o + m.WATCH.force1] - w[before + m.TOUCH.normal_force]) / (BACK * step)
-            w[o + m.WATCH.slip_rate1] = (w[o + m.WATCH.slip1] - w[before + m.TOUCH.slip]) / (BACK * step)
+        final = slope(d, last)
+        for k in range(d.ny):
+            d.y_stage[k] = d.y_new[k] - BACK * step * d.w[final + k]
+        t = d.time + (1.0 - BACK) * step
+        evaluate(d, t, d.at_y_stage, slope(d, spare))
+        d.evaluations += 1
+        for c in range(d.n_contacts):
+            watch, before = d.watch[c], d.touch[c]
+            watch.trend1 = (watch.force1 - before.normal_force) / (BACK * step)
+            watch.slip_rate1 = (watch.slip1 - before.slip) / (BACK * step)
 
     @kernel
-    def trends_matter(h, f, w, n):
+    def trends_matter(d):
         """Whether some closed contact is compressing, or has regimes that a step may visit."""
         matter = False
-        for c in range(h[m.N_CONTACTS]):
-            o = m.WATCH.row(h, c)
-            compressing = w[o + m.WATCH.rate0] > 0.0 or w[o + m.WATCH.rate1] > 0.0
-            matter |= n[n[m.MODE] + c] == 1 and (compressing or has_regimes(h, f, c))
+        for c in range(d.n_contacts):
+            watch = d.watch[c]
+            compressing = watch.rate0 > 0.0 or watch.rate1 > 0.0
+            matter |= d.mode[c] == 1 and (compressing or has_regimes(d, c))
         return matter
 
     @kernel
-    def may_peak(h, f, w, c, step, record):
+    def may_peak(d, c, step, record):
         """Whether a damped force may peak above the record within the step; a lossless one peaks where it is deepest.
 
         Around its peak a force lies below its tangents.
         """
-        o = m.WATCH.row(h, c)
-        damped = f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.normal_law + 2] > 0.0
-        if not (damped and w[o + m.WATCH.rate0] > 0.0 and w[o + m.WATCH.trend0] > 0.0 and w[o + m.WATCH.trend1] <= 0.0):
+        watch = d.watch[c]
+        damped = d.contact_numbers[c].normal_law[2] > 0.0
+        if not (damped and watch.rate0 > 0.0 and watch.trend0 > 0.0 and watch.trend1 <= 0.0):
             return False
-        ahead = w[o + m.WATCH.force0] + w[o + m.WATCH.trend0] * step
-        return min(ahead, w[o + m.WATCH.force1] - w[o + m.WATCH.trend1] * step) > record
+        ahead = watch.force0 + watch.trend0 * step
+        return min(ahead, watch.force1 - watch.trend1 * step) > record
 
     @kernel
-    def may_change_regime(h, f, w, c, step):
+    def may_change_regime(d, c, step):
         """Whether contact c passes, or may pass and return, the speed below which it sticks."""
-        if not has_regimes(h, f, c):
+        if not has_regimes(d, c):
             return False
-        o, level = m.WATCH.row(h, c), stick_speed(h, f, c)
-        return passes_level(w, o, level) or may_touch_level(w, o, level, step)
+        watch, level = d.watch[c], d.contact_numbers[c].stick_speed
+        return passes_level(watch, level) or may_touch_level(watch, level, step)
 
     @kernel
-    def record_peak(h, f, w, n, step, c, rows, events):
+    def record_peak(d, step, c, rows, events):
         """The largest force within the step, if that is a record of this contact."""
-        event = events[int(w[m.WATCH.row(h, c) + m.WATCH.event_row])]
-        peak, where = maximum(h, f, w, n, step, m.TOUCH.row(h, c) + m.TOUCH.normal_force, 1.0)
+        event = events[int(d.watch[c].event_row)]
+        peak, where = maximum(d, step, touch_at(d, c, m.TOUCH.normal_force), 1.0)
         if peak > event[m.EVENT.peak_force]:
             event[m.EVENT.peak_force] = peak
-            interpolate(h, w, where, h[m.Y_STAGE])
-            record_here(h, w, n, step, where, rows)
+            interpolate(d, where, d.at_y_stage)
+            snapshot(d, rows, d.time + where * step, d.at_y_stage)
 
     @kernel
-    def record_compression(h, f, w, n, step, c, rows, events):
+    def record_compression(d, step, c, rows, events):
         """The deepest point of this compression, as an event."""
-        o, now = m.WATCH.row(h, c), m.TOUCH.row(h, c)
-        rate, before, after = now + m.TOUCH.rate, w[o + m.WATCH.rate0], w[o + m.WATCH.rate1]
-        theta = locate_level(h, f, w, n, step, rate, 0.0, 0.0, 0.0, 1.0, before, after)
-        event = events[add_event(events, n, c, m.COMPRESSION, w[h[m.CONTROL] + m.TIME] + theta * step)]
-        event[m.EVENT.speed], event[m.EVENT.peak_depth] = 0.0, -w[now + m.TOUCH.gap]
-        event[m.EVENT.peak_force] = w[now + m.TOUCH.normal_force]
-        begun = events[int(w[o + m.WATCH.event_row])]
-        begun[m.EVENT.peak_depth] = max(begun[m.EVENT.peak_depth], -w[now + m.TOUCH.gap])
-        begun[m.EVENT.peak_force] = max(begun[m.EVENT.peak_force], w[now + m.TOUCH.normal_force])
-        record_here(h, w, n, step, theta, rows)
+        watch, now = d.watch[c], d.touch[c]
+        rate = touch_at(d, c, m.TOUCH.rate)
+        theta = locate(d, step, rate, 0.0, 0.0, 0.0, 1.0, watch.rate0, watch.rate1)
+        event = events[add_event(d, events, c, m.COMPRESSION, d.time + theta * step)]
+        event[m.EVENT.speed], event[m.EVENT.peak_depth] = 0.0, -now.gap
+        event[m.EVENT.peak_force] = now.normal_force
+        begun = events[int(watch.event_row)]
+        begun[m.EVENT.peak_depth] = max(begun[m.EVENT.peak_depth], -now.gap)
+        begun[m.EVENT.peak_force] = max(begun[m.EVENT.peak_force], now.normal_force)
+        snapshot(d, rows, d.time + theta * step, d.at_y_stage)
 
     @kernel
-    def record_passage(h, f, w, n, step, c, a, b, fa, fb, rows, events):
+    def record_passage(d, step, c, a, b, fa, fb, rows, events):
         """Sticking begins or ends between the shares a and b of the step, as an event."""
-        slip = m.TOUCH.row(h, c) + m.TOUCH.slip
-        theta = locate_level(h, f, w, n, step, slip, stick_speed(h, f, c), 0.0, a, b, fa, fb)
+        slip = touch_at(d, c, m.TOUCH.slip)
+        theta = locate(d, step, slip, d.contact_numbers[c].stick_speed, 0.0, a, b, fa, fb)
         kind = m.STICKING if fb < 0.0 else m.SLIPPING
-        add_event(events, n, c, kind, w[h[m.CONTROL] + m.TIME] + theta * step)
-        record_here(h, w, n, step, theta, rows)
+        add_event(d, events, c, kind, d.time + theta * step)
+        snapshot(d, rows, d.time + theta * step, d.at_y_stage)
 
     @kernel
-    def record_regimes(h, f, w, n, step, c, rows, events):
+    def record_regimes(d, step, c, rows, events):
         """One passage between the regimes, or there and back, as events."""
-        o, level = m.WATCH.row(h, c), stick_speed(h, f, c)
-        first, second = w[o + m.WATCH.slip0] - level, w[o + m.WATCH.slip1] - level
+        watch, level = d.watch[c], d.contact_numbers[c].stick_speed
+        first, second = watch.slip0 - level, watch.slip1 - level
         if first * second < 0.0:
-            record_passage(h, f, w, n, step, c, 0.0, 1.0, first, second, rows, events)
+            record_passage(d, step, c, 0.0, 1.0, first, second, rows, events)
             return
         sign = -1.0 if first > 0.0 else 1.0
-        extreme, where = maximum(h, f, w, n, step, m.TOUCH.row(h, c) + m.TOUCH.slip, sign)
+        extreme, where = maximum(d, step, touch_at(d, c, m.TOUCH.slip), sign)
         beyond = sign * extreme - level
         if first * beyond < 0.0:
-            record_passage(h, f, w, n, step, c, 0.0, where, first, beyond, rows, events)
-            record_passage(h, f, w, n, step, c, where, 1.0, beyond, second, rows, events)
+            record_passage(d, step, c, 0.0, where, first, beyond, rows, events)
+            record_passage(d, step, c, where, 1.0, beyond, second, rows, events)
 
     @kernel
-    def follow_contacts(h, f, w, n, step, ready, rows, events):
-        if trends_matter(h, f, w, n):
-            measure_trends(h, f, w, n, step)
-        for c in range(h[m.N_CONTACTS]):
-            if n[n[m.MODE] + c] != 1:
+    def follow_contacts(d, step, ready, rows, events):
+        if trends_matter(d):
+            measure_trends(d, step)
+        for c in range(d.n_contacts):
+            if d.mode[c] != 1:
                 continue
-            o = m.WATCH.row(h, c)
-            event = events[int(w[o + m.WATCH.event_row])]
-            largest = max(w[o + m.WATCH.force0], w[o + m.WATCH.force1])
+            watch = d.watch[c]
+            event = events[int(watch.event_row)]
+            largest = max(watch.force0, watch.force1)
             event[m.EVENT.peak_force] = max(event[m.EVENT.peak_force], largest)
-            event[m.EVENT.peak_depth] = max(event[m.EVENT.peak_depth], -w[o + m.WATCH.gap1])
-            turns = w[o + m.WATCH.rate0] > 0.0 and w[o + m.WATCH.rate1] <= 0.0
-            peaks = may_peak(h, f, w, c, step, event[m.EVENT.peak_force])
-            passes = may_change_regime(h, f, w, c, step)
+            event[m.EVENT.peak_depth] = max(event[m.EVENT.peak_depth], -watch.gap1)
+            turns = watch.rate0 > 0.0 and watch.rate1 <= 0.0
+            peaks = may_peak(d, c, step, event[m.EVENT.peak_force])
+            passes = may_change_regime(d, c, step)
             if (turns or peaks or passes) and not ready:
-                extend(h, f, w, n, step)
+                extend(d, step)
                 ready = True
             if peaks:
-                record_peak(h, f, w, n, step, c, rows, events)
+                record_peak(d, step, c, rows, events)
             if turns:
-                record_compression(h, f, w, n, step, c, rows, events)
+                record_compression(d, step, c, rows, events)
             if passes:
-                record_regimes(h, f, w, n, step, c, rows, events)
-        end_becomes_start(h, w)
+                record_regimes(d, step, c, rows, events)
+        end_becomes_start(d)
         return ready
 
     return follow_contacts

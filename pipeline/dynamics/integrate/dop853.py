@@ -11,7 +11,6 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.pipeline.core.integrators import INTEGRATORS
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
 from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
@@ -104,16 +103,16 @@ D[3, SEEN] = (
 
 
 @kernel
-def error(h, f, w, n, step):
+def error(d, step):
     """Norm of the local error, 1 at the tolerance."""
-    size, k = h[m.NY], slope(h, 0)
+    size, k = d.ny, slope(d, 0)
     five = three = 0.0
     for c in range(size):
         a = b = 0.0
         for j in range(STAGES):
-            a += E5[j] * w[k + j * size + c]
-            b += E3[j] * w[k + j * size + c]
-        s = 1.0 / error_scale(h, w, c)
+            a += E5[j] * d.w[k + j * size + c]
+            b += E3[j] * d.w[k + j * size + c]
+        s = 1.0 / error_scale(d, c)
         a, b = a * s, b * s
         five += a * a
         three += b * b
@@ -123,18 +122,18 @@ def error(h, f, w, n, step):
 
 
 @kernel
-def interpolate(h, w, theta, out):
+def interpolate(d, theta, out):
     """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
-    size, dense = h[m.NY], h[m.DENSE]
+    size, dense = d.ny, d.at_dense
     s = 1.0 - theta
     for c in range(size):
-        v = w[dense + 6 * size + c] * theta
-        v = (v + w[dense + 5 * size + c]) * s
-        v = (v + w[dense + 4 * size + c]) * theta
-        v = (v + w[dense + 3 * size + c]) * s
-        v = (v + w[dense + 2 * size + c]) * theta
-        v = (v + w[dense + size + c]) * s
-        w[out + c] = w[dense + 7 * size + c] + (v + w[dense + c]) * theta
+        v = d.w[dense + 6 * size + c] * theta
+        v = (v + d.w[dense + 5 * size + c]) * s
+        v = (v + d.w[dense + 4 * size + c]) * theta
+        v = (v + d.w[dense + 3 * size + c]) * s
+        v = (v + d.w[dense + 2 * size + c]) * theta
+        v = (v + d.w[dense + size + c]) * s
+        d.w[out + c] = d.w[dense + 7 * size + c] + (v + d.w[dense + c]) * theta
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
@@ -142,23 +141,23 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     stage, attempt = make_stages(evaluate, A, B, C)
 
     @kernel
-    def extend(h, f, w, n, step):
+    def extend(d, step):
         """Prepare the dense output of the step to Y_NEW, whose slope is in row STAGES."""
-        size, dense = h[m.NY], h[m.DENSE]
+        size, dense = d.ny, d.at_dense
         for i in range(STAGES + 1, EXTENDED):
-            stage(h, f, w, n, step, i)
-        first, last = slope(h, 0), slope(h, STAGES)
+            stage(d, step, i)
+        first, last = slope(d, 0), slope(d, STAGES)
         for c in range(size):
-            delta = w[h[m.Y_NEW] + c] - w[h[m.Y] + c]
-            w[dense + c] = delta
-            w[dense + size + c] = step * w[first + c] - delta
-            w[dense + 2 * size + c] = 2.0 * delta - step * (w[last + c] + w[first + c])
-            for d in range(4):
+            delta = d.y_new[c] - d.y[c]
+            d.w[dense + c] = delta
+            d.w[dense + size + c] = step * d.w[first + c] - delta
+            d.w[dense + 2 * size + c] = 2.0 * delta - step * (d.w[last + c] + d.w[first + c])
+            for k in range(4):
                 total = 0.0
                 for j in range(EXTENDED):
-                    total += D[d, j] * w[first + j * size + c]
-                w[dense + (3 + d) * size + c] = step * total
-            w[dense + 7 * size + c] = w[h[m.Y] + c]
+                    total += D[k, j] * d.w[first + j * size + c]
+                d.w[dense + (3 + k) * size + c] = step * total
+            d.w[dense + 7 * size + c] = d.y[c]
 
     return begin_afresh, attempt, error, extend, keep_nothing
 

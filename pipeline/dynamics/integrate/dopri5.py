@@ -42,45 +42,45 @@ D = np.array(
 
 
 @kernel
-def weighted(h, w, weights, c):
+def weighted(d, weights, c):
     """Weighted sum of the slopes of state variable c."""
     total = 0.0
     for j in range(STAGES + 1):
-        total += weights[j] * w[slope(h, j) + c]
+        total += weights[j] * d.w[slope(d, j) + c]
     return total
 
 
 @kernel
-def error(h, f, w, n, step):
+def error(d, step):
     """Norm of the local error, 1 at the tolerance."""
     total = 0.0
-    for c in range(h[m.NY]):
-        total += (step * weighted(h, w, E, c) / error_scale(h, w, c)) ** 2
-    return np.sqrt(total / h[m.NY])
+    for c in range(d.ny):
+        total += (step * weighted(d, E, c) / error_scale(d, c)) ** 2
+    return np.sqrt(total / d.ny)
 
 
 @kernel
-def extend(h, f, w, n, step):
+def extend(d, step):
     """Prepare the dense output of the step to Y_NEW."""
-    size, dense = h[m.NY], h[m.DENSE]
+    size, dense = d.ny, d.at_dense
     for c in range(size):
-        delta = w[h[m.Y_NEW] + c] - w[h[m.Y] + c]
-        bend = step * w[slope(h, 0) + c] - delta
-        w[dense + c] = w[h[m.Y] + c]
-        w[dense + size + c] = delta
-        w[dense + 2 * size + c] = bend
-        w[dense + 3 * size + c] = delta - step * w[slope(h, STAGES) + c] - bend
-        w[dense + 4 * size + c] = step * weighted(h, w, D, c)
+        delta = d.y_new[c] - d.y[c]
+        bend = step * d.w[slope(d, 0) + c] - delta
+        d.w[dense + c] = d.y[c]
+        d.w[dense + size + c] = delta
+        d.w[dense + 2 * size + c] = bend
+        d.w[dense + 3 * size + c] = delta - step * d.w[slope(d, STAGES) + c] - bend
+        d.w[dense + 4 * size + c] = step * weighted(d, D, c)
 
 
 @kernel
-def interpolate(h, w, theta, out):
+def interpolate(d, theta, out):
     """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
-    size, dense, s = h[m.NY], h[m.DENSE], 1.0 - theta
+    size, dense, s = d.ny, d.at_dense, 1.0 - theta
     for c in range(size):
-        v = w[dense + 3 * size + c] + s * w[dense + 4 * size + c]
-        v = w[dense + size + c] + s * (w[dense + 2 * size + c] + theta * v)
-        w[out + c] = w[dense + c] + theta * v
+        v = d.w[dense + 3 * size + c] + s * d.w[dense + 4 * size + c]
+        v = d.w[dense + size + c] + s * (d.w[dense + 2 * size + c] + theta * v)
+        d.w[out + c] = d.w[dense + c] + theta * v
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
@@ -88,13 +88,13 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     _, advance = make_stages(evaluate, A, B, C)
 
     @kernel
-    def attempt(h, f, w, n, step):
+    def attempt(d, step):
         """A step with the slope at its end, which the error estimate needs."""
-        if not advance(h, f, w, n, step):
+        if not advance(d, step):
             return False
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_NEW], slope(h, STAGES))
-        n[m.EVALUATIONS] += 1
-        return n[m.EVALUATION] == m.OK
+        evaluate(d, d.time + step, d.at_y_new, slope(d, STAGES))
+        d.evaluations += 1
+        return d.evaluation == m.OK
 
     return begin_afresh, attempt, error, extend, keep_nothing
 

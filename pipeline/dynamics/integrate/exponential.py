@@ -74,92 +74,92 @@ def memory(h: np.ndarray) -> int:
 
 
 @kernel
-def vector(h, i):
+def vector(d, i):
     """Where w holds vector i over the state."""
-    return h[m.MEMORY] + VECTORS + h[m.NY] * i
+    return d.at_memory + VECTORS + d.ny * i
 
 
 @kernel
-def pair(h, i):
+def pair(d, i):
     """Where w holds pair i of all oscillators."""
-    return vector(h, 2 * NODES) + 2 * room(h) * i
+    return vector(d, 2 * NODES) + 2 * room(d) * i
 
 
 @kernel
-def phi(h, j, i):
+def phi(d, j, i):
     """Where w holds the phi functions of oscillator i at node j; at the share last asked for with j = NODES."""
-    return pair(h, N_PAIRS) + AT_NODE * (room(h) * j + i)
+    return pair(d, N_PAIRS) + AT_NODE * (room(d) * j + i)
 
 
 @kernel
-def share(h, j, i):
+def share(d, j, i):
     """Where w holds what the sources add to (z, z') of oscillator i at node j: per source weights of 1 and Lambda."""
-    return phi(h, j, i) + PHI
+    return phi(d, j, i) + PHI
 
 
 @kernel
-def basis(h):
+def basis(d):
     """Where w holds the oscillators."""
-    return phi(h, NODES + 1, 0)
+    return phi(d, NODES + 1, 0)
 
 
 # Exponential quadrature -----------------------------------------------------------------------------------------------
 @kernel
-def find_phi(h, w, j, step, theta):
+def find_phi(d, j, step, theta):
     """The phi functions of all oscillators at a share of the step, as of node j, and what the sources do there."""
-    o, tau = basis(h), theta * step
-    for i in range(count(h)):
-        at = phi(h, j, i)
-        phi_functions.phi_functions(w, at, w[square(h, o, i)] * tau * tau, w[damping(h, o, i)] * tau)
-        first = share(h, j, i) + 2 * NODES
-        w[first], w[first + 1] = tau * (w[at + 2] - 1.0), tau * tau * w[at + 3]
+    o, tau = basis(d), theta * step
+    for i in range(count(d)):
+        at = phi(d, j, i)
+        phi_functions.phi_functions(d.w, at, d.w[square(d, o, i)] * tau * tau, d.w[damping(d, o, i)] * tau)
+        first = share(d, j, i) + 2 * NODES
+        d.w[first], d.w[first + 1] = tau * (d.w[at + 2] - 1.0), tau * tau * d.w[at + 3]
         for e in range(NODES):
             plain, turned, power = 0.0, 0.0, theta
             for k in range(NODES):
                 power *= theta
                 weight = step * FACTORIALS[k + 1] * power * CUBIC[k, e]
-                plain += weight * (w[at + 2 * k + 4] - 1.0 / FACTORIALS[k + 2])
-                turned += weight * w[at + 2 * k + 5]
-            w[share(h, j, i) + 2 * e], w[share(h, j, i) + 2 * e + 1] = plain, tau * turned
+                plain += weight * (d.w[at + 2 * k + 4] - 1.0 / FACTORIALS[k + 2])
+                turned += weight * d.w[at + 2 * k + 5]
+            d.w[share(d, j, i) + 2 * e], d.w[share(d, j, i) + 2 * e + 1] = plain, tau * turned
 
 
 @kernel
-def combine(h, w, j):
+def combine(d, j):
     """What all sources add at node j, as the pair TOTAL."""
-    o, apart = basis(h), room(h)
-    for i in range(count(h)):
-        if w[square(h, o, i)] == 0.0:
+    o, apart = basis(d), room(d)
+    for i in range(count(d)):
+        if d.w[square(d, o, i)] == 0.0:
             continue
         z = rate = turned = bent = 0.0
         for e in range(SOURCES):
-            plain, by = w[share(h, j, i) + 2 * e], w[share(h, j, i) + 2 * e + 1]
-            a, b = w[pair(h, e) + i], w[pair(h, e) + apart + i]
+            plain, by = d.w[share(d, j, i) + 2 * e], d.w[share(d, j, i) + 2 * e + 1]
+            a, b = d.w[pair(d, e) + i], d.w[pair(d, e) + apart + i]
             z += plain * a
             rate += plain * b
             turned += by * a
             bent += by * b
-        w[pair(h, TOTAL) + i] = z + bent
-        w[pair(h, TOTAL) + apart + i] = rate - w[square(h, o, i)] * turned - w[damping(h, o, i)] * bent
+        d.w[pair(d, TOTAL) + i] = z + bent
+        d.w[pair(d, TOTAL) + apart + i] = rate - d.w[square(d, o, i)] * turned - d.w[damping(d, o, i)] * bent
 
 
 @kernel
-def clear(h, w):
+def clear(d):
     """Nothing in the pair TOTAL."""
-    for i in range(2 * room(h)):
-        w[pair(h, TOTAL) + i] = 0.0
+    for i in range(2 * room(d)):
+        d.w[pair(d, TOTAL) + i] = 0.0
 
 
 @kernel
-def add_term(h, w, j, tau, k, weight, source, factor):
+def add_term(d, j, tau, k, weight, source, factor):
     """Add weight (phi_k(tau Lambda) - 1/k!) factor (z, z') of pair `source` to the pair TOTAL."""
-    o, apart = basis(h), room(h)
-    for i in range(count(h)):
-        at = phi(h, j, i) + 2 * k
-        alpha, beta = w[at] - 1.0 / FACTORIALS[k], w[at + 1] * tau
-        z, rate = factor * w[pair(h, source) + i], factor * w[pair(h, source) + apart + i]
-        bend = -w[square(h, o, i)] * z - w[damping(h, o, i)] * rate
-        w[pair(h, TOTAL) + i] += weight * (alpha * z + beta * rate)
-        w[pair(h, TOTAL) + apart + i] += weight * (alpha * rate + beta * bend)
+    o, apart = basis(d), room(d)
+    for i in range(count(d)):
+        at = phi(d, j, i) + 2 * k
+        alpha, beta = d.w[at] - 1.0 / FACTORIALS[k], d.w[at + 1] * tau
+        z, rate = factor * d.w[pair(d, source) + i], factor * d.w[pair(d, source) + apart + i]
+        bend = -d.w[square(d, o, i)] * z - d.w[damping(d, o, i)] * rate
+        d.w[pair(d, TOTAL) + i] += weight * (alpha * z + beta * rate)
+        d.w[pair(d, TOTAL) + apart + i] += weight * (alpha * rate + beta * bend)
 
 
 @kernel
@@ -173,108 +173,106 @@ def cubic_share(theta, e):
 
 
 @kernel
-def advance_to(h, w, step, theta, j, out):
+def advance_to(d, step, theta, j, out):
     """State at a share of the step into w from place out, with the phi functions that stand at node j."""
-    first, tau = slope(h, 0), step * theta
-    a, b, c = vector(h, DEPARTURE), vector(h, DEPARTURE + 1), vector(h, DEPARTURE + 2)
+    first, tau = slope(d, 0), step * theta
+    a, b, c = vector(d, DEPARTURE), vector(d, DEPARTURE + 1), vector(d, DEPARTURE + 2)
     wa, wb, wc = step * cubic_share(theta, 0), step * cubic_share(theta, 1), step * cubic_share(theta, 2)
-    for i in range(h[m.NY]):
-        w[out + i] = w[h[m.Y] + i] + tau * w[first + i] + (wa * w[a + i] + wb * w[b + i] + wc * w[c + i])
-    combine(h, w, j)
-    lift(h, w, basis(h), pair(h, TOTAL), tau, out)
+    for i in range(d.ny):
+        d.w[out + i] = d.y[i] + tau * d.w[first + i] + (wa * d.w[a + i] + wb * d.w[b + i] + wc * d.w[c + i])
+    combine(d, j)
+    lift(d, basis(d), pair(d, TOTAL), tau, out)
 
 
 @kernel
-def difference(h, w, step, coefficient, weights, out):
+def difference(d, step, coefficient, weights, out):
     """Add the integral over the step of one coefficient of the cubic times a polynomial, given by weights of phi."""
     for k in range(1, NODES + 1):
         weight = step * weights[k] * FACTORIALS[k]
         if weight == 0.0:
             continue
         for e in range(NODES):
-            add_term(h, w, NODES - 1, step, k + 1, weight, e, CUBIC[coefficient, e])
-            d, plain = vector(h, DEPARTURE + e), weight / FACTORIALS[k + 1] * CUBIC[coefficient, e]
-            for c in range(h[m.NY]):
-                w[out + c] += plain * w[d + c]
+            add_term(d, NODES - 1, step, k + 1, weight, e, CUBIC[coefficient, e])
+            departure, plain = vector(d, DEPARTURE + e), weight / FACTORIALS[k + 1] * CUBIC[coefficient, e]
+            for c in range(d.ny):
+                d.w[out + c] += plain * d.w[departure + c]
 
 
 # Departures -----------------------------------------------------------------------------------------------------------
 @kernel
-def depart(h, w, step, e):
+def depart(d, step, e):
     """Departure of g at node e from its start, by the node's state in Y_STAGE, its slope, and its pair TOTAL."""
-    d, o, work = vector(h, DEPARTURE + e), basis(h), pair(h, SPARE)
-    read(h, w, o, h[m.Y_STAGE], work)
-    for i in range(2 * room(h)):
-        w[work + i] = w[pair(h, OF_STATE) + i] - w[work + i]
-    turn(h, w, o, work)
-    for c in range(h[m.NY]):
-        w[d + c] = w[slope(h, NODE) + c] - w[slope(h, 0) + c]
-    lift(h, w, o, work, C[e] * step, d)
-    w[d + h[m.NQ] + h[m.NV] + m.DRIVE_WORK] -= work_rate(h, w, o, pair(h, TOTAL))
-    read(h, w, o, d, pair(h, e))
+    departure, o, work = vector(d, DEPARTURE + e), basis(d), pair(d, SPARE)
+    read(d, o, d.at_y_stage, work)
+    for i in range(2 * room(d)):
+        d.w[work + i] = d.w[pair(d, OF_STATE) + i] - d.w[work + i]
+    turn(d, o, work)
+    for c in range(d.ny):
+        d.w[departure + c] = d.w[slope(d, NODE) + c] - d.w[slope(d, 0) + c]
+    lift(d, o, work, C[e] * step, departure)
+    d.w[departure + d.nq + d.nv + m.DRIVE_WORK] -= work_rate(d, o, pair(d, TOTAL))
+    read(d, o, departure, pair(d, e))
 
 
 @kernel
-def predict(h, w, step):
+def predict(d, step):
     """Departures by the cubic of the step before; none without one."""
-    length = w[h[m.MEMORY] + LAST_STEP]
+    length = d.memory[LAST_STEP]
     for e in range(NODES):
-        d, x = vector(h, DEPARTURE + e), 1.0 + C[e] * step / length if length > 0.0 else 1.0
-        for c in range(h[m.NY]):
-            w[d + c] = 0.0
+        departure, x = vector(d, DEPARTURE + e), 1.0 + C[e] * step / length if length > 0.0 else 1.0
+        for c in range(d.ny):
+            d.w[departure + c] = 0.0
         for b in range(NODES):
             rise = ((CUBIC[2, b] * x + CUBIC[1, b]) * x + CUBIC[0, b]) * x - (1.0 if b == NODES - 1 else 0.0)
             if length > 0.0:
-                before = vector(h, BEFORE + b)
-                for c in range(h[m.NY]):
-                    w[d + c] += rise * w[before + c]
-        read(h, w, basis(h), d, pair(h, e))
+                before = vector(d, BEFORE + b)
+                for c in range(d.ny):
+                    d.w[departure + c] += rise * d.w[before + c]
+        read(d, basis(d), departure, pair(d, e))
 
 
 @kernel
-def begin(h, f, w, n):
+def begin(d):
     """Neither oscillators of this pose nor a step before are known."""
-    o = h[m.MEMORY]
-    w[o + BASIS_HOLDS] = w[o + LAST_STEP] = 0.0
-    w[o + RATE] = 1.0
+    d.memory[BASIS_HOLDS] = d.memory[LAST_STEP] = 0.0
+    d.memory[RATE] = 1.0
 
 
 @kernel
-def extend(h, f, w, n, step):
+def extend(d, step):
     """The dense output is there."""
-    w[h[m.MEMORY] + LENGTH] = step
+    d.memory[LENGTH] = step
 
 
 @kernel
-def interpolate(h, w, theta, out):
+def interpolate(d, theta, out):
     """State at the share `theta` of the step, stored in w from `out`."""
-    step = w[h[m.MEMORY] + LENGTH]
-    find_phi(h, w, NODES, step, theta)
-    advance_to(h, w, step, theta, NODES, out)
+    step = d.memory[LENGTH]
+    find_phi(d, NODES, step, theta)
+    advance_to(d, step, theta, NODES, out)
 
 
 @kernel
-def error(h, f, w, n, step):
+def error(d, step):
     """Norm of the local error, 1 at the tolerance: of fourth order, held up by one of third.
 
     The next step may be as much longer as its sweeps shall converge.
     """
-    out, size = slope(h, ESTIMATE), h[m.NY]
+    out, size = slope(d, ESTIMATE), d.ny
     norms = (0.0, 0.0)
     for which in range(2):
-        clear(h, w)
+        clear(d)
         for c in range(size):
-            w[out + c] = 0.0
+            d.w[out + c] = 0.0
         if which == 0:
-            difference(h, w, step, 2, CUBIC_OR_PARABOLA, out)
+            difference(d, step, 2, CUBIC_OR_PARABOLA, out)
         else:
-            difference(h, w, step, 1, PARABOLA_OR_LINE, out)
-            difference(h, w, step, 2, CUBIC_OR_LINE, out)
-        lift(h, w, basis(h), pair(h, TOTAL), step, out)
-        norms = (norms[1], scaled_norm(h, w, out))
+            difference(d, step, 1, PARABOLA_OR_LINE, out)
+            difference(d, step, 2, CUBIC_OR_LINE, out)
+        lift(d, basis(d), pair(d, TOTAL), step, out)
+        norms = (norms[1], scaled_norm(d, out))
     fourth, third = norms
-    most = h[m.CONTROL] + m.MOST_GROWTH
-    w[most] = min(w[most], np.sqrt(SWIFT / max(w[h[m.MEMORY] + SLOWEST], LEAST)))
+    d.most_growth = min(d.most_growth, np.sqrt(SWIFT / max(d.memory[SLOWEST], LEAST)))
     if fourth == 0.0:
         return 0.0
     return fourth**2 / np.sqrt(fourth**2 + 0.01 * third**2)
@@ -285,57 +283,55 @@ def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> t
     find_oscillators = modal_basis.make_find_oscillators(retract)
 
     @kernel
-    def renew(h, f, w, n):
+    def renew(d):
         """The oscillators of the state that has just been evaluated."""
-        o = h[m.MEMORY]
-        find_oscillators(h, f, w, n, basis(h), w[o + BASIS_KNOWN] > 0.0)
-        n[m.JACOBIANS] += 1
-        w[o + BASIS_HOLDS], w[o + BASIS_KNOWN], w[o + PHI_STEP] = 1.0, 1.0, 0.0
+        find_oscillators(d, basis(d), d.memory[BASIS_KNOWN] > 0.0)
+        d.jacobians += 1
+        d.memory[BASIS_HOLDS], d.memory[BASIS_KNOWN], d.memory[PHI_STEP] = 1.0, 1.0, 0.0
 
     @kernel
-    def prepare(h, f, w, n, step):
+    def prepare(d, step):
         """Oscillators, phi functions, and what is read off the start of the step."""
-        o = h[m.MEMORY]
-        if w[o + BASIS_HOLDS] == 0.0:
-            complete(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], slope(h, NODE))
-            n[m.EVALUATIONS] += 1
-            renew(h, f, w, n)
-        if w[o + PHI_STEP] != step:
+        if d.memory[BASIS_HOLDS] == 0.0:
+            complete(d.h, d.f, d.w, d.n, d.time, d.at_y, slope(d, NODE))
+            d.evaluations += 1
+            renew(d)
+        if d.memory[PHI_STEP] != step:
             for e in range(NODES):
-                find_phi(h, w, e, step, C[e])
-            w[o + PHI_STEP] = step
-        read(h, w, basis(h), slope(h, 0), pair(h, OF_SLOPE))
-        read(h, w, basis(h), h[m.Y], pair(h, OF_STATE))
+                find_phi(d, e, step, C[e])
+            d.memory[PHI_STEP] = step
+        read(d, basis(d), slope(d, 0), pair(d, OF_SLOPE))
+        read(d, basis(d), d.at_y, pair(d, OF_STATE))
 
     @kernel
-    def sweep(h, f, w, n, step):
+    def sweep(d, step):
         """New departures at all nodes, each with those before it; False when one cannot be evaluated."""
         for e in range(NODES):
-            advance_to(h, w, step, C[e], e, h[m.Y_STAGE])
-            evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + C[e] * step, h[m.Y_STAGE], slope(h, NODE))
-            n[m.EVALUATIONS] += 1
-            if n[m.EVALUATION] != m.OK:
+            advance_to(d, step, C[e], e, d.at_y_stage)
+            evaluate(d, d.time + C[e] * step, d.at_y_stage, slope(d, NODE))
+            d.evaluations += 1
+            if d.evaluation != m.OK:
                 return False
-            depart(h, w, step, e)
+            depart(d, step, e)
         return True
 
     @kernel
-    def attempt(h, f, w, n, step):
+    def attempt(d, step):
         """State Y_NEW after a step from Y; False when the iteration fails."""
-        o, last_norm, enough = h[m.MEMORY], 0.0, limit(w[h[m.CONTROL] + m.RTOL])
-        set_error_scales(h, f, w, h[m.Y])
-        prepare(h, f, w, n, step)
-        predict(h, w, step)
-        advance_to(h, w, step, 1.0, NODES - 1, h[m.Y_NEW])
-        rate, w[o + SLOWEST] = w[o + RATE], 0.0
+        last_norm, enough = 0.0, limit(d.rtol)
+        set_error_scales(d, d.at_y)
+        prepare(d, step)
+        predict(d, step)
+        advance_to(d, step, 1.0, NODES - 1, d.at_y_new)
+        rate, d.memory[SLOWEST] = d.memory[RATE], 0.0
         for k in range(MOST_SWEEPS):
-            if not sweep(h, f, w, n, step):
+            if not sweep(d, step):
                 return False
-            advance_to(h, w, step, 1.0, NODES - 1, h[m.Y_STAGE])
-            for c in range(h[m.NY]):
-                end = w[h[m.Y_STAGE] + c]
-                w[h[m.Y_STAGE] + c], w[h[m.Y_NEW] + c] = end - w[h[m.Y_NEW] + c], end
-            norm = scaled_norm(h, w, h[m.Y_STAGE])
+            advance_to(d, step, 1.0, NODES - 1, d.at_y_stage)
+            for c in range(d.ny):
+                end = d.y_stage[c]
+                d.y_stage[c], d.y_new[c] = end - d.y_new[c], end
+            norm = scaled_norm(d, d.at_y_stage)
             if not norm <= 1e300:
                 return False
             if k > 0:
@@ -344,22 +340,22 @@ def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> t
                     return False
                 rate = max(FORGETTING * rate, now)
                 if last_norm > enough:
-                    w[o + SLOWEST] = max(w[o + SLOWEST], now)
+                    d.memory[SLOWEST] = max(d.memory[SLOWEST], now)
             left = norm * (rate / (1.0 - rate)) if rate < 0.5 else norm
             if k > 0 and left <= enough:
-                w[o + RATE] = rate
+                d.memory[RATE] = rate
                 return True
             last_norm = norm
         return False
 
     @kernel
-    def keep(h, f, w, n, step):
+    def keep(d, step):
         """The cubic of an accepted step predicts the next one's; its end, where evaluated last, gives oscillators."""
-        for i in range(NODES * h[m.NY]):
-            w[vector(h, BEFORE) + i] = w[vector(h, DEPARTURE) + i]
-        w[h[m.MEMORY] + LAST_STEP], w[h[m.MEMORY] + BASIS_HOLDS] = step, 0.0
-        if n[m.STATE] == h[m.Y_NEW] and n[m.ABRIDGED] == 0:
-            renew(h, f, w, n)
+        for i in range(NODES * d.ny):
+            d.w[vector(d, BEFORE) + i] = d.w[vector(d, DEPARTURE) + i]
+        d.memory[LAST_STEP], d.memory[BASIS_HOLDS] = step, 0.0
+        if d.state == d.at_y_new and d.abridged == 0:
+            renew(d)
 
     return begin, attempt, error, extend, keep
 

@@ -18,44 +18,44 @@ def make_step_control(
     watch_start, _ = contacts
 
     @kernel
-    def first_step(h, f, w, n):
+    def first_step(d):
         """Slope at the start of a segment; False when the equations have no solution here."""
-        c, slope = h[m.CONTROL], h[m.SLOPES]
-        evaluate(h, f, w, n, w[c + m.TIME], h[m.Y], slope)
-        n[m.EVALUATIONS] += 1
-        if n[m.EVALUATION] != m.OK or not finite(h, w, slope):
-            n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.OK else m.NO_START
+        slope = d.at_slopes
+        evaluate(d, d.time, d.at_y, slope)
+        d.evaluations += 1
+        if d.evaluation != m.OK or not finite(d, slope):
+            d.status = m.NOT_A_NUMBER if d.evaluation == m.OK else m.NO_START
             return False
-        watch_start(h, w)
-        w[c + m.STEP] = w[c + m.FIXED]
-        n[m.FRESH] = 0
-        begin(h, f, w, n)
+        watch_start(d)
+        d.step = d.fixed
+        d.fresh = 0
+        begin(d)
         return True
 
     @kernel
-    def no_error(h, f, w, n, step):
+    def no_error(d, step):
         """Every step that could be made is good."""
         return 0.0
 
     @kernel
-    def no_error_with_scales(h, f, w, n, step):
+    def no_error_with_scales(d, step):
         """The same, of a method that looks for stiffness, which measures changes in units of the tolerance."""
-        set_error_scales(h, f, w, h[m.Y_NEW])
+        set_error_scales(d, d.at_y_new)
         return 0.0
 
     @kernel
-    def after_rejection(h, w, n, step, norm):
+    def after_rejection(d, step, norm):
         """There is no shorter step to try."""
-        if n[m.EVALUATION] == m.OK:
-            n[m.STATUS] = m.NO_CONVERGENCE
+        if d.evaluation == m.OK:
+            d.status = m.NO_CONVERGENCE
         else:
-            n[m.STATUS] = m.NOT_A_NUMBER if n[m.EVALUATION] == m.NOT_FINITE else m.LOST_CLOSURE
+            d.status = m.NOT_A_NUMBER if d.evaluation == m.NOT_FINITE else m.LOST_CLOSURE
         return False
 
     @kernel
-    def next_step(h, w, n, step, norm):
+    def next_step(d, step, norm):
         """All steps are alike."""
-        return w[h[m.CONTROL] + m.FIXED]
+        return d.fixed
 
     error_norm = no_error if method.stability is None else no_error_with_scales
     return first_step, error_norm, after_rejection, next_step

@@ -62,33 +62,33 @@ def memory(h: np.ndarray) -> int:
 
 
 @kernel
-def n_rates(h):
+def n_rates(d):
     """Number of unknowns."""
-    return h[m.NY] - h[m.NQ]
+    return d.ny - d.nq
 
 
 @kernel
-def vector(h, k):
+def vector(d, k):
     """Where w holds one of the vectors."""
-    return h[m.MEMORY] + VECTORS + n_rates(h) * k
+    return d.at_memory + VECTORS + n_rates(d) * k
 
 
 @kernel
-def positions(h):
+def positions(d):
     """Where w has room for positions."""
-    return vector(h, N_VECTORS)
+    return vector(d, N_VECTORS)
 
 
 @kernel
-def slope_before(h):
+def slope_before(d):
     """Where w holds the slope at the start of the step before."""
-    return positions(h) + h[m.NQ]
+    return positions(d) + d.nq
 
 
 @kernel
-def matrix(h, k):
+def matrix(d, k):
     """Where w holds one of the matrices."""
-    return slope_before(h) + h[m.NY] + n_rates(h) * n_rates(h) * k
+    return slope_before(d) + d.ny + n_rates(d) * n_rates(d) * k
 
 
 # Coefficients and linear system --------------------------------------------------------------------------------------
@@ -98,99 +98,98 @@ def parameter(solver: Any) -> float:
 
 
 @kernel
-def coefficients(h, w):
+def coefficients(d):
     """alpha_m, alpha_f, beta and gamma for the spectral radius at infinity."""
-    r = w[h[m.CONTROL] + m.PARAMETER]
+    r = d.parameter
     alpha_m, alpha_f = (2.0 * r - 1.0) / (r + 1.0), r / (r + 1.0)
     gamma = 0.5 - alpha_m + alpha_f
     return alpha_m, alpha_f, 0.25 * (gamma + 0.5) ** 2, gamma
 
 
 @kernel
-def own_weight(h, w, i):
+def own_weight(d, i):
     """Weight of unknown i itself in its equation."""
-    return 1.0 - coefficients(h, w)[0] if i < h[m.NV] else 1.0
+    return 1.0 - coefficients(d)[0] if i < d.nv else 1.0
 
 
 @kernel
-def gain(h, w, step, i):
+def gain(d, step, i):
     """Change of speed or variable i at the end of the step with its rate there."""
-    return coefficients(h, w)[3] * step if i < h[m.NV] else step
+    return coefficients(d)[3] * step if i < d.nv else step
 
 
 @kernel
-def factorise(h, w, step):
+def factorise(d, step):
     """Newton's matrix for a step, factorised; False when it is singular."""
-    _, alpha_f, beta, _ = coefficients(h, w)
-    size, nv = n_rates(h), h[m.NV]
-    S, by_state, by_position = matrix(h, NEWTON), matrix(h, BY_STATE), matrix(h, BY_POSITION)
+    _, alpha_f, beta, _ = coefficients(d)
+    size, nv = n_rates(d), d.nv
+    S, by_state, by_position = matrix(d, NEWTON), matrix(d, BY_STATE), matrix(d, BY_POSITION)
     for i in range(size):
         weight = 1.0 - alpha_f if i < nv else 0.5
         for k in range(size):
-            change = gain(h, w, step, k) * w[by_state + size * i + k]
+            change = gain(d, step, k) * d.w[by_state + size * i + k]
             if k < nv:
-                change += beta * step * step * w[by_position + size * i + k]
-            w[S + size * i + k] = -weight * change
-        w[S + (size + 1) * i] += own_weight(h, w, i)
-    w[h[m.MEMORY] + FACTORED_STEP] = step
-    return lu_factor(w, S, vector(h, PIVOTS), size)
+                change += beta * step * step * d.w[by_position + size * i + k]
+            d.w[S + size * i + k] = -weight * change
+        d.w[S + (size + 1) * i] += own_weight(d, i)
+    d.memory[FACTORED_STEP] = step
+    return lu_factor(d.w, S, vector(d, PIVOTS), size)
 
 
 @kernel
-def solve(h, w, b):
+def solve(d, b):
     """Solve Newton's system in place for the right-hand side from place b."""
-    lu_solve(w, matrix(h, NEWTON), vector(h, PIVOTS), n_rates(h), b)
+    lu_solve(d.w, matrix(d, NEWTON), vector(d, PIVOTS), n_rates(d), b)
 
 
 @kernel
-def rates_norm(h, w, step, a):
+def rates_norm(d, step, a):
     """What rates from place a make of the state, in units of the tolerance."""
-    total, count = 0.0, n_rates(h)
+    total, count = 0.0, n_rates(d)
     for i in range(count):
-        total += (gain(h, w, step, i) * w[a + i] / error_scale(h, w, h[m.NQ] + i)) ** 2
+        total += (gain(d, step, i) * d.w[a + i] / error_scale(d, d.nq + i)) ** 2
     return np.sqrt(total / count)
 
 
 # From step to step ---------------------------------------------------------------------------------------------------
 @kernel
-def predict(h, w, step):
+def predict(d, step):
     """Accelerations at the start for a step of this length, and a first guess of the rates at its end."""
-    o, nq = h[m.MEMORY], h[m.NQ]
-    share, on = step / w[o + A_STEP], step / w[o + LAST_STEP]
-    for k in range(h[m.NV]):
-        now = w[h[m.SLOPES] + nq + k]
-        a = now + share * (w[vector(h, OLD) + k] - now)
-        w[vector(h, RESCALED) + k] = a
-        w[vector(h, NEW) + k] = a + on * (now - w[slope_before(h) + nq + k])
-    for k in range(h[m.NV], n_rates(h)):
-        w[vector(h, NEW) + k] = w[h[m.SLOPES] + nq + k]
+    nq = d.nq
+    share, on = step / d.memory[A_STEP], step / d.memory[LAST_STEP]
+    for k in range(d.nv):
+        now = d.slopes[nq + k]
+        a = now + share * (d.w[vector(d, OLD) + k] - now)
+        d.w[vector(d, RESCALED) + k] = a
+        d.w[vector(d, NEW) + k] = a + on * (now - d.w[slope_before(d) + nq + k])
+    for k in range(d.nv, n_rates(d)):
+        d.w[vector(d, NEW) + k] = d.slopes[nq + k]
 
 
 @kernel
-def keep(h, f, w, n, step):
+def keep(d, step):
     """The end of an accepted step is the start of the next."""
-    o = h[m.MEMORY]
-    for k in range(h[m.NV]):
-        w[vector(h, OLD) + k] = w[vector(h, NEW) + k]
-    for c in range(h[m.NY]):
-        w[slope_before(h) + c] = w[h[m.SLOPES] + c]
-    w[o + A_STEP] = w[o + LAST_STEP] = step
+    for k in range(d.nv):
+        d.w[vector(d, OLD) + k] = d.w[vector(d, NEW) + k]
+    for c in range(d.ny):
+        d.w[slope_before(d) + c] = d.slopes[c]
+    d.memory[A_STEP] = d.memory[LAST_STEP] = step
 
 
 @kernel
-def error(h, f, w, n, step):
+def error(d, step):
     """Norm of the local error, 1 at the tolerance."""
-    size, start, end, before = h[m.NY], slope(h, 0), slope(h, ITERATE), slope_before(h)
-    out, length = slope(h, ESTIMATE), w[h[m.MEMORY] + LAST_STEP]
+    size, start, end, before = d.ny, slope(d, 0), slope(d, ITERATE), slope_before(d)
+    out, length = slope(d, ESTIMATE), d.memory[LAST_STEP]
     for c in range(size):
-        f0, f1 = w[start + c], w[end + c]
-        bend = ((f1 - f0) / step - (f0 - w[before + c]) / length) / (step + length)
+        f0, f1 = d.w[start + c], d.w[end + c]
+        bend = ((f1 - f0) / step - (f0 - d.w[before + c]) / length) / (step + length)
         integral = 0.5 * step * (f0 + f1) - step**3 / 6.0 * bend
-        w[out + c] = w[h[m.Y_NEW] + c] - w[h[m.Y] + c] - integral
-    for k in range(n_rates(h)):
-        w[out + h[m.NQ] + k] *= own_weight(h, w, k)
-    solve(h, w, out + h[m.NQ])
-    return scaled_norm(h, w, out)
+        d.w[out + c] = d.y_new[c] - d.y[c] - integral
+    for k in range(n_rates(d)):
+        d.w[out + d.nq + k] *= own_weight(d, k)
+    solve(d, out + d.nq)
+    return scaled_norm(d, out)
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
@@ -198,98 +197,98 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     place_end, solve_step = make_newton(evaluate, retract)
 
     @kernel
-    def begin(h, f, w, n):
+    def begin(d):
         """Accelerations at their own time, from a look ahead along the tangent."""
-        alpha_m, alpha_f, _, _ = coefficients(h, w)
-        o, size, first, step = h[m.MEMORY], h[m.NY], slope(h, 0), w[h[m.CONTROL] + m.STEP]
-        ahead = slope(h, ITERATE)
+        alpha_m, alpha_f, _, _ = coefficients(d)
+        size, first, step = d.ny, slope(d, 0), d.step
+        ahead = slope(d, ITERATE)
         for c in range(size):
-            w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + step * w[first + c]
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_STAGE], ahead)
-        n[m.EVALUATIONS] += 1
-        seen = n[m.EVALUATION] == m.OK and finite(h, w, ahead)
+            d.y_stage[c] = d.y[c] + step * d.w[first + c]
+        evaluate(d, d.time + step, d.at_y_stage, ahead)
+        d.evaluations += 1
+        seen = d.evaluation == m.OK and finite(d, ahead)
         for c in range(size):
-            change = w[ahead + c] - w[first + c] if seen else 0.0
-            w[slope_before(h) + c] = w[first + c] - change
-            if h[m.NQ] <= c < h[m.NQ] + h[m.NV]:
-                w[vector(h, OLD) + c - h[m.NQ]] = w[first + c] + (alpha_m - alpha_f) * change
-        w[o + A_STEP] = w[o + LAST_STEP] = step
-        w[o + JACOBIAN_HOLDS] = 0.0
-        n[m.EVALUATION] = m.OK
+            change = d.w[ahead + c] - d.w[first + c] if seen else 0.0
+            d.w[slope_before(d) + c] = d.w[first + c] - change
+            if d.nq <= c < d.nq + d.nv:
+                d.w[vector(d, OLD) + c - d.nq] = d.w[first + c] + (alpha_m - alpha_f) * change
+        d.memory[A_STEP] = d.memory[LAST_STEP] = step
+        d.memory[JACOBIAN_HOLDS] = 0.0
+        d.evaluation = m.OK
 
     @kernel
-    def attempt(h, f, w, n, step):
+    def attempt(d, step):
         """State Y_NEW after a step from Y; False when no iteration converges."""
-        set_error_scales(h, f, w, h[m.Y])
-        if not solve_step(h, f, w, n, step):
+        set_error_scales(d, d.at_y)
+        if not solve_step(d, step):
             return False
-        place_end(h, w, step, h[m.Y_NEW])
+        place_end(d, step, d.at_y_new)
         return True
 
     return begin, attempt, error, hermite.make_extend(LAST), keep
 
 
 def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callable]:
-    """The kernels place_end(h, w, step, out) and solve_step(h, f, w, n, step)."""
+    """The kernels place_end(d, step, out) and solve_step(d, step)."""
     jacobian = make_jacobian(evaluate, retract)
 
     @kernel
-    def place_end(h, w, step, out):
+    def place_end(d, step, out):
         """State at the end of the step for the rates in NEW."""
-        _, _, beta, gamma = coefficients(h, w)
-        nq, nv, old, new, shift = h[m.NQ], h[m.NV], vector(h, RESCALED), vector(h, NEW), vector(h, DISPLACEMENT)
+        _, _, beta, gamma = coefficients(d)
+        nq, nv, old, new, shift = d.nq, d.nv, vector(d, RESCALED), vector(d, NEW), vector(d, DISPLACEMENT)
         for k in range(nv):
-            a, b, u = w[old + k], w[new + k], w[h[m.Y] + nq + k]
-            w[shift + k] = step * (u + step * ((0.5 - beta) * a + beta * b))
-            w[out + nq + k] = u + step * ((1.0 - gamma) * a + gamma * b)
-        for k in range(nv, n_rates(h)):
-            w[out + nq + k] = w[h[m.Y] + nq + k] + step * w[new + k]
-        retract(h, w, h[m.Y], shift, out, positions(h))
+            a, b, u = d.w[old + k], d.w[new + k], d.y[nq + k]
+            d.w[shift + k] = step * (u + step * ((0.5 - beta) * a + beta * b))
+            d.w[out + nq + k] = u + step * ((1.0 - gamma) * a + gamma * b)
+        for k in range(nv, n_rates(d)):
+            d.w[out + nq + k] = d.y[nq + k] + step * d.w[new + k]
+        retract(d, d.at_y, shift, out, positions(d))
 
     @kernel
-    def residual(h, f, w, n, step):
+    def residual(d, step):
         """What the rates in NEW leave of the method's equations, into RESIDUAL; False without a slope."""
-        alpha_m, alpha_f, _, _ = coefficients(h, w)
-        nq, old, start, end = h[m.NQ], vector(h, RESCALED), slope(h, 0), slope(h, ITERATE)
-        place_end(h, w, step, h[m.Y_NEW])
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + step, h[m.Y_NEW], end)
-        n[m.EVALUATIONS] += 1
-        for i in range(n_rates(h)):
-            first, last = w[start + nq + i], w[end + nq + i]
-            if i < h[m.NV]:
-                due = (1.0 - alpha_f) * last + alpha_f * first - alpha_m * w[old + i]
+        alpha_m, alpha_f, _, _ = coefficients(d)
+        nq, old, start, end = d.nq, vector(d, RESCALED), slope(d, 0), slope(d, ITERATE)
+        place_end(d, step, d.at_y_new)
+        evaluate(d, d.time + step, d.at_y_new, end)
+        d.evaluations += 1
+        for i in range(n_rates(d)):
+            first, last = d.w[start + nq + i], d.w[end + nq + i]
+            if i < d.nv:
+                due = (1.0 - alpha_f) * last + alpha_f * first - alpha_m * d.w[old + i]
             else:
                 due = 0.5 * (first + last)
-            w[vector(h, RESIDUAL) + i] = due - own_weight(h, w, i) * w[vector(h, NEW) + i]
-        return n[m.EVALUATION] == m.OK
+            d.w[vector(d, RESIDUAL) + i] = due - own_weight(d, i) * d.w[vector(d, NEW) + i]
+        return d.evaluation == m.OK
 
     @kernel
-    def iterate(h, f, w, n, step):
+    def iterate(d, step):
         """Newton's iterations with the matrix as it is; their number, or 0 when they do not converge."""
-        left, last_norm = vector(h, RESIDUAL), 0.0
+        left, last_norm = vector(d, RESIDUAL), 0.0
         for k in range(MOST_ITERATIONS):
-            if not residual(h, f, w, n, step):
+            if not residual(d, step):
                 return 0
-            solve(h, w, left)
-            for i in range(n_rates(h)):
-                w[vector(h, NEW) + i] += w[left + i]
-            norm = rates_norm(h, w, step, left)
-            verdict = converged(k, norm, last_norm, w[h[m.CONTROL] + m.RTOL])
+            solve(d, left)
+            for i in range(n_rates(d)):
+                d.w[vector(d, NEW) + i] += d.w[left + i]
+            norm = rates_norm(d, step, left)
+            verdict = converged(k, norm, last_norm, d.rtol)
             if verdict != 0:
                 return k + 1 if verdict > 0 else 0
             last_norm = norm
         return 0
 
     @kernel
-    def line_search(h, f, w, n, step, norm):
+    def line_search(d, step, norm):
         """Take the correction, or the share of it that makes the residual less; what is left of it, or -1."""
-        correction, new = vector(h, CORRECTION), vector(h, NEW)
+        correction, new = vector(d, CORRECTION), vector(d, NEW)
         share, there = 1.0, 0.0
         for _ in range(MOST_HALVINGS):
-            for i in range(n_rates(h)):
-                w[new + i] += (share - there) * w[correction + i]
-            if residual(h, f, w, n, step):
-                left = rates_norm(h, w, step, vector(h, RESIDUAL))
+            for i in range(n_rates(d)):
+                d.w[new + i] += (share - there) * d.w[correction + i]
+            if residual(d, step):
+                left = rates_norm(d, step, vector(d, RESIDUAL))
                 if left < (1.0 - 0.1 * share) * norm:
                     return left
             there = share
@@ -297,21 +296,21 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
         return -1.0
 
     @kernel
-    def iterate_damped(h, f, w, n, step):
+    def iterate_damped(d, step):
         """Damped Newton iterations with a new matrix each: for friction that saturates within a step."""
-        t, enough = w[h[m.CONTROL] + m.TIME] + step, limit(w[h[m.CONTROL] + m.RTOL])
-        correction = vector(h, CORRECTION)
-        if not residual(h, f, w, n, step):
+        t, enough = d.time + step, limit(d.rtol)
+        correction = vector(d, CORRECTION)
+        if not residual(d, step):
             return False
-        left = rates_norm(h, w, step, vector(h, RESIDUAL))
+        left = rates_norm(d, step, vector(d, RESIDUAL))
         for _ in range(MOST_CORRECTIONS):
-            if not jacobian(h, f, w, n, t, h[m.Y_NEW], slope(h, ITERATE)) or not factorise(h, w, step):
+            if not jacobian(d, t, d.at_y_new, slope(d, ITERATE)) or not factorise(d, step):
                 return False
-            for i in range(n_rates(h)):
-                w[correction + i] = w[vector(h, RESIDUAL) + i]
-            solve(h, w, correction)
-            norm = rates_norm(h, w, step, correction)
-            left = line_search(h, f, w, n, step, left)
+            for i in range(n_rates(d)):
+                d.w[correction + i] = d.w[vector(d, RESIDUAL) + i]
+            solve(d, correction)
+            norm = rates_norm(d, step, correction)
+            left = line_search(d, step, left)
             if norm <= enough or left == 0.0:
                 return True
             if left < 0.0:
@@ -319,69 +318,68 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
         return False
 
     @kernel
-    def solve_step(h, f, w, n, step):
+    def solve_step(d, step):
         """Rates at the end of the step into NEW; False when no iteration converges.
 
         With chosen steps a shorter one is the better remedy, with fixed steps it is patience.
         """
-        o = h[m.MEMORY]
         for _ in range(2):
-            fresh = w[o + JACOBIAN_HOLDS] == 0.0
-            if fresh and not jacobian(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], slope(h, 0)):
+            fresh = d.memory[JACOBIAN_HOLDS] == 0.0
+            if fresh and not jacobian(d, d.time, d.at_y, slope(d, 0)):
                 return False
-            if w[o + FACTORED_STEP] != step and not factorise(h, w, step):
+            if d.memory[FACTORED_STEP] != step and not factorise(d, step):
                 return False
-            predict(h, w, step)
-            count = iterate(h, f, w, n, step)
+            predict(d, step)
+            count = iterate(d, step)
             if count > 0:
-                w[o + JACOBIAN_HOLDS] = 1.0 if count <= SLOW else 0.0
+                d.memory[JACOBIAN_HOLDS] = 1.0 if count <= SLOW else 0.0
                 return True
-            w[o + JACOBIAN_HOLDS] = 0.0
+            d.memory[JACOBIAN_HOLDS] = 0.0
             if fresh:
                 break
-        if w[h[m.CONTROL] + m.FIXED] > 0.0:
-            predict(h, w, step)
-            return iterate_damped(h, f, w, n, step)
+        if d.fixed > 0.0:
+            predict(d, step)
+            return iterate_damped(d, step)
         return False
 
     return place_end, solve_step
 
 
 def make_jacobian(evaluate: Callable, retract: Callable) -> Callable:
-    """The kernel jacobian(h, f, w, n, t, y, slope_there)."""
+    """The kernel jacobian(d, t, y, slope_there)."""
 
     @kernel
-    def column(h, f, w, n, t, slope_there, k, change, target):
+    def column(d, t, slope_there, k, change, target):
         """Column k of a Jacobian of the rates, from the changed state in Y_STAGE."""
-        size, nq, near = n_rates(h), h[m.NQ], slope(h, ESTIMATE)
-        evaluate(h, f, w, n, t, h[m.Y_STAGE], near)
-        n[m.EVALUATIONS] += 1
+        size, nq, near = n_rates(d), d.nq, slope(d, ESTIMATE)
+        evaluate(d, t, d.at_y_stage, near)
+        d.evaluations += 1
         for i in range(size):
-            w[target + size * i + k] = (w[near + nq + i] - w[slope_there + nq + i]) / change
-        return n[m.EVALUATION] == m.OK
+            d.w[target + size * i + k] = (d.w[near + nq + i] - d.w[slope_there + nq + i]) / change
+        return d.evaluation == m.OK
 
     @kernel
-    def jacobian(h, f, w, n, t, y, slope_there):
+    def jacobian(d, t, y, slope_there):
         """Change of the rates with speeds and z, and with displacements, at the state in y; False without a slope."""
-        nv, nq, shift = h[m.NV], h[m.NQ], vector(h, DISPLACEMENT)
-        for c in range(h[m.NY]):
-            w[h[m.Y_STAGE] + c] = w[y + c]
-        for k in range(n_rates(h)):
-            floor, value = f[m.FLOORS.row(h, m.GROUPS.group(h, nq + k)) + m.FLOORS.natural], w[y + nq + k]
+        nv, nq, shift = d.nv, d.nq, vector(d, DISPLACEMENT)
+        for c in range(d.ny):
+            d.y_stage[c] = d.w[y + c]
+        for k in range(n_rates(d)):
+            floor, value = d.floors[d.groups[nq + k].group].natural, d.w[y + nq + k]
             changed = value + PERTURBATION * (floor + abs(value))
-            w[h[m.Y_STAGE] + nq + k] = changed
-            if not column(h, f, w, n, t, slope_there, k, changed - value, matrix(h, BY_STATE)):
+            d.y_stage[nq + k] = changed
+            if not column(d, t, slope_there, k, changed - value, matrix(d, BY_STATE)):
                 return False
-            w[h[m.Y_STAGE] + nq + k] = value
+            d.y_stage[nq + k] = value
         for k in range(nv):
-            change = PERTURBATION * f[m.FLOORS.row(h, m.GROUPS.group(h, nq + k)) + m.FLOORS.natural]
+            change = PERTURBATION * d.floors[d.groups[nq + k].group].natural
             for j in range(nv):
-                w[shift + j] = change if j == k else 0.0
-            retract(h, w, y, shift, h[m.Y_STAGE], positions(h))
-            if not column(h, f, w, n, t, slope_there, k, change, matrix(h, BY_POSITION)):
+                d.w[shift + j] = change if j == k else 0.0
+            retract(d, y, shift, d.at_y_stage, positions(d))
+            if not column(d, t, slope_there, k, change, matrix(d, BY_POSITION)):
                 return False
-        n[m.JACOBIANS] += 1
-        w[h[m.MEMORY] + JACOBIAN_HOLDS], w[h[m.MEMORY] + FACTORED_STEP] = 1.0, 0.0
+        d.jacobians += 1
+        d.memory[JACOBIAN_HOLDS], d.memory[FACTORED_STEP] = 1.0, 0.0
         return True
 
     return jacobian

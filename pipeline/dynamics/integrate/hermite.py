@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -16,26 +15,26 @@ ROWS = 4
 
 
 def make_extend(last: int) -> Callable:
-    """The kernel extend(h, f, w, n, step) of a method whose slope at the end is in row `last`."""
+    """The kernel extend(d, step) of a method whose slope at the end is in row `last`."""
 
     @kernel
-    def extend(h, f, w, n, step):
-        size, dense, first, final = h[m.NY], h[m.DENSE], slope(h, 0), slope(h, last)
+    def extend(d, step):
+        size, dense, first, final = d.ny, d.at_dense, slope(d, 0), slope(d, last)
         for c in range(size):
-            y, delta = w[h[m.Y] + c], w[h[m.Y_NEW] + c] - w[h[m.Y] + c]
-            start, end = step * w[first + c], step * w[final + c]
-            w[dense + c] = y
-            w[dense + size + c] = start
-            w[dense + 2 * size + c] = 3.0 * delta - 2.0 * start - end
-            w[dense + 3 * size + c] = start + end - 2.0 * delta
+            y, delta = d.y[c], d.y_new[c] - d.y[c]
+            start, end = step * d.w[first + c], step * d.w[final + c]
+            d.w[dense + c] = y
+            d.w[dense + size + c] = start
+            d.w[dense + 2 * size + c] = 3.0 * delta - 2.0 * start - end
+            d.w[dense + 3 * size + c] = start + end - 2.0 * delta
 
     return extend
 
 
 @kernel
-def interpolate(h, w, theta, out):
+def interpolate(d, theta, out):
     """State at the share `theta` of the step, stored in w from `out` (after `extend`); any cubic in DENSE."""
-    size, dense = h[m.NY], h[m.DENSE]
+    size, dense = d.ny, d.at_dense
     for c in range(size):
-        v = w[dense + 3 * size + c] * theta + w[dense + 2 * size + c]
-        w[out + c] = (v * theta + w[dense + size + c]) * theta + w[dense + c]
+        v = d.w[dense + 3 * size + c] * theta + d.w[dense + 2 * size + c]
+        d.w[out + c] = (v * theta + d.w[dense + size + c]) * theta + d.w[dense + c]

@@ -14,18 +14,18 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel
-def slope(h, i):
+def slope(d, i):
     """Where w holds row i of SLOPES, the slope of a state."""
-    return h[m.SLOPES] + h[m.NY] * i
+    return d.at_slopes + d.ny * i
 
 
 @kernel
-def begin_afresh(h, f, w, n):
+def begin_afresh(d):
     """`begin` of a one-step method, which has nothing to forget."""
 
 
 @kernel
-def keep_nothing(h, f, w, n, step):
+def keep_nothing(d, step):
     """`keep` of a one-step method, which has nothing to remember."""
 
 
@@ -47,13 +47,14 @@ class Method:
     slopes: rows of SLOPES; the first is the slope where a step starts, the last is left to the search for events.
     last: row of the slope at the step's end.  dense: rows of DENSE.
     make_kernels: (evaluate, retract) -> kernels, with a third argument of methods that read more than rates
-        (`Traits.reads_all`): an evaluation of which everything is left. They count their evaluations themselves:
-        begin(h, f, w, n) after every restart, with the slope and the length of the first step known;
-        attempt(h, f, w, n, step) fills Y_NEW, False when it could not;
-        error(h, f, w, n, step) gives the norm of the local error, 1 at the tolerance (None: fixed steps only);
-        extend(h, f, w, n, step) prepares the dense output once the slope at the end is known;
-        keep(h, f, w, n, step) remembers an accepted step.
-    interpolate: (h, w, share of the step, out) the dense output.
+        (`Traits.reads_all`): an evaluation of which everything is left. evaluate(d, t, y, dy), retract(d, y,
+        displacement, out, scratch) take indices in w. They count their evaluations themselves:
+        begin(d) after every restart, with the slope and the length of the first step known;
+        attempt(d, step) fills Y_NEW, False when it could not;
+        error(d, step) gives the norm of the local error, 1 at the tolerance (None: fixed steps only);
+        extend(d, step) prepares the dense output once the slope at the end is known;
+        keep(d, step) remembers an accepted step.
+    interpolate: (d, share of the step, out) the dense output.
     error_order: the error estimate falls with this power of the step plus one; 0 for methods without one.
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.

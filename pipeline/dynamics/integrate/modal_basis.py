@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.bodies.interface import to_interface, to_modes
 from flexclear.pipeline.dynamics.equations.closures import add_spread, solve, take_spread
 from flexclear.pipeline.dynamics.equations.envelope import backward, forward
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import dot6
+from flexclear.pipeline.dynamics.vectors import dot
 
 #: off-diagonal entries of this share of the diagonal ones' geometric mean are zero; sweeps, quadratically convergent
 NOTHING, SWEEPS = 1e-13, 20
@@ -35,9 +35,9 @@ A_LITTLE = 1e-9
 
 
 @kernel
-def room(h):
+def room(d):
     """Most oscillators: one per speed."""
-    return h[m.NV]
+    return d.nv
 
 
 def floats(h: np.ndarray) -> int:
@@ -48,210 +48,212 @@ def floats(h: np.ndarray) -> int:
 
 # Places; o is where the basis begins ----------------------------------------------------------------------------------
 @kernel
-def square(h, o, i):
+def square(d, o, i):
     """Where w holds omega^2 of oscillator i [1/s^2]."""
     return o + i
 
 
 @kernel
-def damping(h, o, i):
+def damping(d, o, i):
     """Where w holds the damping of oscillator i [1/s]."""
-    return o + room(h) + i
+    return o + room(d) + i
 
 
 @kernel
-def root(h, o, j):
+def root(d, o, j):
     """Where w holds the root of the stiffness of spring j."""
-    return o + 2 * room(h) + j
+    return o + 2 * room(d) + j
 
 
 @kernel
-def axes(h, o, i):
+def axes(d, o, i):
     """Where w holds column i of Q."""
-    return o + room(h) * (3 + i)
+    return o + room(d) * (3 + i)
 
 
 @kernel
-def matrix(h, o, i):
+def matrix(d, o, i):
     """Where w holds row i of the symmetric matrix."""
-    return o + room(h) * (3 + room(h) + i)
+    return o + room(d) * (3 + room(d) + i)
 
 
 @kernel
-def reading(h, o, i):
+def reading(d, o, i):
     """Where w holds row i of C: weights of the springs."""
-    return o + room(h) * (3 + 2 * room(h) + i)
+    return o + room(d) * (3 + 2 * room(d) + i)
 
 
 @kernel
-def lifting(h, o, i):
+def lifting(d, o, i):
     """Where w holds oscillator i's shape, of the state's length: rates of positions, speeds, and two of the work.
 
     Oscillating forces do work on drives whose speed changes within a step: the work at the start's speed, and its rate.
     """
-    return o + room(h) * (3 + 3 * room(h)) + h[m.NY] * i
+    return o + room(d) * (3 + 3 * room(d)) + d.ny * i
 
 
 @kernel
-def response(h, o, j):
+def response(d, o, j):
     """Where w holds what the root of spring j's stiffness accelerates, the drives' power then, and its rate."""
-    return lifting(h, o, room(h) + j)
+    return lifting(d, o, room(d) + j)
 
 
 @kernel
-def count(h):
+def count(d):
     """Number of modes, which is that of oscillators."""
     total = 0
-    for k in range(h[m.N_FLEX]):
-        total += m.FLEXES.n_modes(h, k)
+    for k in range(d.n_flex):
+        total += d.flexes[k].n_modes
     return total
 
 
 # Functions of the state -----------------------------------------------------------------------------------------------
 @kernel
-def read(h, w, o, state, out):
+def read(d, o, state, out):
     """C: z, and z' after `room` entries, of what w holds for each variable from index `state` on."""
-    for i in range(count(h)):
-        row, e, z, rate = reading(h, o, i), 0, 0.0, 0.0
-        for k in range(h[m.N_FLEX]):
-            q, c = state + m.FLEXES.q0(h, k), state + h[m.NQ] + m.FLEXES.c0(h, k)
-            for j in range(m.FLEXES.n_modes(h, k)):
-                z += w[row + e] * w[q + j]
-                rate += w[row + e] * w[c + j]
+    for i in range(count(d)):
+        row, e, z, rate = reading(d, o, i), 0, 0.0, 0.0
+        for k in range(d.n_flex):
+            q, c = state + d.flexes[k].q0, state + d.nq + d.flexes[k].c0
+            for j in range(d.flexes[k].n_modes):
+                z += d.w[row + e] * d.w[q + j]
+                rate += d.w[row + e] * d.w[c + j]
                 e += 1
-        w[out + i], w[out + room(h) + i] = z, rate
+        d.w[out + i], d.w[out + room(d) + i] = z, rate
 
 
 @kernel
-def lift(h, w, o, pair, t, out):
+def lift(d, o, pair, t, out):
     """Add B, a time t after the pose, of (z, z') to what w holds for each variable from place `out` on.
 
     z' follows z after `room` entries.
     """
-    nq, nv = h[m.NQ], h[m.NV]
-    for i in range(count(h)):
-        if w[square(h, o, i)] == 0.0:
+    nq, nv = d.nq, d.nv
+    for i in range(count(d)):
+        if d.w[square(d, o, i)] == 0.0:
             continue
-        shape, z, rate = lifting(h, o, i), w[pair + i], w[pair + room(h) + i]
+        shape, z, rate = lifting(d, o, i), d.w[pair + i], d.w[pair + room(d) + i]
         for c in range(nq):
-            w[out + c] += w[shape + c] * z
+            d.w[out + c] += d.w[shape + c] * z
         for c in range(nq, nq + nv):
-            w[out + c] += w[shape + c] * rate
-        work = w[shape + nq + nv] + t * w[shape + nq + nv + 1]
-        w[out + nq + nv + m.DRIVE_WORK] += work * (rate + w[damping(h, o, i)] * z)
+            d.w[out + c] += d.w[shape + c] * rate
+        work = d.w[shape + nq + nv] + t * d.w[shape + nq + nv + 1]
+        d.w[out + nq + nv + m.DRIVE_WORK] += work * (rate + d.w[damping(d, o, i)] * z)
 
 
 @kernel
-def work_rate(h, w, o, pair):
+def work_rate(d, o, pair):
     """Rate at which the work that belongs to (z, z') changes because the drives' speeds do."""
-    total, rates = 0.0, h[m.NQ] + h[m.NV] + 1
-    for i in range(count(h)):
-        total += w[lifting(h, o, i) + rates] * (w[pair + room(h) + i] + w[damping(h, o, i)] * w[pair + i])
+    total, rates = 0.0, d.nq + d.nv + 1
+    for i in range(count(d)):
+        total += d.w[lifting(d, o, i) + rates] * (d.w[pair + room(d) + i] + d.w[damping(d, o, i)] * d.w[pair + i])
     return total
 
 
 @kernel
-def turn(h, w, o, pair):
+def turn(d, o, pair):
     """Lambda: (z, z') becomes (z', -omega^2 z - d z'), in place."""
-    for i in range(count(h)):
-        z, rate = w[pair + i], w[pair + room(h) + i]
-        w[pair + i] = rate
-        w[pair + room(h) + i] = -w[square(h, o, i)] * z - w[damping(h, o, i)] * rate
+    for i in range(count(d)):
+        z, rate = d.w[pair + i], d.w[pair + room(d) + i]
+        d.w[pair + i] = rate
+        d.w[pair + room(d) + i] = -d.w[square(d, o, i)] * z - d.w[damping(d, o, i)] * rate
 
 
 # Oscillators ----------------------------------------------------------------------------------------------------------
 @kernel
-def constrained(h, w, b):
+def constrained(d, b):
     """P applied to the forces in w from place b; needs the factors of an evaluation. Leaves the multipliers.
 
     Modes are in the interface basis.
     """
-    forward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], b)
-    for k in range(h[m.MULTIPLIER], h[m.MULTIPLIER] + h[m.N_KEPT_ROWS]):
-        w[k] = 0.0
-    take_spread(h, w, b)
-    solve(h, w)
-    add_spread(h, w, b, 1.0)
-    backward(h, h[m.ENVELOPE.place], w, h[m.MASS], h[m.NV], b)
+    forward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, b)
+    for k in range(d.at_multiplier, d.at_multiplier + d.n_kept_rows):
+        d.w[k] = 0.0
+    take_spread(d, b)
+    solve(d)
+    add_spread(d, b, 1.0)
+    backward(d.h, d.at_envelope, d.w, d.at_mass, d.nv, b)
 
 
 @kernel
-def drive_power(h, w, b, motion):
+def drive_power(d, b, motion):
     """Power that the drives bring in at accelerations from place b and the multipliers that belong to them.
 
     motion: U for the power, DU for the rate at which it grows with the drives' speeds.
     """
     power = 0.0
-    for p in range(h[m.N_KNOWN_PAIRS]):
-        momentum, column = m.MOMENTA.row(h, m.KNOWN_PAIRS.momentum(h, p)), m.COLUMNS.row(h, m.KNOWN_PAIRS.column(h, p))
-        speed = w[motion + h[m.NV] + m.KNOWN_PAIRS.drive(h, p)]
-        power += dot6(w, momentum, w, column) * w[b + m.KNOWN_PAIRS.coordinate(h, p)] * speed
-    for e in range(h[m.N_KNOWN_ENTRIES]):
-        c, d, sign = m.KNOWN_ENTRIES.closure(h, e), m.KNOWN_ENTRIES.drive(h, e), m.KNOWN_ENTRIES.sign(h, e)
-        col, speed = m.COLUMNS.row(h, m.KNOWN_ENTRIES.column(h, e)), w[motion + h[m.NV] + d]
-        wrenches, first = m.ROWS.row(h, m.CLOSURES.row0(h, c)), h[m.MULTIPLIER] + m.CLOSURES.kept0(h, c)
-        for k in range(m.CLOSURES.n_kept(h, c)):
-            power -= sign * dot6(w, wrenches + 6 * k, w, col) * w[first + k] * speed
+    for p in range(d.n_known_pairs):
+        pair = d.known_pairs[p]
+        momentum, column = d.momenta[pair.momentum], d.columns[pair.column]
+        inertia = dot(momentum.angular, column.angular) + dot(momentum.linear, column.linear)
+        power += inertia * d.w[b + pair.coordinate] * d.w[motion + d.nv + pair.drive]
+    for e in range(d.n_known_entries):
+        entry, closure = d.known_entries[e], d.closures[d.known_entries[e].closure]
+        column, speed = d.columns[entry.column], d.w[motion + d.nv + entry.drive]
+        for k in range(closure.n_kept):
+            wrench = d.rows[closure.row0 + k]
+            along = dot(wrench.moment, column.angular) + dot(wrench.force, column.linear)
+            power -= entry.sign * along * d.multiplier[closure.kept0 + k] * speed
     return power
 
 
 @kernel
-def respond(h, f, w, b):
+def respond(d, b):
     """What the forces in w from place b do, in place; and the drives' power then, and its rate, added after it."""
-    nv = h[m.NV]
-    constrained(h, w, b)
-    w[b + nv] += drive_power(h, w, b, h[m.U])
-    w[b + nv + 1] += drive_power(h, w, b, h[m.DU])
-    to_modes(h, f, w, b)
+    nv = d.nv
+    constrained(d, b)
+    d.w[b + nv] += drive_power(d, b, d.at_u)
+    d.w[b + nv + 1] += drive_power(d, b, d.at_du)
+    to_modes(d, b)
 
 
 @kernel
-def responses(h, f, w, o):
+def responses(d, o):
     """Responses to the root of each mode's stiffness, and the symmetric matrix."""
-    nq, nv, e = h[m.NQ], h[m.NV], 0
-    for i in range(count(h)):
+    nq, nv, e = d.nq, d.nv, 0
+    for i in range(count(d)):
         for k in range(nq, nq + nv + 2):
-            w[response(h, o, i) + k] = 0.0
-    for k in range(h[m.N_FLEX]):
-        size, c0 = m.FLEXES.n_modes(h, k), m.FLEXES.c0(h, k)
-        stiffness = h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + 12 * size + size * size
+            d.w[response(d, o, i) + k] = 0.0
+    for k in range(d.n_flex):
+        size, c0 = d.flexes[k].n_modes, d.flexes[k].c0
+        stiffness = d.at_flex_data + d.flexes[k].data0 + 12 * size + size * size
         for j in range(size):
-            w[root(h, o, e)] = np.sqrt(max(f[stiffness + j], 0.0))
-            b = response(h, o, e) + nq
-            w[b + c0 + j] = w[root(h, o, e)]
-            to_interface(h, f, w, b)
-            respond(h, f, w, b)
+            d.w[root(d, o, e)] = np.sqrt(max(d.f[stiffness + j], 0.0))
+            b = response(d, o, e) + nq
+            d.w[b + c0 + j] = d.w[root(d, o, e)]
+            to_interface(d, b)
+            respond(d, b)
             e += 1
     for i in range(e):
-        couple(h, w, o, i)
+        couple(d, o, i)
 
 
 @kernel
-def couple(h, w, o, i):
+def couple(d, o, i):
     """Row i of the symmetric matrix: what the response of mode i's spring does along all modes."""
-    j, b = 0, response(h, o, i) + h[m.NQ]
-    for k in range(h[m.N_FLEX]):
-        for c in range(m.FLEXES.c0(h, k), m.FLEXES.c0(h, k) + m.FLEXES.n_modes(h, k)):
-            w[matrix(h, o, i) + j] = w[root(h, o, j)] * w[b + c]
+    j, b = 0, response(d, o, i) + d.nq
+    for k in range(d.n_flex):
+        for c in range(d.flexes[k].c0, d.flexes[k].c0 + d.flexes[k].n_modes):
+            d.w[matrix(d, o, i) + j] = d.w[root(d, o, j)] * d.w[b + c]
             j += 1
 
 
 @kernel
-def into_axes(h, w, o, n):
+def into_axes(d, o, n):
     """The symmetric matrix in the axes of the pose before, which are nearly its own."""
-    spare = reading(h, o, 0)
+    spare = reading(d, o, 0)
     for i in range(n):
         for k in range(n):
             total = 0.0
             for j in range(n):
-                total += w[axes(h, o, i) + j] * w[matrix(h, o, j) + k]
-            w[spare + n * i + k] = total
+                total += d.w[axes(d, o, i) + j] * d.w[matrix(d, o, j) + k]
+            d.w[spare + n * i + k] = total
     for i in range(n):
         for k in range(n):
             total = 0.0
             for j in range(n):
-                total += w[spare + n * i + j] * w[axes(h, o, k) + j]
-            w[matrix(h, o, i) + k] = total
+                total += d.w[spare + n * i + j] * d.w[axes(d, o, k) + j]
+            d.w[matrix(d, o, i) + k] = total
 
 
 @kernel
@@ -263,14 +265,14 @@ def rotate(w, a, b, n, c, s):
 
 
 @kernel
-def diagonalise(h, w, o, n):
+def diagonalise(d, o, n):
     """Jacobi's rotations until the symmetric matrix is diagonal, taken along by its axes."""
     for _ in range(SWEEPS):
         turned = False
         for p in range(n - 1):
             for q in range(p + 1, n):
-                P, R = matrix(h, o, p), matrix(h, o, q)
-                mixed, a, b = w[P + q], w[P + p], w[R + q]
+                P, R = matrix(d, o, p), matrix(d, o, q)
+                mixed, a, b = d.w[P + q], d.w[P + p], d.w[R + q]
                 if not abs(mixed) > NOTHING * np.sqrt(max(a * b, 0.0)):
                     continue
                 turned = True
@@ -278,80 +280,80 @@ def diagonalise(h, w, o, n):
                 t = (1.0 if half >= 0.0 else -1.0) / (abs(half) + np.sqrt(half * half + 1.0))
                 c = 1.0 / np.sqrt(t * t + 1.0)
                 s = t * c
-                rotate(w, P, R, n, c, s)
+                rotate(d.w, P, R, n, c, s)
                 for k in range(n):
-                    row = matrix(h, o, k)
-                    x, y = w[row + p], w[row + q]
-                    w[row + p], w[row + q] = c * x - s * y, s * x + c * y
-                w[P + q] = w[R + p] = 0.0
-                rotate(w, axes(h, o, p), axes(h, o, q), n, c, s)
+                    row = matrix(d, o, k)
+                    x, y = d.w[row + p], d.w[row + q]
+                    d.w[row + p], d.w[row + q] = c * x - s * y, s * x + c * y
+                d.w[P + q] = d.w[R + p] = 0.0
+                rotate(d.w, axes(d, o, p), axes(d, o, q), n, c, s)
         if not turned:
             return
 
 
 @kernel
-def damp(h, f, w, o, i):
+def damp(d, o, i):
     """Damping of oscillator i by the modal damping: the part that does not couple it to others."""
     total, e = 0.0, 0
-    for k in range(h[m.N_FLEX]):
-        n = m.FLEXES.n_modes(h, k)
-        stiffness = h[m.FLEX_DATA.place] + m.FLEXES.data0(h, k) + 12 * n + n * n
+    for k in range(d.n_flex):
+        n = d.flexes[k].n_modes
+        stiffness = d.at_flex_data + d.flexes[k].data0 + 12 * n + n * n
         for j in range(n):
-            if f[stiffness + j] > 0.0:
-                total += w[axes(h, o, i) + e] ** 2 * f[stiffness + n + j] / f[stiffness + j]
+            if d.f[stiffness + j] > 0.0:
+                total += d.w[axes(d, o, i) + e] ** 2 * d.f[stiffness + n + j] / d.f[stiffness + j]
             e += 1
-    return w[square(h, o, i)] * total
+    return d.w[square(d, o, i)] * total
 
 
 def make_find_oscillators(retract: Callable) -> Callable:
-    """The kernel find_oscillators(h, f, w, n, o, known), at the state in Y or Y_NEW that has just been evaluated."""
+    """The kernel find_oscillators(d, o, known), at the state in Y or Y_NEW that has just been evaluated."""
 
     @kernel
-    def shapes(h, w, o, state, n):
+    def shapes(d, o, state, n):
         """Rows of C and shapes of B, from responses, axes and squares; slow oscillators have none."""
-        nq, nv, largest = h[m.NQ], h[m.NV], 0.0
+        nq, nv, largest = d.nq, d.nv, 0.0
         for i in range(n):
-            largest = max(largest, w[matrix(h, o, i) + i])
+            largest = max(largest, d.w[matrix(d, o, i) + i])
         for i in range(n):
-            shape, omega2 = lifting(h, o, i), w[matrix(h, o, i) + i]
+            shape, omega2 = lifting(d, o, i), d.w[matrix(d, o, i) + i]
             stiff = omega2 > SLOW * SLOW * largest
-            w[square(h, o, i)] = omega2 if stiff else 0.0
+            d.w[square(d, o, i)] = omega2 if stiff else 0.0
             for j in range(n):
-                w[reading(h, o, i) + j] = w[axes(h, o, i) + j] * w[root(h, o, j)]
-            for c in range(h[m.NY]):
-                w[shape + c] = 0.0
+                d.w[reading(d, o, i) + j] = d.w[axes(d, o, i) + j] * d.w[root(d, o, j)]
+            for c in range(d.ny):
+                d.w[shape + c] = 0.0
             if not stiff:
                 continue
             for j in range(n):
-                part, weight = response(h, o, j), w[axes(h, o, i) + j] / omega2
+                part, weight = response(d, o, j), d.w[axes(d, o, i) + j] / omega2
                 for c in range(nq, nq + nv + 2):
-                    w[shape + c] += weight * w[part + c]
+                    d.w[shape + c] += weight * d.w[part + c]
         for i in range(n):
             # the responses are used up: room for a displacement, the positions that it leads to, and the change
-            shape, spare, longest = lifting(h, o, i), response(h, o, 0), 0.0
+            shape, spare, longest = lifting(d, o, i), response(d, o, 0), 0.0
             for c in range(nv):
-                longest = max(longest, abs(w[shape + nq + c]))
+                longest = max(longest, abs(d.w[shape + nq + c]))
             if longest > 0.0:
                 for c in range(nv):
-                    w[spare + c] = w[shape + nq + c] * (A_LITTLE / longest)
-                retract(h, w, state, spare, spare + nv, spare + nv + nq)
+                    d.w[spare + c] = d.w[shape + nq + c] * (A_LITTLE / longest)
+                retract(d, state, spare, spare + nv, spare + nv + nq)
                 for c in range(nq):
-                    w[shape + c] = w[spare + nv + nq + c] * (longest / A_LITTLE)
+                    d.w[shape + c] = d.w[spare + nv + nq + c] * (longest / A_LITTLE)
 
     @kernel
-    def find_oscillators(h, f, w, n, o, known):
+    def find_oscillators(d, o, known):
         """Fill the basis; known: whether it holds the axes of another pose."""
-        size = count(h)
-        responses(h, f, w, o)
+        size = count(d)
+        responses(d, o)
         if known:
-            into_axes(h, w, o, size)
+            into_axes(d, o, size)
         else:
             for i in range(size):
                 for j in range(size):
-                    w[axes(h, o, i) + j] = 1.0 if i == j else 0.0
-        diagonalise(h, w, o, size)
-        shapes(h, w, o, n[m.STATE], size)
+                    d.w[axes(d, o, i) + j] = 1.0 if i == j else 0.0
+        diagonalise(d, o, size)
+        shapes(d, o, d.state, size)
         for i in range(size):
-            w[damping(h, o, i)] = damp(h, f, w, o, i)
+            d.w[damping(d, o, i)] = damp(d, o, i)
 
     return find_oscillators

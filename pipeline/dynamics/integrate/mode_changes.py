@@ -12,10 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.within_step import NEAR
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import at, dot, sub
+from flexclear.pipeline.dynamics.vectors import dot, sub
 
 #: a gap is zero below this share of the clearance plus this one, four roundings, of the mechanism's size: a difference
 #: of the sites' positions has no digits below, which matters where clearances are of micrometres
@@ -38,21 +37,15 @@ DIP = 0.05
 
 
 @kernel
-def side(n, c):
+def side(d, c):
     """+1 for an open contact, whose gap falls to an event; -1 for a closed one, whose penetration does."""
-    return 1.0 if n[n[m.MODE] + c] == 0 else -1.0
+    return 1.0 if d.mode[c] == 0 else -1.0
 
 
 @kernel
-def clearance(h, f, c):
-    """Clearance of contact c."""
-    return f[m.CONTACT_NUMBERS.row(h, c) + m.CONTACT_NUMBERS.clearance]
-
-
-@kernel
-def zero_gap(h, f, w, c):
+def zero_gap(d, c):
     """Size [m] below which the gap of contact c is zero."""
-    return ZERO_GAP * clearance(h, f, c) + ROUNDING * w[h[m.CONTROL] + m.LENGTH]
+    return ZERO_GAP * d.contact_numbers[c].clearance + ROUNDING * d.length
 
 
 @kernel
@@ -83,49 +76,49 @@ def cubic_departure(d0, d1, r0, r1):
 
 
 @kernel
-def ends_tell(h, w, n, c):
+def ends_tell(d, c):
     """Whether the ends of a step show a mode change, or one turn that may hold one."""
-    o, s = m.WATCH.row(h, c), side(n, c)
-    return s * w[o + m.WATCH.gap1] < 0.0 or (s * w[o + m.WATCH.rate0] > 0.0 and s * w[o + m.WATCH.rate1] <= 0.0)
+    watch, s = d.watch[c], side(d, c)
+    return s * watch.gap1 < 0.0 or (s * watch.rate0 > 0.0 and s * watch.rate1 <= 0.0)
 
 
 @kernel
-def cubic_tells(h, w, n, c, step):
+def cubic_tells(d, c, step):
     """Whether the distance to the mode change may fall below zero inside the step, by the cubic through its ends."""
-    o, s = m.WATCH.row(h, c), side(n, c)
-    d0, d1 = s * w[o + m.WATCH.gap0], s * w[o + m.WATCH.gap1]
-    r0, r1 = -s * w[o + m.WATCH.rate0] * step, -s * w[o + m.WATCH.rate1] * step
+    watch, s = d.watch[c], side(d, c)
+    d0, d1 = s * watch.gap0, s * watch.gap1
+    r0, r1 = -s * watch.rate0 * step, -s * watch.rate1 * step
     return cubic_least(d0, d1, r0, r1) < TRUST * cubic_departure(d0, d1, r0, r1)
 
 
 def make_locate_change(evaluate_at: Callable) -> Callable:
-    """The kernel locate_change(h, f, w, n, step, c), after `ends_tell` or `cubic_tells`.
+    """The kernel locate_change(d, step, c), after `ends_tell` or `cubic_tells`.
 
     It gives the share of the step where contact c changes its mode: 0 at once, NEVER not at all.
-    evaluate_at(h, f, w, n, step, theta): evaluates the dense output at a share of the step.
+    evaluate_at(d, step, theta): evaluates the dense output at a share of the step.
     """
 
     @kernel
-    def distance_at(h, f, w, n, step, theta, c):
+    def distance_at(d, step, theta, c):
         """Distance to the mode change (gap if open, penetration if closed) and its rate per step."""
-        evaluate_at(h, f, w, n, step, theta)
-        return side(n, c) * w[m.TOUCH.row(h, c) + m.TOUCH.gap], -side(n, c) * w[m.TOUCH.row(h, c) + m.TOUCH.rate] * step
+        evaluate_at(d, step, theta)
+        return side(d, c) * d.touch[c].gap, -side(d, c) * d.touch[c].rate * step
 
     @kernel
-    def turning_point(h, f, w, n, step, c, sign, low, high):
+    def turning_point(d, step, c, sign, low, high):
         """Share of the step where sign * distance is first least, or where it is seen to be negative at once.
 
         With sign -1 the distance rises from zero and is negative at the end: wherever it is seen negative, its first
         rise and fall lie before, whatever it does after.
         """
-        zero, theta, last = zero_gap(h, f, w, c), low, 0
+        zero, theta, last = zero_gap(d, c), low, 0
         at_low = at_high = 0.0  # rates there, zero while they are not known
         for _ in range(TURN_ITERATIONS):
             before, share = theta, 0.5
             if at_low < 0.0 < at_high:
                 share = at_low / (at_low - at_high)
             theta = low + share * (high - low)
-            value, rate = distance_at(h, f, w, n, step, theta, c)
+            value, rate = distance_at(d, step, theta, c)
             if sign * value < -zero or abs(theta - before) <= NEAR:
                 return theta
             if sign * rate > 0.0 or (sign < 0.0 and value < 0.0):
@@ -139,11 +132,11 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
         return theta
 
     @kernel
-    def root(h, f, w, n, step, c, low, high):
+    def root(d, step, c, low, high):
         """Share of the step where the distance falls through zero, given > 0 at low and < 0 at high."""
-        theta, enough = 0.5 * (low + high), 1e-3 * zero_gap(h, f, w, c)
+        theta, enough = 0.5 * (low + high), 1e-3 * zero_gap(d, c)
         for _ in range(ROOT_ITERATIONS):
-            value, rate = distance_at(h, f, w, n, step, theta, c)
+            value, rate = distance_at(d, step, theta, c)
             if value > 0.0:
                 low = theta
             else:
@@ -155,69 +148,68 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
         return theta
 
     @kernel
-    def change_within(h, f, w, n, step, c, low, high, start, falling, end, rising):
+    def change_within(d, step, c, low, high, start, falling, end, rising):
         """First mode change between two shares of the step with at most one turn between them, or NEVER.
 
         start, end: distances there; falling, rising: whether they fall at the first, and rise at the second.
         """
-        zero = zero_gap(h, f, w, c)
+        zero = zero_gap(d, c)
         if end < -zero:
             if start > zero:
-                return root(h, f, w, n, step, c, low, high)
+                return root(d, step, c, low, high)
             if falling:
                 return low
-            top = turning_point(h, f, w, n, step, c, -1.0, low, high)
-            value, _ = distance_at(h, f, w, n, step, top, c)
-            return root(h, f, w, n, step, c, top, high) if value > zero else low
+            top = turning_point(d, step, c, -1.0, low, high)
+            value, _ = distance_at(d, step, top, c)
+            return root(d, step, c, top, high) if value > zero else low
         if falling and rising:
-            bottom = turning_point(h, f, w, n, step, c, 1.0, low, high)
-            value, _ = distance_at(h, f, w, n, step, bottom, c)
+            bottom = turning_point(d, step, c, 1.0, low, high)
+            value, _ = distance_at(d, step, bottom, c)
             if value < -zero:
-                return root(h, f, w, n, step, c, low, bottom) if start > zero else low
+                return root(d, step, c, low, bottom) if start > zero else low
         return NEVER
 
     @kernel
-    def search(h, f, w, n, step, c):
+    def search(d, step, c):
         """First mode change in the step, stretch by stretch: 0 at once, NEVER not at all."""
-        zero, room = zero_gap(h, f, w, c), clearance(h, f, c)
-        here = m.TOUCH.row(h, c) + m.TOUCH.offset
-        d0, r0 = distance_at(h, f, w, n, step, 0.0, c)
-        p0 = at(w, here)
-        d1, r1 = distance_at(h, f, w, n, step, WIDEST, c)
-        p1 = at(w, here)
+        zero, room = zero_gap(d, c), d.contact_numbers[c].clearance
+        d0, r0 = distance_at(d, step, 0.0, c)
+        p0 = d.touch[c].offset
+        d1, r1 = distance_at(d, step, WIDEST, c)
+        p1 = d.touch[c].offset
         low, high = 0.0, WIDEST
         while True:
             width, middle = high - low, 0.5 * (low + high)
-            d, r = distance_at(h, f, w, n, step, middle, c)
-            p = at(w, here)
-            half, missed = 0.5 * width, abs(d - cubic_middle(d0, d1, width * r0, width * r1))
-            least = min(cubic_least(d0, d, half * r0, half * r), cubic_least(d, d1, half * r, half * r1))
+            dm, r = distance_at(d, step, middle, c)
+            p = d.touch[c].offset
+            half, missed = 0.5 * width, abs(dm - cubic_middle(d0, d1, width * r0, width * r1))
+            least = min(cubic_least(d0, dm, half * r0, half * r), cubic_least(dm, d1, half * r, half * r1))
             bend = cubic_departure(d0, d1, width * r0, width * r1)
-            if not min(least, min(d, d1)) > missed + DIP * bend:
-                near = FAITHFUL * min(bend, max(d0, max(d, d1))) + zero
+            if not min(least, min(dm, d1)) > missed + DIP * bend:
+                near = FAITHFUL * min(bend, max(d0, max(dm, d1))) + zero
                 known = missed <= near and distance_between(p0, p) + distance_between(p, p1) <= room
                 if width > SHORTEST and not known:
-                    high, d1, r1, p1 = middle, d, r, p
+                    high, d1, r1, p1 = middle, dm, r, p
                     continue
-                theta = change_within(h, f, w, n, step, c, low, middle, d0, r0 < 0.0, d, r >= 0.0)
+                theta = change_within(d, step, c, low, middle, d0, r0 < 0.0, dm, r >= 0.0)
                 if theta == NEVER:
-                    theta = change_within(h, f, w, n, step, c, middle, high, d, r < 0.0, d1, r1 >= 0.0)
+                    theta = change_within(d, step, c, middle, high, dm, r < 0.0, d1, r1 >= 0.0)
                 if theta != NEVER:
                     return theta
             if high >= 1.0:
                 return NEVER
             low, d0, r0, p0 = high, d1, r1, p1
             high = min(low + min(2.0 * width, WIDEST), 1.0)
-            d1, r1 = distance_at(h, f, w, n, step, high, c)
-            p1 = at(w, here)
+            d1, r1 = distance_at(d, step, high, c)
+            p1 = d.touch[c].offset
 
     @kernel
-    def locate_change(h, f, w, n, step, c):
-        if cubic_tells(h, w, n, c, step):
-            return search(h, f, w, n, step, c)
-        o, s = m.WATCH.row(h, c), side(n, c)
-        start, falling = s * w[o + m.WATCH.gap0], s * w[o + m.WATCH.rate0] > 0.0
-        end, rising = s * w[o + m.WATCH.gap1], s * w[o + m.WATCH.rate1] <= 0.0
-        return change_within(h, f, w, n, step, c, 0.0, 1.0, start, falling, end, rising)
+    def locate_change(d, step, c):
+        if cubic_tells(d, c, step):
+            return search(d, step, c)
+        watch, s = d.watch[c], side(d, c)
+        start, falling = s * watch.gap0, s * watch.rate0 > 0.0
+        end, rising = s * watch.gap1, s * watch.rate1 <= 0.0
+        return change_within(d, step, c, 0.0, 1.0, start, falling, end, rising)
 
     return locate_change

@@ -13,45 +13,44 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel
-def set_error_scales(h, f, w, y):
+def set_error_scales(d, y):
     """Scale of each group from the states at both ends of the step: in Y and from place y of w."""
-    scales, o = h[m.MAGNITUDE], h[m.Y]
-    for g in range(h[m.N_GROUPS]):
-        w[scales + g] = 0.0
-    for c in range(h[m.NY]):
-        g = scales + m.GROUPS.group(h, c)
-        w[g] += 0.5 * (w[y + c] * w[y + c] + w[o + c] * w[o + c])
-    for g in range(h[m.N_GROUPS]):
-        o = m.FLOORS.row(h, g)
-        allowed = w[h[m.CONTROL] + m.RTOL] * (f[o + m.FLOORS.magnitude] + np.sqrt(w[scales + g]))
-        w[scales + g] = allowed * f[o + m.FLOORS.share]
+    scales, o = d.at_magnitude, d.at_y
+    for g in range(d.n_groups):
+        d.w[scales + g] = 0.0
+    for c in range(d.ny):
+        g = scales + d.groups[c].group
+        d.w[g] += 0.5 * (d.w[y + c] * d.w[y + c] + d.w[o + c] * d.w[o + c])
+    for g in range(d.n_groups):
+        o = d.floors[g]
+        allowed = d.rtol * (o.magnitude + np.sqrt(d.w[scales + g]))
+        d.w[scales + g] = allowed * o.share
 
 
 @kernel
-def error_scale(h, w, c):
+def error_scale(d, c):
     """Error of variable c that the tolerance allows."""
-    return w[h[m.MAGNITUDE] + m.GROUPS.group(h, c)]
+    return d.magnitude[d.groups[c].group]
 
 
 @kernel
-def scaled_norm(h, w, a):
+def scaled_norm(d, a):
     """Root mean square, in units of the scales, of what w holds for each variable from place a on."""
     total = 0.0
-    for c in range(h[m.NY]):
-        share = w[a + c] / error_scale(h, w, c)
+    for c in range(d.ny):
+        share = d.w[a + c] / error_scale(d, c)
         total += share * share
-    return np.sqrt(total / h[m.NY])
+    return np.sqrt(total / d.ny)
 
 
 @kernel
-def finite(h, w, a):
+def finite(d, a):
     """Whether w holds numbers only, for each variable, from place a on."""
     result = True
-    for c in range(h[m.NY]):
-        result &= abs(w[a + c]) <= 1e300
+    for c in range(d.ny):
+        result &= abs(d.w[a + c]) <= 1e300
     return result

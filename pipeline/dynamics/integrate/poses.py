@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
@@ -14,13 +13,13 @@ from flexclear.pipeline.dynamics.kernels import kernel
 class Poses:
     """Kernels, and makers of some; those of mechanisms with loops are in `singular_step`.
 
-    note(h, w): remember how independent the closures are in the state just evaluated.
-    stand(h, w, t): take that for the start of a step.
-    steer(h, w, t): the next step from t, 0 where a polynomial must be laid over a pose.
-    ready(h, w): whether one lies ready.  done(h, w, t): it has been gone along up to t.
-    make_foresee(evaluate): foresee(h, f, w, n, t) looks for a pose ahead of an accepted step's end.
+    note(d): remember how independent the closures are in the state just evaluated.
+    stand(d, t): take that for the start of a step.
+    steer(d, t): the next step from t, 0 where a polynomial must be laid over a pose.
+    ready(d): whether one lies ready.  done(d, t): it has been gone along up to t.
+    make_foresee(evaluate): foresee(d, t) looks for a pose ahead of an accepted step's end.
     make_along(method, attempt, extend): the method's attempt, extend and interpolate, for such polynomials as well.
-    make_arrive(evaluate, project, attempt, method): arrive(h, f, w, n, step, t_new) goes along one.
+    make_arrive(evaluate, project, attempt, method): arrive(d, step, t_new) goes along one.
     """
 
     note: Callable
@@ -34,29 +33,29 @@ class Poses:
 
 
 @kernel
-def note_nothing(h, w):
+def note_nothing(d):
     """No closure."""
 
 
 @kernel
-def stand_anywhere(h, w, t):
+def stand_anywhere(d, t):
     """No closure."""
 
 
 @kernel
-def step_as_planned(h, w, t):
+def step_as_planned(d, t):
     """No pose to stop before."""
-    return w[h[m.CONTROL] + m.STEP]
+    return d.step
 
 
 @kernel
-def never_ready(h, w):
+def never_ready(d):
     """No polynomial."""
     return False
 
 
 @kernel
-def nothing_done(h, w, t):
+def nothing_done(d, t):
     """No polynomial."""
 
 
@@ -64,7 +63,7 @@ def make_foresee_nothing(evaluate: Callable) -> Callable:
     """The kernel foresee of a tree."""
 
     @kernel
-    def foresee(h, f, w, n, t):
+    def foresee(d, t):
         """No pose to foresee."""
 
     return foresee
@@ -79,7 +78,7 @@ def make_arrive_nowhere(evaluate: Callable, project: Callable, attempt: Callable
     """The kernel arrive of a tree."""
 
     @kernel
-    def arrive(h, f, w, n, step, t_new):
+    def arrive(d, step, t_new):
         """No polynomial."""
 
     return arrive

@@ -83,267 +83,264 @@ def memory(h: np.ndarray) -> int:
 
 
 @kernel
-def stage_vector(h, kind, i):
+def stage_vector(d, kind, i):
     """Where w holds vector i of a kind."""
-    return h[m.MEMORY] + VECTORS + h[m.NY] * (3 * kind + i)
+    return d.at_memory + VECTORS + d.ny * (3 * kind + i)
 
 
 @kernel
-def jacobian_entry(h, i, k):
+def jacobian_entry(d, i, k):
     """Where w holds an entry of the Jacobian."""
-    return h[m.MEMORY] + VECTORS + h[m.NY] * N_VECTORS + h[m.NY] * i + k
+    return d.at_memory + VECTORS + d.ny * N_VECTORS + d.ny * i + k
 
 
 @kernel
-def factors(h, system):
+def factors(d, system):
     """Where w holds the factors of a system."""
-    size = h[m.NY]
-    return jacobian_entry(h, h[m.NY], 0) + system * size * size
+    size = d.ny
+    return jacobian_entry(d, d.ny, 0) + system * size * size
 
 
 @kernel
-def pivots(h, system):
+def pivots(d, system):
     """Where w holds the row exchanges of a system's factors, behind one real and one complex matrix."""
-    return factors(h, 3) + h[m.NY] * system
+    return factors(d, 3) + d.ny * system
 
 
 # Linear systems ------------------------------------------------------------------------------------------------------
 @kernel
-def factorise(h, w, step):
+def factorise(d, step):
     """Factors of both systems for a step; False when one is singular."""
-    size, real, rest = h[m.NY], factors(h, REAL), factors(h, COMPLEX)
+    size, real, rest = d.ny, factors(d, REAL), factors(d, COMPLEX)
     for i in range(size):
         for k in range(size):
-            entry, o = w[jacobian_entry(h, i, k)], size * i + k
-            w[real + o] = w[rest + o] = -entry
-            w[rest + size * size + o] = 0.0
-        w[real + (size + 1) * i] += MU_REAL / step
-        w[rest + (size + 1) * i] += MU_REST / step
-        w[rest + size * size + (size + 1) * i] = MU_IMAG / step
-    w[h[m.MEMORY] + FACTORED_STEP] = step
-    return lu_factor(w, real, pivots(h, REAL), size) and lu_factor_complex(w, rest, pivots(h, COMPLEX), size)
+            entry, o = d.w[jacobian_entry(d, i, k)], size * i + k
+            d.w[real + o] = d.w[rest + o] = -entry
+            d.w[rest + size * size + o] = 0.0
+        d.w[real + (size + 1) * i] += MU_REAL / step
+        d.w[rest + (size + 1) * i] += MU_REST / step
+        d.w[rest + size * size + (size + 1) * i] = MU_IMAG / step
+    d.memory[FACTORED_STEP] = step
+    return lu_factor(d.w, real, pivots(d, REAL), size) and lu_factor_complex(d.w, rest, pivots(d, COMPLEX), size)
 
 
 @kernel
-def solve_real(h, w, b):
+def solve_real(d, b):
     """Solve the real system in place for the right-hand side from place b."""
-    lu_solve(w, factors(h, REAL), pivots(h, REAL), h[m.NY], b)
+    lu_solve(d.w, factors(d, REAL), pivots(d, REAL), d.ny, b)
 
 
 @kernel
-def solve_complex(h, w, b, d):
-    """Solve the complex system in place: real part of the right-hand side from place b, imaginary part from d."""
-    lu_solve_complex(w, factors(h, COMPLEX), pivots(h, COMPLEX), h[m.NY], b, d)
+def solve_complex(d, b, e):
+    """Solve the complex system in place: real part of the right-hand side from place b, imaginary part from e."""
+    lu_solve_complex(d.w, factors(d, COMPLEX), pivots(d, COMPLEX), d.ny, b, e)
 
 
 # Collocation polynomial ----------------------------------------------------------------------------------------------
 @kernel
-def coefficient(h, w, c, k):
+def coefficient(d, c, k):
     """Coefficient of theta^(k + 1) for state variable c."""
     return (
-        P[0, k] * w[stage_vector(h, Z, 0) + c]
-        + P[1, k] * w[stage_vector(h, Z, 1) + c]
-        + P[2, k] * w[stage_vector(h, Z, 2) + c]
+        P[0, k] * d.w[stage_vector(d, Z, 0) + c]
+        + P[1, k] * d.w[stage_vector(d, Z, 1) + c]
+        + P[2, k] * d.w[stage_vector(d, Z, 2) + c]
     )
 
 
 @kernel
-def write_polynomial(h, w, out):
+def write_polynomial(d, out):
     """The polynomial of the present step into four vectors from place out."""
-    for c in range(h[m.NY]):
-        w[out + c] = w[h[m.Y] + c]
+    for c in range(d.ny):
+        d.w[out + c] = d.y[c]
         for k in range(3):
-            w[out + h[m.NY] * (k + 1) + c] = coefficient(h, w, c, k)
+            d.w[out + d.ny * (k + 1) + c] = coefficient(d, c, k)
 
 
 @kernel
-def extend(h, f, w, n, step):
+def extend(d, step):
     """Prepare the dense output: the polynomial, a cubic."""
-    write_polynomial(h, w, h[m.DENSE])
+    write_polynomial(d, d.at_dense)
 
 
 @kernel
-def keep(h, f, w, n, step):
+def keep(d, step):
     """The polynomial of an accepted step predicts the stages of the next."""
-    write_polynomial(h, w, stage_vector(h, POLYNOMIAL, 0))
-    w[h[m.MEMORY] + LAST_STEP] = step
+    write_polynomial(d, stage_vector(d, POLYNOMIAL, 0))
+    d.memory[LAST_STEP] = step
 
 
 @kernel
-def begin(h, f, w, n):
+def begin(d):
     """No polynomial is known; the Jacobian holds until the iteration says otherwise, whatever the contacts' modes."""
-    w[h[m.MEMORY] + LAST_STEP] = 0.0
+    d.memory[LAST_STEP] = 0.0
 
 
 # Newton's iteration --------------------------------------------------------------------------------------------------
 @kernel
-def transform(h, w, matrix, source, target):
+def transform(d, matrix, source, target):
     """Three vectors of one kind as combinations of those of another."""
-    for c in range(h[m.NY]):
-        a = w[stage_vector(h, source, 0) + c]
-        b = w[stage_vector(h, source, 1) + c]
-        d = w[stage_vector(h, source, 2) + c]
+    for c in range(d.ny):
+        a = d.w[stage_vector(d, source, 0) + c]
+        b = d.w[stage_vector(d, source, 1) + c]
+        e = d.w[stage_vector(d, source, 2) + c]
         for i in range(3):
-            w[stage_vector(h, target, i) + c] = matrix[i, 0] * a + matrix[i, 1] * b + matrix[i, 2] * d
+            d.w[stage_vector(d, target, i) + c] = matrix[i, 0] * a + matrix[i, 1] * b + matrix[i, 2] * e
 
 
 @kernel
-def predict(h, w, step):
+def predict(d, step):
     """Stages from the polynomial of the step before; without one, positions move on with their rates at the start.
 
     Not speeds, whose rates at the start may be far from those of a stiff step. Positions must: at rest where a contact
     begins the first iterate would not touch, and the force, seen by the second one only, would look like divergence.
     """
-    length, o, size = w[h[m.MEMORY] + LAST_STEP], stage_vector(h, POLYNOMIAL, 0), h[m.NY]
+    length, o, size = d.memory[LAST_STEP], stage_vector(d, POLYNOMIAL, 0), d.ny
     for i in range(3):
         x = 1.0 + C[i] * step / length if length > 0.0 else 0.0
         for c in range(size):
-            rise = (w[o + 3 * size + c] * x + w[o + 2 * size + c]) * x + w[o + size + c]
-            extrapolated = w[o + c] + rise * x - w[h[m.Y] + c]
-            along = C[i] * step * w[h[m.SLOPES] + c] if c < h[m.NQ] else 0.0
-            w[stage_vector(h, Z, i) + c] = extrapolated if length > 0.0 else along
-    transform(h, w, T_INVERSE, Z, TRANSFORMED)
+            rise = (d.w[o + 3 * size + c] * x + d.w[o + 2 * size + c]) * x + d.w[o + size + c]
+            extrapolated = d.w[o + c] + rise * x - d.y[c]
+            along = C[i] * step * d.slopes[c] if c < d.nq else 0.0
+            d.w[stage_vector(d, Z, i) + c] = extrapolated if length > 0.0 else along
+    transform(d, T_INVERSE, Z, TRANSFORMED)
 
 
 @kernel
-def residuals(h, w, step):
+def residuals(d, step):
     """Right-hand sides of the systems, from the stages' slopes."""
-    size, first = h[m.NY], slope(h, 1)
+    size, first = d.ny, slope(d, 1)
     for c in range(size):
-        a, b, d = w[first + c], w[first + size + c], w[first + 2 * size + c]
-        one = w[stage_vector(h, TRANSFORMED, 0) + c] / step
-        two = w[stage_vector(h, TRANSFORMED, 1) + c] / step
-        three = w[stage_vector(h, TRANSFORMED, 2) + c] / step
+        a, b, e = d.w[first + c], d.w[first + size + c], d.w[first + 2 * size + c]
+        one = d.w[stage_vector(d, TRANSFORMED, 0) + c] / step
+        two = d.w[stage_vector(d, TRANSFORMED, 1) + c] / step
+        three = d.w[stage_vector(d, TRANSFORMED, 2) + c] / step
         for i in range(3):
-            total = T_INVERSE[i, 0] * a + T_INVERSE[i, 1] * b + T_INVERSE[i, 2] * d
+            total = T_INVERSE[i, 0] * a + T_INVERSE[i, 1] * b + T_INVERSE[i, 2] * e
             if i == 0:
                 total -= MU_REAL * one
             elif i == 1:
                 total -= MU_REST * two - MU_IMAG * three
             else:
                 total -= MU_REST * three + MU_IMAG * two
-            w[stage_vector(h, CORRECTION, i) + c] = total
+            d.w[stage_vector(d, CORRECTION, i) + c] = total
 
 
 @kernel
-def correct(h, w):
+def correct(d):
     """Add the corrections; their norm in units of the tolerance."""
     total = 0.0
-    for c in range(h[m.NY]):
-        scale = error_scale(h, w, c)
+    for c in range(d.ny):
+        scale = error_scale(d, c)
         for i in range(3):
-            change = w[stage_vector(h, CORRECTION, i) + c]
-            w[stage_vector(h, TRANSFORMED, i) + c] += change
+            change = d.w[stage_vector(d, CORRECTION, i) + c]
+            d.w[stage_vector(d, TRANSFORMED, i) + c] += change
             total += (change / scale) ** 2
-    transform(h, w, T, TRANSFORMED, Z)
-    return np.sqrt(total / (3.0 * h[m.NY]))
+    transform(d, T, TRANSFORMED, Z)
+    return np.sqrt(total / (3.0 * d.ny))
 
 
 @kernel
-def estimate(h, w, step, start):
+def estimate(d, step, start):
     """Norm of the filtered error, left in row ESTIMATE, from a slope at (or near) the start of the step."""
-    out = slope(h, ESTIMATE)
-    for c in range(h[m.NY]):
+    out = slope(d, ESTIMATE)
+    for c in range(d.ny):
         bent = 0.0
         for i in range(3):
-            bent += E[i] * w[stage_vector(h, Z, i) + c]
-        w[out + c] = w[start + c] + bent / step
-    solve_real(h, w, out)
-    return scaled_norm(h, w, out)
+            bent += E[i] * d.w[stage_vector(d, Z, i) + c]
+        d.w[out + c] = d.w[start + c] + bent / step
+    solve_real(d, out)
+    return scaled_norm(d, out)
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels."""
 
     @kernel
-    def jacobian(h, f, w, n):
+    def jacobian(d):
         """Change of all rates with all variables, at the start of the step; works and losses change none."""
-        size, near = h[m.NY], slope(h, 1)
-        works = h[m.NQ] + h[m.NV]
-        states = works + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * h[m.N_CONTACTS]
+        size, near = d.ny, slope(d, 1)
+        works = d.nq + d.nv
+        states = works + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * d.n_contacts
         for c in range(size):
-            w[h[m.Y_STAGE] + c] = w[h[m.Y] + c]
+            d.y_stage[c] = d.y[c]
         for k in range(size):
             if works <= k < states:
                 for i in range(size):
-                    w[jacobian_entry(h, i, k)] = 0.0
+                    d.w[jacobian_entry(d, i, k)] = 0.0
                 continue
-            y = w[h[m.Y] + k]
-            w[h[m.Y_STAGE] + k] = y + PERTURBATION * (
-                f[m.FLOORS.row(h, m.GROUPS.group(h, k)) + m.FLOORS.natural] + abs(y)
-            )
-            change = w[h[m.Y_STAGE] + k] - y
-            evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y_STAGE], near)
-            n[m.EVALUATIONS] += 1
-            if n[m.EVALUATION] != m.OK:
+            y = d.y[k]
+            d.y_stage[k] = y + PERTURBATION * (d.floors[d.groups[k].group].natural + abs(y))
+            change = d.y_stage[k] - y
+            evaluate(d, d.time, d.at_y_stage, near)
+            d.evaluations += 1
+            if d.evaluation != m.OK:
                 return False
             for i in range(size):
-                difference = w[near + i] - w[h[m.SLOPES] + i]
-                w[jacobian_entry(h, i, k)] = difference / change
-            w[h[m.Y_STAGE] + k] = y
-        n[m.JACOBIANS] += 1
-        w[h[m.MEMORY] + JACOBIAN_HOLDS], w[h[m.MEMORY] + FACTORED_STEP] = 1.0, 0.0
+                difference = d.w[near + i] - d.slopes[i]
+                d.w[jacobian_entry(d, i, k)] = difference / change
+            d.y_stage[k] = y
+        d.jacobians += 1
+        d.memory[JACOBIAN_HOLDS], d.memory[FACTORED_STEP] = 1.0, 0.0
         return True
 
     @kernel
-    def iterate(h, f, w, n, step):
+    def iterate(d, step):
         """Newton's iterations: rate at which the corrections fell, or -1 when they did not."""
-        size, last_norm, rate = h[m.NY], 0.0, 0.0
+        size, last_norm, rate = d.ny, 0.0, 0.0
         for k in range(MOST_ITERATIONS):
             for i in range(3):
                 for c in range(size):
-                    w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + w[stage_vector(h, Z, i) + c]
-                t = w[h[m.CONTROL] + m.TIME] + C[i] * step
-                evaluate(h, f, w, n, t, h[m.Y_STAGE], slope(h, i + 1))
-                n[m.EVALUATIONS] += 1
-                if n[m.EVALUATION] != m.OK:
+                    d.y_stage[c] = d.y[c] + d.w[stage_vector(d, Z, i) + c]
+                t = d.time + C[i] * step
+                evaluate(d, t, d.at_y_stage, slope(d, i + 1))
+                d.evaluations += 1
+                if d.evaluation != m.OK:
                     return -1.0
-            residuals(h, w, step)
-            solve_real(h, w, stage_vector(h, CORRECTION, 0))
-            solve_complex(h, w, stage_vector(h, CORRECTION, 1), stage_vector(h, CORRECTION, 2))
-            norm = correct(h, w)
+            residuals(d, step)
+            solve_real(d, stage_vector(d, CORRECTION, 0))
+            solve_complex(d, stage_vector(d, CORRECTION, 1), stage_vector(d, CORRECTION, 2))
+            norm = correct(d)
             rate = norm / last_norm if k > 0 else 0.0
-            verdict = converged(k, norm, last_norm, w[h[m.CONTROL] + m.RTOL])
+            verdict = converged(k, norm, last_norm, d.rtol)
             if verdict != 0:
                 return rate if verdict > 0 else -1.0
             last_norm = norm
         return -1.0
 
     @kernel
-    def attempt(h, f, w, n, step):
+    def attempt(d, step):
         """State Y_NEW after a step from Y; False when Newton's iteration fails with a fresh Jacobian too."""
-        o = h[m.MEMORY]
-        set_error_scales(h, f, w, h[m.Y])
+        set_error_scales(d, d.at_y)
         for _ in range(2):
-            fresh = w[o + JACOBIAN_HOLDS] == 0.0
-            if fresh and not jacobian(h, f, w, n):
+            fresh = d.memory[JACOBIAN_HOLDS] == 0.0
+            if fresh and not jacobian(d):
                 return False
-            if w[o + FACTORED_STEP] != step and not factorise(h, w, step):
+            if d.memory[FACTORED_STEP] != step and not factorise(d, step):
                 return False
-            predict(h, w, step)
-            rate = iterate(h, f, w, n, step)
+            predict(d, step)
+            rate = iterate(d, step)
             if rate >= 0.0:
-                w[o + JACOBIAN_HOLDS] = 1.0 if rate <= SLOW else 0.0
-                for c in range(h[m.NY]):
-                    w[h[m.Y_NEW] + c] = w[h[m.Y] + c] + w[stage_vector(h, Z, 2) + c]
+                d.memory[JACOBIAN_HOLDS] = 1.0 if rate <= SLOW else 0.0
+                for c in range(d.ny):
+                    d.y_new[c] = d.y[c] + d.w[stage_vector(d, Z, 2) + c]
                 return True
-            w[o + JACOBIAN_HOLDS] = 0.0
+            d.memory[JACOBIAN_HOLDS] = 0.0
             if fresh:
                 return False
         return False
 
     @kernel
-    def error(h, f, w, n, step):
+    def error(d, step):
         """Norm of the local error, 1 at the tolerance; what is too large is filtered twice."""
-        norm, out, near = estimate(h, w, step, slope(h, 0)), slope(h, ESTIMATE), slope(h, 1)
+        norm, out, near = estimate(d, step, slope(d, 0)), slope(d, ESTIMATE), slope(d, 1)
         if norm > 1.0:
-            for c in range(h[m.NY]):
-                w[h[m.Y_STAGE] + c] = w[h[m.Y] + c] + w[out + c]
-            evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y_STAGE], near)
-            n[m.EVALUATIONS] += 1
-            if n[m.EVALUATION] == m.OK and finite(h, w, near):
-                norm = estimate(h, w, step, near)
-            n[m.EVALUATION] = m.OK
+            for c in range(d.ny):
+                d.y_stage[c] = d.y[c] + d.w[out + c]
+            evaluate(d, d.time, d.at_y_stage, near)
+            d.evaluations += 1
+            if d.evaluation == m.OK and finite(d, near):
+                norm = estimate(d, step, near)
+            d.evaluation = m.OK
         return norm
 
     return begin, attempt, error, extend, keep

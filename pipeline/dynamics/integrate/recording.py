@@ -25,58 +25,58 @@ share_of_records = kernel(record_share)
 
 
 @kernel
-def holds_outputs(n, outputs, t):
+def holds_outputs(d, outputs, t):
     """Whether there are several output times up to t that have not been recorded."""
-    return n[m.NEXT_OUTPUT] + 1 < outputs.shape[0] and outputs[n[m.NEXT_OUTPUT] + 1] <= t
+    return d.next_output + 1 < outputs.shape[0] and outputs[d.next_output + 1] <= t
 
 
 @kernel
-def hold_modes(h, w, n):
+def hold_modes(d):
     """Keep the modes and impact rates that hold within the step, which its end may change."""
-    for c in range(h[m.N_CONTACTS]):
-        o = m.WATCH.row(h, c)
-        w[o + m.WATCH.mode0], w[o + m.WATCH.latched0] = n[n[m.MODE] + c], w[h[m.LATCHED] + c]
+    for c in range(d.n_contacts):
+        watch = d.watch[c]
+        watch.mode0, watch.latched0 = d.mode[c], d.latched[c]
 
 
 @kernel
-def snapshot(h, w, n, rows, t, y):
+def snapshot(d, rows, t, y):
     """Append a row of the motion: time, modes and impact rates of the contacts as held, state."""
-    row, (mode, latched, state) = rows[n[m.N_RECORDED]], m.record_columns(h[m.N_CONTACTS])
+    row, (mode, latched, state) = rows[d.n_recorded], m.record_columns(d.n_contacts)
     row[0] = t
-    for c in range(h[m.N_CONTACTS]):
-        o = m.WATCH.row(h, c)
-        row[mode + c] = w[o + m.WATCH.mode0]
-        row[latched + c] = w[o + m.WATCH.latched0]
-    for k in range(h[m.NY]):
-        row[state + k] = w[y + k]
-    n[m.N_RECORDED] += 1
+    for c in range(d.n_contacts):
+        watch = d.watch[c]
+        row[mode + c] = watch.mode0
+        row[latched + c] = watch.latched0
+    for k in range(d.ny):
+        row[state + k] = d.w[y + k]
+    d.n_recorded += 1
 
 
 @kernel
-def add_event(events, n, c, kind, t):
+def add_event(d, events, c, kind, t):
     """Append a row to the events, of contact c; its number."""
-    row = n[m.N_EVENTS]
+    row = d.n_events
     event = events[row]
     event[m.EVENT.time], event[m.EVENT.contact], event[m.EVENT.kind] = t, c, kind
-    n[m.N_EVENTS] = row + 1
+    d.n_events = row + 1
     return row
 
 
 def make_record_outputs(extend: Callable, interpolate: Callable) -> Callable:
-    """The kernel record_outputs(h, f, w, n, step, ready, outputs, rows, t_end)."""
+    """The kernel record_outputs(d, step, ready, outputs, rows, t_end)."""
 
     @kernel
-    def record_outputs(h, f, w, n, step, ready, outputs, rows, t_end):
+    def record_outputs(d, step, ready, outputs, rows, t_end):
         """Snapshots at the output times up to t_end, from the dense output, which may be ready."""
-        t = w[h[m.CONTROL] + m.TIME]
-        while n[m.NEXT_OUTPUT] < outputs.shape[0] and outputs[n[m.NEXT_OUTPUT]] <= t_end:
-            t_output = outputs[n[m.NEXT_OUTPUT]]
+        t = d.time
+        while d.next_output < outputs.shape[0] and outputs[d.next_output] <= t_end:
+            t_output = outputs[d.next_output]
             if t_output > t:
                 if not ready:
-                    extend(h, f, w, n, step)
+                    extend(d, step)
                     ready = True
-                interpolate(h, w, (t_output - t) / step, h[m.Y_STAGE])
-                snapshot(h, w, n, rows, t_output, h[m.Y_STAGE])
-            n[m.NEXT_OUTPUT] += 1
+                interpolate(d, (t_output - t) / step, d.at_y_stage)
+                snapshot(d, rows, t_output, d.at_y_stage)
+            d.next_output += 1
 
     return record_outputs

@@ -12,7 +12,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 
 def make_stages(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> tuple[Callable, Callable]:
-    """The kernels stage(h, f, w, n, step, i) and attempt(h, f, w, n, step).
+    """The kernels stage(d, step, i) and attempt(d, step).
 
     A, B, C: Butcher's tableau; stages beyond len(B) serve error estimates and dense output.
     Row i of SLOPES is the slope of stage i, row 0 that at the start of the step.
@@ -20,37 +20,37 @@ def make_stages(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray)
     count = len(B)
 
     @kernel
-    def stage(h, f, w, n, step, i):
+    def stage(d, step, i):
         """Slope of stage i from those of all earlier ones."""
-        size, y, stage_y = h[m.NY], h[m.Y], h[m.Y_STAGE]
+        size, y, stage_y = d.ny, d.at_y, d.at_y_stage
         for c in range(size):
-            w[stage_y + c] = w[y + c]
+            d.w[stage_y + c] = d.w[y + c]
         for j in range(i):
             weight = step * A[i, j]
             if weight != 0.0:
-                k = slope(h, j)
+                k = slope(d, j)
                 for c in range(size):
-                    w[stage_y + c] += weight * w[k + c]
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + C[i] * step, stage_y, slope(h, i))
-        n[m.EVALUATIONS] += 1
+                    d.w[stage_y + c] += weight * d.w[k + c]
+        evaluate(d, d.time + C[i] * step, stage_y, slope(d, i))
+        d.evaluations += 1
 
     @kernel
-    def attempt(h, f, w, n, step):
+    def attempt(d, step):
         """State Y_NEW after a step from Y; False when a stage has no slope."""
-        size = h[m.NY]
+        size = d.ny
         for i in range(1, count):
-            stage(h, f, w, n, step, i)
-            if n[m.EVALUATION] != m.OK:
+            stage(d, step, i)
+            if d.evaluation != m.OK:
                 return False
         for c in range(size):
-            w[h[m.Y_NEW] + c] = 0.0
+            d.y_new[c] = 0.0
         for j in range(count):
             if B[j] != 0.0:
-                k = slope(h, j)
+                k = slope(d, j)
                 for c in range(size):
-                    w[h[m.Y_NEW] + c] += B[j] * w[k + c]
+                    d.y_new[c] += B[j] * d.w[k + c]
         for c in range(size):
-            w[h[m.Y_NEW] + c] = w[h[m.Y] + c] + step * w[h[m.Y_NEW] + c]
+            d.y_new[c] = d.y[c] + step * d.y_new[c]
         return True
 
     return stage, attempt

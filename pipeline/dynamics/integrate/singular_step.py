@@ -40,54 +40,54 @@ TIGHTLY = 1e-15
 
 
 @kernel
-def pivot(h, w, r):
+def pivot(d, r):
     """How far kept row r is from depending on those before it, in the state just evaluated: a length in M^-1."""
-    return 1.0 / abs(w[base(h, h[m.CLOSURE_ENVELOPE.place], h[m.SCHUR], r) + r])
+    return 1.0 / abs(d.w[base(d.h, d.at_closure_envelope, d.at_schur, r) + r])
 
 
 @kernel
-def now(h, r):
+def now(d, r):
     """Where w holds the independence of row r at the end of the step."""
-    return h[m.INDEPENDENCE] + r
+    return d.at_independence + r
 
 
 @kernel
-def past(h, r):
+def past(d, r):
     """The same at its start."""
-    return h[m.INDEPENDENCE] + h[m.N_CLOSURE_ROWS] + r
+    return d.at_independence + d.n_closure_rows + r
 
 
 @kernel
-def most(h, r):
+def most(d, r):
     """The most that it has been at the ends of steps."""
-    return h[m.INDEPENDENCE] + 2 * h[m.N_CLOSURE_ROWS] + r
+    return d.at_independence + 2 * d.n_closure_rows + r
 
 
 @kernel
-def note(h, w):
+def note(d):
     """Remember how independent the closure rows are in the state just evaluated."""
-    for r in range(h[m.N_KEPT_ROWS]):
-        w[now(h, r)] = pivot(h, w, r)
-    w[h[m.CONTROL] + m.SIGMA] = np.sqrt(max(w[h[m.PIVOT] + m.LAST_PIVOT], 0.0))
+    for r in range(d.n_kept_rows):
+        d.w[now(d, r)] = pivot(d, r)
+    d.sigma = np.sqrt(max(d.last_pivot, 0.0))
 
 
 @kernel
-def left(h, w):
+def left(d):
     """Least share that a row has of the most that it had, in what has been noted."""
     least = 1.0
-    for r in range(h[m.N_KEPT_ROWS]):
-        if w[now(h, r)] < least * w[most(h, r)]:
-            least = w[now(h, r)] / w[most(h, r)]
+    for r in range(d.n_kept_rows):
+        if d.w[now(d, r)] < least * d.w[most(d, r)]:
+            least = d.w[now(d, r)] / d.w[most(d, r)]
     return least
 
 
 @kernel
-def stand(h, w, t):
+def stand(d, t):
     """Take what has been noted at time t for the start of the next step."""
-    for r in range(h[m.N_KEPT_ROWS]):
-        w[past(h, r)] = w[now(h, r)]
-        w[most(h, r)] = max(w[most(h, r)], w[now(h, r)])
-    w[h[m.CONTROL] + m.PAST_TIME], w[h[m.CONTROL] + m.LEFT] = t, left(h, w)
+    for r in range(d.n_kept_rows):
+        d.w[past(d, r)] = d.w[now(d, r)]
+        d.w[most(d, r)] = max(d.w[most(d, r)], d.w[now(d, r)])
+    d.past_time, d.left = t, left(d)
 
 
 @kernel
@@ -100,108 +100,106 @@ def zero_ahead(sigma, fall, before, span):
 
 
 @kernel
-def full(h, w, r):
+def full(d, r):
     """How independent row r is away from singular poses."""
-    o = h[m.ROW_SCALE] + r
-    return max(w[most(h, r)], HALF * np.sqrt(max(w[o], w[o + h[m.N_CLOSURE_ROWS]])))
+    o = d.at_row_scale + r
+    return max(d.w[most(d, r)], HALF * np.sqrt(max(d.w[o], d.w[o + d.n_closure_rows])))
 
 
 def make_foresee(evaluate: Callable) -> Callable:
-    """The kernel foresee(h, f, w, n, t)."""
+    """The kernel foresee(d, t)."""
 
     @kernel
-    def soonest(h, w, span):
+    def soonest(d, span):
         """Row that is first to depend on those before it, and when, by straight lines; -1 when that is far."""
-        horizon, first, which = STEPS_AHEAD * max(span, w[h[m.CONTROL] + m.STEP]), NEVER, -1
-        for r in range(h[m.N_KEPT_ROWS]):
-            value, before = w[now(h, r)], w[past(h, r)]
+        horizon, first, which = STEPS_AHEAD * max(span, d.step), NEVER, -1
+        for r in range(d.n_kept_rows):
+            value, before = d.w[now(d, r)], d.w[past(d, r)]
             if value < before:
                 rough = value * span / (before - value)
-                if rough < first and (rough <= horizon or value <= LOW * w[most(h, r)]):
+                if rough < first and (rough <= horizon or value <= LOW * d.w[most(d, r)]):
                     first, which = rough, r
         return which, first
 
     @kernel
-    def foresee(h, f, w, n, t):
+    def foresee(d, t):
         """Time of the next singular pose, from the ends of the step that has been accepted at t.
 
         Roughly from both ends; when that is near, from the slope at t, by one evaluation a little earlier.
         """
-        c, span = h[m.CONTROL], t - w[h[m.CONTROL] + m.PAST_TIME]
-        which, rough = soonest(h, w, span)
-        value, before = w[now(h, max(which, 0))], w[past(h, max(which, 0))]
-        stand(h, w, t)
-        blind = 0.0 < w[c + m.SIGMA] < np.sqrt(BLIND)
-        w[c + m.BLIND_STEPS] = w[c + m.BLIND_STEPS] + 1.0 if blind else 0.0
-        if w[c + m.PASS_TIME] < t and w[c + m.MOST_REACH] == 0.0:
-            w[c + m.BLIND_STEPS] = NEVER  # a pose that no polynomial leads over has been stepped over
-        w[c + m.PASS_TIME] = NEVER
+        span = t - d.past_time
+        which, rough = soonest(d, span)
+        value, before = d.w[now(d, max(which, 0))], d.w[past(d, max(which, 0))]
+        stand(d, t)
+        blind = 0.0 < d.sigma < np.sqrt(BLIND)
+        d.blind_steps = d.blind_steps + 1.0 if blind else 0.0
+        if d.pass_time < t and d.most_reach == 0.0:
+            d.blind_steps = NEVER  # a pose that no polynomial leads over has been stepped over
+        d.pass_time = NEVER
         if which < 0:
-            if w[c + m.LEFT] > LOW:
-                w[c + m.MOST_REACH] = NEVER
+            if d.left > LOW:
+                d.most_reach = NEVER
             return
         back = A_LITTLE * min(span, rough)
-        for k in range(h[m.NY]):
-            w[h[m.Y_STAGE] + k] = w[h[m.Y] + k] - back * w[h[m.SLOPES] + k]
-        evaluate(h, f, w, n, t - back, h[m.Y_STAGE], h[m.Y_NEW])
-        n[m.EVALUATIONS] += 1
-        fall = pivot(h, w, which) - value
-        if n[m.EVALUATION] == m.OK and fall > 0.0:
+        for k in range(d.ny):
+            d.y_stage[k] = d.y[k] - back * d.slopes[k]
+        evaluate(d, t - back, d.at_y_stage, d.at_y_new)
+        d.evaluations += 1
+        fall = pivot(d, which) - value
+        if d.evaluation == m.OK and fall > 0.0:
             ahead = zero_ahead(value, fall / back, before, span)
-            w[c + m.PASS_TIME] = t + ahead
-            w[c + m.REACH] = min(w[c + m.MOST_REACH], ahead * FROM * full(h, w, which) / value)
+            d.pass_time = t + ahead
+            d.reach = min(d.most_reach, ahead * FROM * full(d, which) / value)
 
     return foresee
 
 
 @kernel
-def steer(h, w, t):
+def steer(d, t):
     """The next step from t; 0 where a polynomial must be laid over a singular pose."""
-    c = h[m.CONTROL]
-    step, ahead, reach = w[c + m.STEP], w[c + m.PASS_TIME] - t, w[c + m.REACH]
-    if w[c + m.MOST_REACH] > 0.0 and (ahead <= reach or w[c + m.LEFT] < TOO_LITTLE):
+    step, ahead, reach = d.step, d.pass_time - t, d.reach
+    if d.most_reach > 0.0 and (ahead <= reach or d.left < TOO_LITTLE):
         return 0.0
-    if ahead >= NEVER - t or w[c + m.MOST_REACH] == 0.0:
+    if ahead >= NEVER - t or d.most_reach == 0.0:
         return step
     return min(step, min(ahead - (1.0 - MARGIN) * reach, NEARER * ahead))
 
 
 @kernel
-def follow(h, w, share, out):
+def follow(d, share, out):
     """State at a share of the polynomial, a Chebyshev series in 2 share - 1, into w from `out`."""
-    size, last, x = h[m.NY], m.COLLOCATION_ROWS - 1, 2.0 * share - 1.0
+    size, last, x = d.ny, m.COLLOCATION_ROWS - 1, 2.0 * share - 1.0
     for c in range(size):
         a = b = 0.0
         for k in range(last, 0, -1):
-            a, b = w[h[m.COLLOCATION] + k * size + c] + 2.0 * x * a - b, a
-        w[out + c] = w[h[m.COLLOCATION] + c] + x * a - b
+            a, b = d.collocation[k * size + c] + 2.0 * x * a - b, a
+        d.w[out + c] = d.collocation[c] + x * a - b
 
 
 @kernel
-def follow_slope(h, w, share, out):
+def follow_slope(d, share, out):
     """Its slope there: with T_k' = k U_{k-1}."""
-    size, last, x = h[m.NY], m.COLLOCATION_ROWS - 1, 2.0 * share - 1.0
-    length = w[h[m.CONTROL] + m.COLLOCATED]
+    size, last, x = d.ny, m.COLLOCATION_ROWS - 1, 2.0 * share - 1.0
+    length = d.collocated
     for c in range(size):
         a = b = 0.0
         for k in range(last, 0, -1):
-            a, b = k * w[h[m.COLLOCATION] + k * size + c] + 2.0 * x * a - b, a
-        w[out + c] = 2.0 / length * a
+            a, b = k * d.collocation[k * size + c] + 2.0 * x * a - b, a
+        d.w[out + c] = 2.0 / length * a
 
 
 @kernel
-def ready(h, w):
+def ready(d):
     """Whether the present step goes along the polynomial."""
-    return w[h[m.CONTROL] + m.COLLOCATED] > 0.0
+    return d.collocated > 0.0
 
 
 @kernel
-def done(h, w, t):
+def done(d, t):
     """The polynomial has been gone along, up to time t."""
-    c = h[m.CONTROL]
-    w[c + m.COLLOCATED] = 0.0
-    if t >= w[c + m.PASS_TIME]:
-        w[c + m.PASS_TIME] = w[c + m.MOST_REACH] = NEVER
+    d.collocated = 0.0
+    if t >= d.pass_time:
+        d.pass_time = d.most_reach = NEVER
 
 
 def make_along(method: Any, attempt: Callable, extend: Callable) -> tuple[Callable, Callable, Callable]:
@@ -209,51 +207,51 @@ def make_along(method: Any, attempt: Callable, extend: Callable) -> tuple[Callab
     interpolate, last = method.interpolate, method.last
 
     @kernel
-    def attempt_along(h, f, w, n, step):
-        if not ready(h, w):
-            return attempt(h, f, w, n, step)
-        share = step / w[h[m.CONTROL] + m.COLLOCATED]
-        w[h[m.CONTROL] + m.FRACTION] = share
-        follow(h, w, share, h[m.Y_NEW])
-        follow_slope(h, w, share, h[m.SLOPES] + h[m.NY] * last)
+    def attempt_along(d, step):
+        if not ready(d):
+            return attempt(d, step)
+        share = step / d.collocated
+        d.fraction = share
+        follow(d, share, d.at_y_new)
+        follow_slope(d, share, d.at_slopes + d.ny * last)
         return True
 
     @kernel
-    def extend_along(h, f, w, n, step):
-        if not ready(h, w):
-            extend(h, f, w, n, step)
+    def extend_along(d, step):
+        if not ready(d):
+            extend(d, step)
 
     @kernel
-    def interpolate_along(h, w, theta, out):
-        if ready(h, w):
-            follow(h, w, theta * w[h[m.CONTROL] + m.FRACTION], out)
+    def interpolate_along(d, theta, out):
+        if ready(d):
+            follow(d, theta * d.fraction, out)
         else:
-            interpolate(h, w, theta, out)
+            interpolate(d, theta, out)
 
     return attempt_along, extend_along, interpolate_along
 
 
 def make_arrive(evaluate: Callable, project: Callable, attempt: Callable, method: Any) -> Callable:
-    """The kernel arrive(h, f, w, n, step, t_new)."""
+    """The kernel arrive(d, step, t_new)."""
     last = method.last
 
     @kernel
-    def arrive(h, f, w, n, step, t_new):
+    def arrive(d, step, t_new):
         """To the end of the polynomial, or of a share of it; closed there unless that is too near to the pose."""
-        attempt(h, f, w, n, step)
-        evaluate(h, f, w, n, t_new, h[m.Y_NEW], h[m.SLOPES] + h[m.NY] * last)
-        n[m.EVALUATIONS] += 1
+        attempt(d, step)
+        evaluate(d, t_new, d.at_y_new, d.at_slopes + d.ny * last)
+        d.evaluations += 1
         used = -1
-        if n[m.EVALUATION] == m.OK:
-            tolerance = TIGHTLY * w[h[m.CONTROL] + m.LENGTH]
-            used = project(h, f, w, n, t_new, h[m.Y_NEW], h[m.SLOPES] + h[m.NY] * last, tolerance)
-            n[m.EVALUATIONS] += max(used, 0)
+        if d.evaluation == m.OK:
+            tolerance = TIGHTLY * d.length
+            used = project(d.h, d.f, d.w, d.n, t_new, d.at_y_new, d.at_slopes + d.ny * last, tolerance)
+            d.evaluations += max(used, 0)
         if used >= 0:
-            note(h, w)
-            w[h[m.CONTROL] + m.LEFT] = left(h, w)
+            note(d)
+            d.left = left(d)
         else:
-            attempt(h, f, w, n, step)
-            n[m.EVALUATION], w[h[m.CONTROL] + m.LEFT] = m.OK, 0.0
+            attempt(d, step)
+            d.evaluation, d.left = m.OK, 0.0
 
     return arrive
 

@@ -17,44 +17,44 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel
-def mode_differs(h, w, n, c):
+def mode_differs(d, c):
     """Whether contact c has come to have the other mode."""
-    return (w[m.WATCH.row(h, c) + m.WATCH.gap1] < 0.0) != (n[n[m.MODE] + c] == 1)
+    return (d.watch[c].gap1 < 0.0) != (d.mode[c] == 1)
 
 
 @kernel
-def watch_end(h, w, n, events):
+def watch_end(d, events):
     """Gaps and rates at the step's end, peaks of the closed contacts; whether some mode changes."""
     changes = False
-    for c in range(h[m.N_CONTACTS]):
-        o, now = m.WATCH.row(h, c), m.TOUCH.row(h, c)
-        w[o + m.WATCH.gap1], w[o + m.WATCH.rate1] = w[now + m.TOUCH.gap], w[now + m.TOUCH.rate]
-        if n[n[m.MODE] + c] == 1:
-            event = events[int(w[o + m.WATCH.event_row])]
-            event[m.EVENT.peak_force] = max(event[m.EVENT.peak_force], w[now + m.TOUCH.normal_force])
-            event[m.EVENT.peak_depth] = max(event[m.EVENT.peak_depth], -w[o + m.WATCH.gap1])
-        changes |= mode_differs(h, w, n, c)
+    for c in range(d.n_contacts):
+        watch, now = d.watch[c], d.touch[c]
+        watch.gap1, watch.rate1 = now.gap, now.rate
+        if d.mode[c] == 1:
+            event = events[int(watch.event_row)]
+            event[m.EVENT.peak_force] = max(event[m.EVENT.peak_force], now.normal_force)
+            event[m.EVENT.peak_depth] = max(event[m.EVENT.peak_depth], -watch.gap1)
+        changes |= mode_differs(d, c)
     return changes
 
 
 def make_resolve_events(
     evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any
 ) -> Callable:
-    """The kernel resolve_events(h, f, w, n, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
+    """The kernel resolve_events(d, step, t_new, rows, events) -> (event?, dense output ready?, end, step)."""
     last = method.last
 
     @kernel
-    def resolve_events(h, f, w, n, step, t_new, rows, events):
-        if not watch_end(h, w, n, events):
+    def resolve_events(d, step, t_new, rows, events):
+        if not watch_end(d, events):
             return 0, False, t_new, step
-        extend(h, f, w, n, step)  # before the modes change: the outputs of this step belong to the old ones
-        for c in range(h[m.N_CONTACTS]):
-            if mode_differs(h, w, n, c):
-                change_mode(h, w, n, events, c, t_new)
-        evaluate(h, f, w, n, t_new, h[m.Y_NEW], slope(h, last))
-        n[m.EVALUATIONS] += 1
-        if n[m.EVALUATION] != m.OK:
-            n[m.STATUS] = m.LOST_CLOSURE
+        extend(d, step)  # before the modes change: the outputs of this step belong to the old ones
+        for c in range(d.n_contacts):
+            if mode_differs(d, c):
+                change_mode(d, events, c, t_new)
+        evaluate(d, t_new, d.at_y_new, slope(d, last))
+        d.evaluations += 1
+        if d.evaluation != m.OK:
+            d.status = m.LOST_CLOSURE
             return -1, True, t_new, step
         return RESTART + 1, True, t_new, step
 

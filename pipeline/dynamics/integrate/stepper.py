@@ -13,6 +13,7 @@ from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.projection import keep_scales, largest
+from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.integrate.norms import finite
 from flexclear.pipeline.dynamics.integrate.poses import NO_POSES, Poses
 from flexclear.pipeline.dynamics.integrate.recording import (
@@ -44,35 +45,46 @@ SMALLEST_STEP = 4e-16
 
 
 @kernel
-def plan(h, w, step, following):
+def plan(d, step, following):
     """The step to try next; one that was cut short says little about how long it may be."""
-    planned = h[m.CONTROL] + m.STEP
-    least = w[planned] if step < CUT * w[planned] else 0.0
-    w[planned] = max(following, least)
+    least = d.step if step < CUT * d.step else 0.0
+    d.step = max(following, least)
 
 
 @kernel
-def watch_nothing(h, w):
-    """Nothing is noted, of contacts or of friction."""
+def watch_nothing(d):
+    """Do nothing: neither contacts nor guards are there."""
 
 
 @kernel
-def none_closed(h, n):
+def none_closed(d):
     """No contact to be closed."""
     return False
+
+
+def make_end_nowhere(evaluate_at: Callable, extend: Callable, repeat: Callable) -> Callable:
+    """The kernel end_on_guard of scenes without guards (`guards.make_end_on_guard`)."""
+
+    @kernel
+    def end_on_guard(d, step, before, ready):
+        return 0.0
+
+    return end_on_guard
 
 
 def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, project: Callable, method: Any) -> Callable:
     """The kernel resolve_events of a stepper that looks for none."""
 
     @kernel
-    def resolve_events(h, f, w, n, step, t_new, rows, events):
+    def resolve_events(d, step, t_new, rows, events):
         return 0, False, t_new, step
 
     return resolve_events
 
 
-#: `events` of scenes without contacts
+#: `guards.AMONG_CONTACTS` of scenes without guards
+NO_GUARDS = (watch_nothing, watch_nothing, watch_nothing, make_end_nowhere)
+#: `events` of scenes without contacts and guards
 NO_CONTACTS = (watch_nothing, make_no_events, none_closed)
 
 
@@ -87,6 +99,8 @@ def make_advance(
     complete: Callable | None = None,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
+
+    The kernels that it is made of take `d`, the arrays with named fields (`fields`), instead of h, f, w and n.
 
     complete: evaluates like `evaluate`, and leaves all of the evaluation; given to methods that read more than rates.
     stepping: the module `adaptive` or `fixed`.
@@ -108,170 +122,168 @@ def make_advance(
     foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, attempt, method)
 
     @kernel
-    def must_stop(h, w, n, outputs, rows, events):
-        """Whether to return now, with the reason in n[STATUS]."""
-        c, waiting = h[m.CONTROL], outputs.shape[0] - n[m.NEXT_OUTPUT]
-        room = m.ROOM + m.EVENTS_OF_A_CONTACT * h[m.N_CONTACTS]
-        if w[c + m.TIME] >= w[c + m.END]:
-            n[m.STATUS] = m.SEGMENT_END
-        elif n[m.EVALUATIONS] >= n[m.CAP]:
-            n[m.STATUS] = m.CAP_REACHED
-        elif n[m.EVALUATIONS] >= n[m.BUDGET]:
-            n[m.STATUS] = m.PAUSED
-        elif w[c + m.BLIND_STEPS] > MOST_BLIND:
-            n[m.STATUS] = m.AT_SINGULAR
-        elif w[h[m.PIVOT] + m.LAST_PIVOT] < w[h[m.PIVOT] + m.WANTED_PIVOT]:
-            n[m.STATUS] = m.WORN_ROWS
-        elif n[m.N_RECORDED] + waiting + room > rows.shape[0] or n[m.N_EVENTS] + room > events.shape[0]:
-            n[m.STATUS] = m.FULL
+    def must_stop(d, outputs, rows, events):
+        """Whether to return now, with the reason in `status`."""
+        waiting = outputs.shape[0] - d.next_output
+        room = m.ROOM + m.EVENTS_OF_A_CONTACT * d.n_contacts
+        if d.time >= d.end:
+            d.status = m.SEGMENT_END
+        elif d.evaluations >= d.cap:
+            d.status = m.CAP_REACHED
+        elif d.evaluations >= d.budget:
+            d.status = m.PAUSED
+        elif d.blind_steps > MOST_BLIND:
+            d.status = m.AT_SINGULAR
+        elif d.last_pivot < d.wanted_pivot:
+            d.status = m.WORN_ROWS
+        elif d.n_recorded + waiting + room > rows.shape[0] or d.n_events + room > events.shape[0]:
+            d.status = m.FULL
         else:
             return False
         return True
 
     @kernel
-    def open_loops(h, w, n, outputs, t_new):
+    def open_loops(d, outputs, t_new):
         """How far the loops may be open at the end of a step that reaches t_new.
 
         Drift grows from step to step. Where a step holds several outputs, closing its end as tightly as they are closed
         when they are observed costs less than closing each of them.
         """
-        c = h[m.CONTROL]
-        share = share_of_records(w[c + m.RTOL]) if holds_outputs(n, outputs, t_new) else 1.0
-        return share * w[c + m.RTOL] * w[c + m.LENGTH]
+        share = share_of_records(d.rtol) if holds_outputs(d, outputs, t_new) else 1.0
+        return share * d.rtol * d.length
 
     @kernel
-    def finish(h, f, w, n, t_new, tolerance):
+    def finish(d, t_new, tolerance):
         """Slope at Y_NEW with the loops closed to a tolerance; False when they cannot be."""
-        c, slope = h[m.CONTROL], h[m.SLOPES] + h[m.NY] * last
+        slope = d.at_slopes + d.ny * last
         if not ends:
-            evaluate(h, f, w, n, t_new, h[m.Y_NEW], slope)
-            n[m.EVALUATIONS] += 1
-        if n[m.EVALUATION] != m.OK:
+            evaluate(d, t_new, d.at_y_new, slope)
+            d.evaluations += 1
+        if d.evaluation != m.OK:
             return False
-        if not (finite(h, w, slope) and finite(h, w, h[m.Y_NEW])):
-            n[m.EVALUATION] = m.NOT_FINITE
+        if not (finite(d, slope) and finite(d, d.at_y_new)):
+            d.evaluation = m.NOT_FINITE
             return False
-        w[c + m.DRIFT] = max(w[c + m.DRIFT], largest(w, h[m.RESIDUAL], h[m.N_CLOSURE_ROWS]))
-        w[c + m.RATE_DRIFT] = max(w[c + m.RATE_DRIFT], largest(w, h[m.RESIDUAL_RATE], h[m.N_CLOSURE_ROWS]))
-        used = project(h, f, w, n, t_new, h[m.Y_NEW], slope, tolerance)
-        note(h, w)
+        d.drift = max(d.drift, largest(d.residual, d.n_closure_rows))
+        d.rate_drift = max(d.rate_drift, largest(d.residual_rate, d.n_closure_rows))
+        used = project(d.h, d.f, d.w, d.n, t_new, d.at_y_new, slope, tolerance)
+        note(d)
         if used > 0:
-            n[m.EVALUATIONS] += used
-            n[m.PROJECTION_EVALUATIONS] += used
-            n[m.PROJECTIONS] += 1
+            d.evaluations += used
+            d.projection_evaluations += used
+            d.projections += 1
         return used >= 0
 
     @kernel
-    def try_step(h, f, w, n, step, t_new, tolerance):
+    def try_step(d, step, t_new, tolerance):
         """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made."""
-        if ready(h, w):
-            arrive(h, f, w, n, step, t_new)
+        if ready(d):
+            arrive(d, step, t_new)
             return 0.0
-        if not attempt(h, f, w, n, step):
+        if not attempt(d, step):
             return FAILED
-        norm = error_norm(h, f, w, n, step)
+        norm = error_norm(d, step)
         if norm != norm:
-            n[m.EVALUATION] = m.NOT_FINITE
+            d.evaluation = m.NOT_FINITE
             return FAILED
         if norm > 1.0:
             return min(norm, FAILED)
-        if not finish(h, f, w, n, t_new, tolerance):
+        if not finish(d, t_new, tolerance):
             return FAILED
-        detect_stiffness(h, w, n, step)
+        detect_stiffness(d, step)
         return norm
 
     @kernel
-    def accept(h, w, t_new):
+    def accept(d, t_new):
         """Make the end of the step the start of the next."""
-        slope = h[m.SLOPES]
-        final = slope + h[m.NY] * last
-        for k in range(h[m.NY]):
-            w[h[m.Y] + k] = w[h[m.Y_NEW] + k]
-            w[slope + k] = w[final + k]
-        w[h[m.CONTROL] + m.TIME] = t_new
-        keep_scales(h, w)
+        slope = d.at_slopes
+        final = slope + d.ny * last
+        for k in range(d.ny):
+            d.y[k] = d.y_new[k]
+            d.w[slope + k] = d.w[final + k]
+        d.time = t_new
+        keep_scales(d)
 
     @kernel
-    def set_off(h, f, w, n):
+    def set_off(d):
         """What `first_step` does for the contacts, before a step along a polynomial; True, for it can be made."""
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME], h[m.Y], h[m.SLOPES])
-        n[m.EVALUATIONS] += 1
-        watch_start(h, w)
-        n[m.EVALUATION], n[m.FRESH] = m.OK, 0
+        evaluate(d, d.time, d.at_y, d.at_slopes)
+        d.evaluations += 1
+        watch_start(d)
+        d.evaluation, d.fresh = m.OK, 0
         return True
 
     @kernel
-    def start(h, f, w, n):
+    def start(d):
         """Begin at the start of a segment or after an event; False when that cannot be."""
-        if ready(h, w):
-            return set_off(h, f, w, n)
-        if not first_step(h, f, w, n):
+        if ready(d):
+            return set_off(d)
+        if not first_step(d):
             return False
-        note(h, w)
-        stand(h, w, w[h[m.CONTROL] + m.TIME])
+        note(d)
+        stand(d, d.time)
         return True
 
     @kernel
-    def choose_step(h, w, n, t):
-        """Length of the step to try from t; 0, with the reason in n[STATUS], when none can be."""
-        c = h[m.CONTROL]
-        step = w[c + m.COLLOCATED] if ready(h, w) else steer(h, w, t)
+    def choose_step(d, t):
+        """Length of the step to try from t; 0, with the reason in `status`, when none can be."""
+        step = d.collocated if ready(d) else steer(d, t)
         if step == 0.0:
-            n[m.STATUS] = m.SINGULAR_AHEAD
+            d.status = m.SINGULAR_AHEAD
             return 0.0
-        if t + 1.0001 * step >= w[c + m.END]:
-            step = w[c + m.END] - t
-        if step > SMALLEST_STEP * max(abs(t), w[c + m.SPAN]):
+        if t + 1.0001 * step >= d.end:
+            step = d.end - t
+        if step > SMALLEST_STEP * max(abs(t), d.span):
             return step
-        if n[m.EVALUATION] == m.NOT_FINITE:
-            n[m.STATUS] = m.NOT_A_NUMBER
+        if d.evaluation == m.NOT_FINITE:
+            d.status = m.NOT_A_NUMBER
         else:
-            n[m.STATUS] = m.LOST_CLOSURE if n[m.EVALUATION] != m.OK else m.STEP_TOO_SMALL
+            d.status = m.LOST_CLOSURE if d.evaluation != m.OK else m.STEP_TOO_SMALL
         return 0.0
 
     @kernel
     def advance(h, f, w, n, outputs, rows, events):
-        """Step to the end of the segment or of the budget; n[STATUS] says why it came back."""
-        c = h[m.CONTROL]
-        while not must_stop(h, w, n, outputs, rows, events):
-            t = w[c + m.TIME]
-            if n[m.FRESH] and not start(h, f, w, n):
+        """Step to the end of the segment or of the budget; `status` says why it came back."""
+        d = data(h, f, w, n)
+        while not must_stop(d, outputs, rows, events):
+            t = d.time
+            if d.fresh and not start(d):
                 return
-            step = choose_step(h, w, n, t)
+            step = choose_step(d, t)
             if step == 0.0:
                 return
-            final = t + 1.0001 * step >= w[c + m.END]
-            t_new = w[c + m.END] if final else t + step
-            norm = try_step(h, f, w, n, step, t_new, open_loops(h, w, n, outputs, t_new))
+            final = t + 1.0001 * step >= d.end
+            t_new = d.end if final else t + step
+            norm = try_step(d, step, t_new, open_loops(d, outputs, t_new))
             if norm > 1.0:
-                n[m.REJECTED] += 1
-                if not after_rejection(h, w, n, step, norm):
+                d.rejected += 1
+                if not after_rejection(d, step, norm):
                     return
                 continue
-            along = ready(h, w)
-            following = w[c + m.STEP] if along else next_step(h, w, n, step, norm)
-            hold_modes(h, w, n)
-            happened, known, t_end, step = resolve_events(h, f, w, n, step, t_new, rows, events)
-            if happened == AGAIN and w[c + m.FIXED] == 0.0 and not along:  # a polynomial would be the same again
-                n[m.REJECTED] += 1
-                w[c + m.STEP], w[c + m.REJECTED_STEP] = SHORTER * step, 0.0
+            along = ready(d)
+            following = d.step if along else next_step(d, step, norm)
+            hold_modes(d)
+            happened, known, t_end, step = resolve_events(d, step, t_new, rows, events)
+            if happened == AGAIN and d.fixed == 0.0 and not along:  # a polynomial would be the same again
+                d.rejected += 1
+                d.step, d.rejected_step = SHORTER * step, 0.0
                 continue
             if happened < 0:
                 return
-            n[m.STEPS] += 1
+            d.steps += 1
             if along:
-                snapshot(h, w, n, rows, t, h[m.Y])
-            record_outputs(h, f, w, n, step, known, outputs, rows, t_end)
-            keep(h, f, w, n, step)
-            accept(h, w, t_end)
-            plan(h, w, step, following)
+                snapshot(d, rows, t, d.at_y)
+            record_outputs(d, step, known, outputs, rows, t_end)
+            keep(d, step)
+            accept(d, t_end)
+            plan(d, step, following)
             if along:
-                done(h, w, t_end)
+                done(d, t_end)
             elif t_end == t_new:  # how independent the rows are has been noted at the end that was tried
-                foresee(h, f, w, n, t_end)
+                foresee(d, t_end)
             if happened > 0 or along:
-                hold_modes(h, w, n)
-                snapshot(h, w, n, rows, t_end, h[m.Y])
-                n[m.FRESH] = 1 if along or happened == RESTART else 0
+                hold_modes(d)
+                snapshot(d, rows, t_end, d.at_y)
+                d.fresh = 1 if along or happened == RESTART else 0
 
     return advance

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -22,52 +21,52 @@ SWINGING = 0.7
 
 
 @kernel
-def difference(h, w, first, count, a, b):
+def difference(d, first, count, a, b):
     """Norm of the difference of two states or slopes at places a and b of w, variables `first` on, by tolerance."""
     total = 0.0
     for k in range(first, first + count):
-        change = (w[a + k] - w[b + k]) / error_scale(h, w, k)
+        change = (d.w[a + k] - d.w[b + k]) / error_scale(d, k)
         total += change * change
     return np.sqrt(total)
 
 
 @kernel
-def steepness(h, w, last):
+def steepness(d, last):
     """Largest rate [1/s] that the equations show between the last stage and the end of the step.
 
     Both are at the same time; the change of slope over the change of state estimates the spectral radius. Taken of the
     speeds alone it explodes where an oscillation's speeds happen to agree, so that it is at most the geometric mean
     with that of the positions, which an oscillation makes its frequency.
     """
-    end, stage = slope(h, last), slope(h, last - 1)
-    speeds = difference(h, w, h[m.NQ], h[m.NV], h[m.Y_NEW], h[m.Y_STAGE])
-    if not speeds > LEAST_CHANGE * np.sqrt(h[m.NV]):
+    end, stage = slope(d, last), slope(d, last - 1)
+    speeds = difference(d, d.nq, d.nv, d.at_y_new, d.at_y_stage)
+    if not speeds > LEAST_CHANGE * np.sqrt(d.nv):
         return 0.0
-    rate = difference(h, w, h[m.NQ], h[m.NV], end, stage) / speeds
-    positions = difference(h, w, 0, h[m.NQ], h[m.Y_NEW], h[m.Y_STAGE])
-    if not positions > LEAST_CHANGE * np.sqrt(h[m.NQ]):
+    rate = difference(d, d.nq, d.nv, end, stage) / speeds
+    positions = difference(d, 0, d.nq, d.at_y_new, d.at_y_stage)
+    if not positions > LEAST_CHANGE * np.sqrt(d.nq):
         return rate
-    return min(rate, np.sqrt(rate * difference(h, w, 0, h[m.NQ], end, stage) / positions))
+    return min(rate, np.sqrt(rate * difference(d, 0, d.nq, end, stage) / positions))
 
 
 @kernel
-def detect_nothing(h, w, n, step):
+def detect_nothing(d, step):
     """`detect_stiffness` of an implicit method, or of one whose stages do not tell."""
 
 
 def make_detect_stiffness(method: Any) -> Callable:
-    """The kernel detect_stiffness(h, w, n, step), after an accepted step."""
+    """The kernel detect_stiffness(d, step), after an accepted step."""
     if method.stability is None:
         return detect_nothing
     last, reach = method.last, method.stability
 
     @kernel
-    def detect_stiffness(h, w, n, step):
+    def detect_stiffness(d, step):
         """Note the step's steepness, and count the step if that limits it."""
-        rate, c = steepness(h, w, last), h[m.CONTROL]
-        w[c + m.STEEPEST] = max(w[c + m.STEEPEST], rate)
-        share = 1.0 if w[c + m.FIXED] > 0.0 else SWINGING
+        rate = steepness(d, last)
+        d.steepest = max(d.steepest, rate)
+        share = 1.0 if d.fixed > 0.0 else SWINGING
         if rate * step > share * reach:
-            n[m.STIFF_STEPS] += 1
+            d.stiff_steps += 1
 
     return detect_stiffness

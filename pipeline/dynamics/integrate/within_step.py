@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -20,45 +19,48 @@ MOST_LOOKS = 60
 
 
 def make_evaluate_at(evaluate: Callable, method: Any) -> Callable:
-    """The kernel evaluate_at(h, f, w, n, step, theta): evaluates the dense output at a share of the step."""
+    """The kernel evaluate_at(d, step, theta): evaluates the dense output at a share of the step."""
     interpolate, spare = method.interpolate, method.slopes - 1  # a row of SLOPES that no stage uses
 
     @kernel
-    def evaluate_at(h, f, w, n, step, theta):
-        interpolate(h, w, theta, h[m.Y_STAGE])
-        evaluate(h, f, w, n, w[h[m.CONTROL] + m.TIME] + theta * step, h[m.Y_STAGE], slope(h, spare))
-        n[m.EVALUATIONS] += 1
+    def evaluate_at(d, step, theta):
+        interpolate(d, theta, d.at_y_stage)
+        evaluate(d, d.time + theta * step, d.at_y_stage, slope(d, spare))
+        d.evaluations += 1
 
     return evaluate_at
 
 
 def make_repeat(evaluate: Callable, attempt: Callable, project: Callable, method: Any) -> Callable:
-    """The kernel repeat(h, f, w, n, step): the step again with another length; False when it cannot be made."""
+    """The kernel repeat(d, step): the step again with another length; False when it cannot be made."""
     last = method.last
 
     @kernel
-    def repeat(h, f, w, n, step):
+    def repeat(d, step):
         """Make the step again with another length, loops closed at its end."""
-        n[m.EVALUATIONS] += 1
-        if not attempt(h, f, w, n, step):
+        d.evaluations += 1
+        if not attempt(d, step):
             return False
-        t, final = w[h[m.CONTROL] + m.TIME] + step, slope(h, last)
-        evaluate(h, f, w, n, t, h[m.Y_NEW], final)
-        used = project(h, f, w, n, t, h[m.Y_NEW], final, 1e-3 * w[h[m.CONTROL] + m.RTOL] * w[h[m.CONTROL] + m.LENGTH])
-        n[m.EVALUATIONS] += max(used, 0)
+        t, final = d.time + step, slope(d, last)
+        evaluate(d, t, d.at_y_new, final)
+        used = project(d.h, d.f, d.w, d.n, t, d.at_y_new, final, 1e-3 * d.rtol * d.length)
+        d.evaluations += max(used, 0)
         return used >= 0
 
     return repeat
 
 
-def make_locate_level(evaluate_at: Callable) -> Callable:
-    """The kernel locate_level(h, f, w, n, step, place, level, enough, a, b, fa, fb) -> share of the step."""
+def make_locate(value_at: Callable) -> Callable:
+    """The kernel locate(d, step, which, level, enough, a, b, fa, fb) -> fraction of the step.
+
+    value_at(d, step, theta, which): evaluates the dense output at a fraction of the step, and gives a value there.
+    """
 
     @kernel
-    def locate_level(h, f, w, n, step, place, level, enough, a, b, fa, fb):
-        """Share of the step in (a, b) where w[place] = level, fa and fb from it at the ends (Illinois rule).
+    def locate(d, step, which, level, enough, a, b, fa, fb):
+        """Fraction of the step in (a, b) where a value reaches a level, off by fa and fb at the ends (Illinois rule).
 
-        It is also found where w[place] is no further from the level than `enough`.
+        A value no further from the level than `enough` has reached it.
         """
         side, theta = 0, b
         for _ in range(MOST_LOOKS):
@@ -66,8 +68,7 @@ def make_locate_level(evaluate_at: Callable) -> Callable:
             theta = (a * fb - b * fa) / (fb - fa)
             if not a < theta < b:
                 theta = 0.5 * (a + b)
-            evaluate_at(h, f, w, n, step, theta)
-            value = w[place] - level
+            value = value_at(d, step, theta, which) - level
             if abs(value) <= enough or abs(theta - before) <= NEAR:
                 return theta
             if (value > 0.0) == (fb > 0.0):
@@ -78,19 +79,19 @@ def make_locate_level(evaluate_at: Callable) -> Callable:
                 fb, side = (0.5 * fb, -1) if side == -1 else (fb, -1)
         return theta
 
-    return locate_level
+    return locate
 
 
 def make_maximum(evaluate_at: Callable) -> Callable:
-    """The kernel maximum(h, f, w, n, step, place, sign) -> largest sign * w[place] within the step, and where."""
+    """The kernel maximum(d, step, place, sign) -> largest sign * w[place] within the step, and where."""
 
     @kernel
-    def maximum(h, f, w, n, step, place, sign):
+    def maximum(d, step, place, sign):
         """Largest sign * w[place] within the step, and where: parabolas through the best three, or golden sections."""
-        a, b, d, e = 0.0, 1.0, 0.0, 0.0
+        a, b, move, e = 0.0, 1.0, 0.0, 0.0
         x = second = third = GOLDEN
-        evaluate_at(h, f, w, n, step, x)
-        fx = f_second = f_third = sign * w[place]
+        evaluate_at(d, step, x)
+        fx = f_second = f_third = sign * d.w[place]
         for _ in range(MOST_LOOKS):
             middle = 0.5 * (a + b)
             if abs(x - middle) <= 2.0 * NEAR_MAXIMUM - 0.5 * (b - a):
@@ -101,12 +102,12 @@ def make_maximum(evaluate_at: Callable) -> Callable:
             wild = abs(p) >= abs(0.5 * q * e) or p <= q * (a - x) or p >= q * (b - x)
             if abs(e) <= NEAR_MAXIMUM or wild:
                 e = b - x if x < middle else a - x
-                d = GOLDEN * e
+                move = GOLDEN * e
             else:
-                e, d = d, p / q
-            u = x + (d if abs(d) >= NEAR_MAXIMUM else (NEAR_MAXIMUM if d > 0.0 else -NEAR_MAXIMUM))
-            evaluate_at(h, f, w, n, step, u)
-            fu = sign * w[place]
+                e, move = move, p / q
+            u = x + (move if abs(move) >= NEAR_MAXIMUM else (NEAR_MAXIMUM if move > 0.0 else -NEAR_MAXIMUM))
+            evaluate_at(d, step, u)
+            fu = sign * d.w[place]
             if fu >= fx:
                 a, b = (x, b) if u >= x else (a, x)
                 third, f_third, second, f_second, x, fx = second, f_second, x, fx, u, fu

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import ZERO, at9, axis, dot, scale
+from flexclear.pipeline.dynamics.vectors import ZERO, axis, dot, scale
 
 
 @kernel
-def separation(f, w, outer, numbers, p, v):
+def separation(axes, numbers, p, v):
     """As `clearance_spherical.separation`; the normal points into the plane."""
-    z = axis(at9(w, outer + m.FRAME.axes), 2)
+    z = axis(axes, 2)
     height = dot(z, p)
-    return height - f[numbers + m.CONTACT_NUMBERS.radius], -dot(z, v), scale(-1.0, z), ZERO, scale(height, z)
+    return height - numbers.radius, -dot(z, v), scale(-1.0, z), ZERO, scale(height, z)
 
 
 class BallOnPlane:

@@ -8,17 +8,16 @@ not modelled.
 
 from __future__ import annotations
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import at9, axis, dot, radial, scale, sub
+from flexclear.pipeline.dynamics.vectors import axis, dot, radial, scale, sub
 
 
 @kernel
-def separation(f, w, outer, numbers, p, v):
+def separation(axes, numbers, p, v):
     """As `clearance_spherical.separation`, of the parts of p and v normal to the journal's axis."""
-    z = axis(at9(w, outer + m.FRAME.axes), 2)
+    z = axis(axes, 2)
     distance, rate, normal, turning = radial(sub(p, scale(dot(z, p), z)), sub(v, scale(dot(z, v), z)))
-    return f[numbers + m.CONTACT_NUMBERS.clearance] - distance, rate, normal, turning, p
+    return numbers.clearance - distance, rate, normal, turning, p
 
 
 class ClearanceRevolute:

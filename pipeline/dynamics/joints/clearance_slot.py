@@ -8,16 +8,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import at9, axis, dot, radial, scale, sub
+from flexclear.pipeline.dynamics.vectors import axis, dot, radial, scale, sub
 
 
 @kernel
-def separation(f, w, outer, numbers, p, v):
+def separation(axes, numbers, p, v):
     """As `clearance_spherical.separation`; shape: half the length of the straight part [m]."""
-    F, half = at9(w, outer + m.FRAME.axes), f[numbers + m.CONTACT_NUMBERS.shape]
-    x, z = axis(F, 0), axis(F, 2)
+    x, z, half = axis(axes, 0), axis(axes, 2), numbers.shape[0]
     across, across_rate = sub(p, scale(dot(z, p), z)), sub(v, scale(dot(z, v), z))
     along = dot(x, p)
     if abs(along) <= half:
@@ -25,7 +23,7 @@ def separation(f, w, outer, numbers, p, v):
     else:
         across = sub(across, scale(np.copysign(half, along), x))
     distance, rate, normal, turning = radial(across, across_rate)
-    return f[numbers + m.CONTACT_NUMBERS.clearance] - distance, rate, normal, turning, across
+    return numbers.clearance - distance, rate, normal, turning, across
 
 
 class ClearanceSlot:

@@ -69,7 +69,7 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
     best, since = np.inf, 0
     for iteration in range(MOST):
         size = float(np.linalg.norm(at.unbalanced))
-        largest = max(weight(bench), magnitude(at.Z, at))
+        largest = max(weight(bench), magnitude(at.Z, at.bias))
         since = 0 if size < 0.5 * best else since + 1
         best = min(best, size)
         if size <= BALANCED * largest or (since > 3 and size <= ROUNDING * largest):

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 
 from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, displacement_map
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, displacement_map, set_drives
 from flexclear.pipeline.dynamics.linear.differences import Rounding, derivative
 
 #: singular values of the closures below this fraction of the largest are redundant rows
@@ -76,7 +76,7 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces per displacement along motions (columns), shape (n, n) [1/s^2], and an error estimate of each column."""
     size = bench.model.speed_scales
-    noise = EPSILON * magnitude(motions, at)
+    noise = EPSILON * magnitude(motions, at.bias)
 
     def columns(direction: np.ndarray) -> tuple[np.ndarray, float]:
         step = at.moves @ direction
@@ -93,7 +93,9 @@ def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarra
 
 def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces per speed along motions (columns), gyroscopic ones included, shape (n, n) [1/s], and errors."""
-    size, noise = bench.model.speed_scales, Rounding(EPSILON * magnitude(motions, at))
+    # forces that balance those of the drives' motion leave nothing of their size in the sum, only their rounding
+    noise = Rounding(EPSILON * (magnitude(motions, at.bias) + magnitude(motions, _at_rest(bench, at))))
+    size = bench.model.speed_scales
 
     def columns(direction: np.ndarray) -> tuple[np.ndarray, float]:
         def force(s: float) -> np.ndarray:
@@ -104,9 +106,18 @@ def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray,
     return _stacked([columns(d) for d in motions.T], motions.shape[1])
 
 
-def magnitude(motions: np.ndarray, at: Tangent) -> float:
+def magnitude(motions: np.ndarray, bias: np.ndarray) -> float:
     """Size of the terms of which the forces along motions are sums."""
-    return float(np.linalg.norm(np.abs(motions).T @ np.abs(at.bias)))
+    return float(np.linalg.norm(np.abs(motions).T @ np.abs(bias)))
+
+
+def _at_rest(bench: Bench, at: Tangent) -> np.ndarray:
+    """Return the bias of the same pose with its drives at rest, shape (nv,)."""
+    drives = bench.drives.copy()
+    set_drives(bench, drives * [1.0, 0.0])
+    bias = balance(bench, at.q).bias
+    set_drives(bench, drives)
+    return bias
 
 
 def _stacked(columns: list[tuple[np.ndarray, float]], n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,7 @@
 Each module but that of gravity, which is a field, holds a class, called like its parameters, with
 - ``row(load, place)`` or, on a joint coordinate, ``row(load, place, coordinate)``: what it acts on
   and with (see `row.Row`); ValueError, in words, for values that cannot be;
-- ``apply(h, f, w, k)``: kernel that applies load k by `fields.act`.
+- ``apply(d, k)``: kernel that applies load k by `fields.act`.
 """
 
 from flexclear.pipeline.core.registry import declared

@@ -18,7 +18,6 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.scene.loads import Bushing as Declared
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.gauge import internal_rate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, number
@@ -26,7 +25,6 @@ from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.vectors import (
     add,
     at,
-    at9,
     cross,
     dot,
     product,
@@ -89,42 +87,42 @@ def tangent_part(v):
 
 
 @kernel
-def times(h, f, k, first, v):
+def times(d, k, first, v):
     """A 3x3 block of a matrix of load k, its first entry at `first`, times v."""
     return (
-        number(h, f, k, first) * v[0] + number(h, f, k, first + 1) * v[1] + number(h, f, k, first + 2) * v[2],
-        number(h, f, k, first + 6) * v[0] + number(h, f, k, first + 7) * v[1] + number(h, f, k, first + 8) * v[2],
-        number(h, f, k, first + 12) * v[0] + number(h, f, k, first + 13) * v[1] + number(h, f, k, first + 14) * v[2],
+        number(d, k, first) * v[0] + number(d, k, first + 1) * v[1] + number(d, k, first + 2) * v[2],
+        number(d, k, first + 6) * v[0] + number(d, k, first + 7) * v[1] + number(d, k, first + 8) * v[2],
+        number(d, k, first + 12) * v[0] + number(d, k, first + 13) * v[1] + number(d, k, first + 14) * v[2],
     )
 
 
 @kernel
-def product6(h, f, k, first, x, v):
+def product6(d, k, first, x, v):
     """Both halves of a 6x6 matrix of load k times (x, v)."""
-    upper = add(times(h, f, k, first, x), times(h, f, k, first + MIXED, v))
-    lower = add(times(h, f, k, first + SECOND, x), times(h, f, k, first + SECOND + MIXED, v))
+    upper = add(times(d, k, first, x), times(d, k, first + MIXED, v))
+    lower = add(times(d, k, first + SECOND, x), times(d, k, first + SECOND + MIXED, v))
     return upper, lower
 
 
 @kernel
-def apply(h, f, w, k):
+def apply(d, k):
     """Apply load k."""
-    a, b = m.SITE_FRAMES.row(h, m.LOADS.a(h, k)), m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
-    F, G, p = at9(w, a + m.FRAME.axes), at9(w, b + m.FRAME.axes), at(w, b + m.FRAME.origin)
-    r, omega = sub(p, at(w, a + m.FRAME.origin)), at(w, a + m.FRAME.omega)
-    slide = sub(at(w, b + m.FRAME.velocity), add(at(w, a + m.FRAME.velocity), cross(omega, r)))
-    spin = turn_back(F, sub(at(w, b + m.FRAME.omega), omega))
+    load = d.loads[k]
+    a, b = d.site_frames[load.a], d.site_frames[load.b]
+    F, G, p, omega = a.axes, b.axes, b.origin, a.omega
+    r = sub(p, a.origin)
+    slide = sub(b.velocity, add(a.velocity, cross(omega, r)))
+    spin = turn_back(F, sub(b.omega, omega))
     x, x_rate, v = turn_back(F, r), turn_back(F, slide), rotation_vector(product(transpose(F), G))
-    state = m.LOADS.internal0(h, k)
-    if state >= 0:
-        v = continued(v, at(w, h[m.INTERNAL] + state))
+    if load.internal0 >= 0:
+        v = continued(v, at(d.internal, load.internal0))
     e = tangent_part(v)
     crossed = cross(v, spin)
     v_rate = add(spin, add(scale(-0.5, crossed), scale(e, cross(v, crossed))))
-    if state >= 0:
-        put(w, internal_rate(h, state), v_rate)
-    pull, twist = product6(h, f, k, 0, x, v)
-    damped_pull, damped_twist = product6(h, f, k, DAMPING, x_rate, v_rate)
+    if load.internal0 >= 0:
+        put(d.ledger_rate, internal_rate(d, load.internal0), v_rate)
+    pull, twist = product6(d, k, 0, x, v)
+    damped_pull, damped_twist = product6(d, k, DAMPING, x_rate, v_rate)
     stored, lost = 0.5 * (dot(pull, x) + dot(twist, v)), dot(damped_pull, x_rate) + dot(damped_twist, v_rate)
     force = turn(F, scale(-1.0, add(pull, damped_pull)))
     along = scale(-1.0, add(twist, damped_twist))
@@ -132,7 +130,7 @@ def apply(h, f, w, k):
     torque = turn(F, add(along, add(scale(0.5, swung), scale(e, cross(v, swung)))))
     length = np.sqrt(dot(r, r))
     rate = dot(r, slide) / length if length > 0.0 else 0.0
-    act(h, w, k, add(torque, cross(p, force)), force, length, rate, stored, 0.0, lost)
+    act(d, k, add(torque, cross(p, force)), force, length, rate, stored, 0.0, lost)
 
 
 class Bushing:

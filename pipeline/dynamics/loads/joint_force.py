@@ -11,11 +11,11 @@ from flexclear.pipeline.dynamics.vectors import scale
 
 
 @kernel
-def apply(h, f, w, k):
+def apply(d, k):
     """Apply load k."""
-    value, rate, moment, force = measure(h, w, k)
-    size = law(h, w, k, 0)
-    act(h, w, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * rate, 0.0)
+    value, rate, moment, force = measure(d, k)
+    size = law(d, k, 0)
+    act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * rate, 0.0)
 
 
 class JointForce:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import JointFriction as Declared
 from flexclear.pipeline.core.units import quantity
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.contact.friction.modified_coulomb import coefficient
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -18,14 +17,15 @@ from flexclear.pipeline.dynamics.vectors import scale
 
 
 @kernel
-def apply(h, f, w, k):
+def apply(d, k):
     """Apply load k."""
-    value, rate, moment, force = measure(h, w, k)
-    w[m.LOAD_SPEEDS.row(h, k) + m.LOAD_SPEEDS.now], speed = rate, abs(rate)
-    p = (number(h, f, k, 1), number(h, f, k, 2), number(h, f, k, 3), number(h, f, k, 4))
+    value, rate, moment, force = measure(d, k)
+    speeds, speed = d.load_speeds[k], abs(rate)
+    speeds.now = rate
+    p = (number(d, k, 1), number(d, k, 2), number(d, k, 3), number(d, k, 4))
     dry = coefficient(speed, p)
-    size = -number(h, f, k, 0) * rate - (dry if rate >= 0.0 else -dry)
-    act(h, w, k, scale(size, moment), scale(size, force), value, rate, 0.0, 0.0, -size * rate)
+    size = -number(d, k, 0) * rate - (dry if rate >= 0.0 else -dry)
+    act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, 0.0, -size * rate)
 
 
 class JointFriction:

@@ -12,13 +12,13 @@ from flexclear.pipeline.dynamics.vectors import scale
 
 
 @kernel
-def apply(h, f, w, k):
+def apply(d, k):
     """Apply load k."""
-    value, rate, moment, force = measure(h, w, k)
-    stretch, damped = value - number(h, f, k, 2), number(h, f, k, 1) * rate
-    size = -(number(h, f, k, 0) * stretch + damped)
-    stored = 0.5 * number(h, f, k, 0) * stretch * stretch
-    act(h, w, k, scale(size, moment), scale(size, force), value, rate, stored, 0.0, damped * rate)
+    value, rate, moment, force = measure(d, k)
+    stretch, damped = value - number(d, k, 2), number(d, k, 1) * rate
+    size = -(number(d, k, 0) * stretch + damped)
+    stored = 0.5 * number(d, k, 0) * stretch * stretch
+    act(d, k, scale(size, moment), scale(size, force), value, rate, stored, 0.0, damped * rate)
 
 
 class JointSpring:

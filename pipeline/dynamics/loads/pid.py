@@ -13,7 +13,6 @@ from typing import Any
 
 from flexclear.pipeline.core.scene.loads import Pid as Declared
 from flexclear.pipeline.core.units import quantity
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.gauge import counted, internal_rate
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -34,16 +33,16 @@ GAINS = {
 
 
 @kernel
-def apply(h, f, w, k):
+def apply(d, k):
     """Apply load k."""
-    value, rate, _, _ = counted(h, w, m.LOADS.measured(h, k))
-    _, speed, moment, force = measure(h, w, k)
-    state = m.LOADS.internal0(h, k)
-    error, error_rate = law(h, w, k, 0) - value, law_rate(h, w, k, 0) - rate
-    asked = number(h, f, k, 0) * error + w[h[m.INTERNAL] + state] + number(h, f, k, 2) * error_rate
-    size = min(max(asked, number(h, f, k, 3)), number(h, f, k, 4))
-    w[internal_rate(h, state)] = number(h, f, k, 1) * error + number(h, f, k, 5) * (size - asked)
-    act(h, w, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * speed, 0.0)
+    value, rate, _, _ = counted(d, d.loads[k].measured)
+    _, speed, moment, force = measure(d, k)
+    state = d.loads[k].internal0
+    error, error_rate = law(d, k, 0) - value, law_rate(d, k, 0) - rate
+    asked = number(d, k, 0) * error + d.internal[state] + number(d, k, 2) * error_rate
+    size = min(max(asked, number(d, k, 3)), number(d, k, 4))
+    d.ledger_rate[internal_rate(d, state)] = number(d, k, 1) * error + number(d, k, 5) * (size - asked)
+    act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * speed, 0.0)
 
 
 def numbers(load: Any, coordinate: Coordinate, measured: Coordinate) -> tuple[float, ...]:

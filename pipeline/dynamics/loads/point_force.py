@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import PointForce as Declared
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, law
 from flexclear.pipeline.dynamics.loads.row import Row
-from flexclear.pipeline.dynamics.vectors import at, at9, cross, dot, turn
+from flexclear.pipeline.dynamics.vectors import cross, dot, turn
 
 
 @kernel
-def apply(h, f, w, k):
+def apply(d, k):
     """Apply load k."""
-    o = m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
-    force = (law(h, w, k, 0), law(h, w, k, 1), law(h, w, k, 2))
-    if m.LOADS.follows(h, k):
-        force = turn(at9(w, o + m.FRAME.axes), force)
-    power = dot(force, at(w, o + m.FRAME.velocity))
-    act(h, w, k, cross(at(w, o + m.FRAME.origin), force), force, 0.0, 0.0, 0.0, power, 0.0)
+    frame = d.site_frames[d.loads[k].b]
+    force = (law(d, k, 0), law(d, k, 1), law(d, k, 2))
+    if d.loads[k].follows:
+        force = turn(frame.axes, force)
+    power = dot(force, frame.velocity)
+    act(d, k, cross(frame.origin, force), force, 0.0, 0.0, 0.0, power, 0.0)
 
 
 class PointForce:

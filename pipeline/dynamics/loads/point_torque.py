@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import PointTorque as Declared
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import ZERO, act, law
 from flexclear.pipeline.dynamics.loads.row import Row
-from flexclear.pipeline.dynamics.vectors import at, at9, dot, turn
+from flexclear.pipeline.dynamics.vectors import dot, turn
 
 
 @kernel
-def apply(h, f, w, k):
+def apply(d, k):
     """Apply load k."""
-    o = m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
-    torque = (law(h, w, k, 0), law(h, w, k, 1), law(h, w, k, 2))
-    if m.LOADS.follows(h, k):
-        torque = turn(at9(w, o + m.FRAME.axes), torque)
-    act(h, w, k, torque, ZERO, 0.0, 0.0, 0.0, dot(torque, at(w, o + m.FRAME.omega)), 0.0)
+    frame = d.site_frames[d.loads[k].b]
+    torque = (law(d, k, 0), law(d, k, 1), law(d, k, 2))
+    if d.loads[k].follows:
+        torque = turn(frame.axes, torque)
+    act(d, k, torque, ZERO, 0.0, 0.0, 0.0, dot(torque, frame.omega), 0.0)
 
 
 class PointTorque:

@@ -13,7 +13,6 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.scene.loads import SampledPid as Declared
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.gauge import counted
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -27,12 +26,12 @@ FORCE, INTEGRAL, ERROR = range(3)
 
 
 @kernel
-def apply(h, f, w, k):
+def apply(d, k):
     """Apply load k."""
-    value, rate, _, _ = counted(h, w, m.LOADS.measured(h, k))
-    _, speed, moment, force = measure(h, w, k)
-    size = w[h[m.INTERNAL] + m.LOADS.internal0(h, k)]
-    act(h, w, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * speed, 0.0)
+    value, rate, _, _ = counted(d, d.loads[k].measured)
+    _, speed, moment, force = measure(d, k)
+    size = d.internal[d.loads[k].internal0]
+    act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * speed, 0.0)
 
 
 class SampledPid:

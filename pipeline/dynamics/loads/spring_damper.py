@@ -11,26 +11,25 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.scene.loads import SpringDamper as Declared
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, number
 from flexclear.pipeline.dynamics.loads.row import Row
-from flexclear.pipeline.dynamics.vectors import at, cross, dot, scale, sub
+from flexclear.pipeline.dynamics.vectors import cross, dot, scale, sub
 
 
 @kernel
-def apply(h, f, w, k):
+def apply(d, k):
     """Apply load k."""
-    a, b = m.SITE_FRAMES.row(h, m.LOADS.a(h, k)), m.SITE_FRAMES.row(h, m.LOADS.b(h, k))
-    p = at(w, b + m.FRAME.origin)
-    r = sub(p, at(w, a + m.FRAME.origin))
+    a, b = d.site_frames[d.loads[k].a], d.site_frames[d.loads[k].b]
+    p = b.origin
+    r = sub(p, a.origin)
     length = np.sqrt(dot(r, r))
     along = scale(1.0 / length, r) if length > 0.0 else (0.0, 0.0, 0.0)
-    rate = dot(along, sub(at(w, b + m.FRAME.velocity), at(w, a + m.FRAME.velocity)))
-    stretch, damped = length - number(h, f, k, 2), number(h, f, k, 1) * rate
-    force = scale(-(number(h, f, k, 0) * stretch + damped), along)
-    stored = 0.5 * number(h, f, k, 0) * stretch * stretch
-    act(h, w, k, cross(p, force), force, length, rate, stored, 0.0, damped * rate)
+    rate = dot(along, sub(b.velocity, a.velocity))
+    stretch, damped = length - number(d, k, 2), number(d, k, 1) * rate
+    force = scale(-(number(d, k, 0) * stretch + damped), along)
+    stored = 0.5 * number(d, k, 0) * stretch * stretch
+    act(d, k, cross(p, force), force, length, rate, stored, 0.0, damped * rate)
 
 
 class SpringDamper:

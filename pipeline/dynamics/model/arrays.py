@@ -132,6 +132,7 @@ def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int
         m.N_BODIES: count[m.BODIES],
         m.N_FRAMES: count[m.FRAMES],
         m.N_COMPONENTS: count[m.BOOKS],
+        m.N_GUARDS: count[m.GUARDS],
         m.MASS_SIZE: envelope_size(named(m.ENVELOPE, tables[m.ENVELOPE])),
         m.SCHUR_SIZE: envelope_size(named(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
         m.JACOBIAN_SIZE: int(np.sum(3 * closures["threes"] * closures["n_support"])),
@@ -168,7 +169,8 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
         m.LOAD_SPEEDS: int(h[m.N_LOADS]),
         m.WATCH: contacts,
         m.BEARING: bearings,
-        m.BENDS: 3 * bearings,
+        m.BENDS: bearings,
+        m.GUARDED: int(h[m.N_GUARDS]),
         m.REACTIONS: int(h[m.N_RUBBING]) * (1 + bearings),
     }
     lengths = {table.place: table.size * count for table, count in tables.items()} | {

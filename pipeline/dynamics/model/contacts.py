@@ -46,12 +46,11 @@ def fill(
     for contact, law, sites, first in given:
         name, joint, *_ = contact
         length = mechanism.components.lengths[part_of(mechanism, contact)]
-        friction_kind, numbers, stick, kinks = -1, (0.0,) * 6, 0.0, (0.0, 0.0)
+        friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
         if joint.friction is not None:
             friction = _friction(name, joint)
             friction_kind = parts.frictions.index(joint.friction.law)
             numbers, stick = friction.parameters(joint.friction), friction.stick_speed(joint.friction)
-            kinks = friction.kinks(joint.friction)
         if isinstance(joint, End):
             surfaces, shape = gauges.add(*sites, joint.coordinate, counts=True), (joint.limit, joint.sense)
         else:
@@ -59,7 +58,7 @@ def fill(
         kinds_of = (parts.forms.index(law.form), friction_kind, surfaces)
         rows.append((*sites, *kinds_of, first))
         sizes = (joint.clearance, joint.radius, _floor(joint, length))
-        reals.append([*sizes, stick, *kinks, *law.numbers, *numbers, *shape, length])
+        reals.append([*sizes, stick, *law.numbers, *numbers, *shape, length])
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
 

@@ -127,14 +127,7 @@ def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
     axial = (friction.axial_radius or radius) / radius if joint.type == "revolute" else 0.0
     torsion = 1.0 / radius if kind == SLIDER and radius else 0.0
     lever = 1.0 / friction.length if friction.length else 0.0
-    law = _law(name, joint)
-    turning_kink = 0.0 if law.bristle(friction) is None else law.stick_speed(friction)
-    return [
-        *(radius, lever, axial, torsion, friction.preload),
-        *law.parameters(friction),
-        *law.kinks(friction),
-        turning_kink,
-    ]
+    return [radius, lever, axial, torsion, friction.preload, *_law(name, joint).parameters(friction)]
 
 
 def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:

@@ -36,11 +36,15 @@ class Load(NamedTuple):
 
 @dataclass(frozen=True)
 class Loaded:
-    """Tables of the loads, kind after kind; `laws` are theirs."""
+    """Tables of the loads, kind after kind; `laws` are theirs.
+
+    kinks: of each load, speeds along its joint coordinate at which its friction bends, or 0.
+    """
 
     kinds: tuple[str, ...]
     loads: tuple[Load, ...]
     tables: dict[Any, Any]
+    kinks: list[tuple[float, ...]]
     laws: list[Pieces] = field(default_factory=list)
 
 
@@ -91,9 +95,8 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
         m.LOADS: rows,
         m.LOAD_KINDS: [(int(s), c) for s, c in zip(starts, counts, strict=False)],
         m.LOAD_NUMBERS: numbers,
-        m.LOAD_KINKS: kinks,
     }
-    return Loaded(kinds, tuple(loads), tables, laws)
+    return Loaded(kinds, tuple(loads), tables, kinks, laws)
 
 
 def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None, tuple[str, Coordinate] | None]:

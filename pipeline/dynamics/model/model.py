@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.effects import Parts, joint_frictions, load_kinks
 from flexclear.pipeline.dynamics.model import contacts as contacting
-from flexclear.pipeline.dynamics.model import flexible_bodies, laws, wiring
+from flexclear.pipeline.dynamics.model import flexible_bodies, guards, laws, wiring
 from flexclear.pipeline.dynamics.model import loads as loading
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.model.assembly import assembled
@@ -146,6 +146,7 @@ def filled(
             m.LOADS: _booked(mechanism, loaded, books),
             **coupling_tables,
             **rubbing,
+            **guards.fill(mechanism, loaded),
             m.WORN: contacting.worn(mechanism),
             **_recorded(mechanism),
             m.GAUGES: gauges.rows,

@@ -13,7 +13,7 @@ import numpy as np
 from flexclear.pipeline.core.artifacts.coordinates import motion
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled
 from flexclear.pipeline.core.artifacts.schema import RUN, conformed
-from flexclear.pipeline.core.citations import cited
+from flexclear.pipeline.core.citations import cited, docstring
 from flexclear.pipeline.core.event_kinds import EVENT_KINDS
 from flexclear.pipeline.core.quantities import PERTURBATION
 from flexclear.pipeline.core.registry import lookup
@@ -155,7 +155,7 @@ def references(scene: Scene) -> str:
         module = import_module(name)
         own = [thing for thing in vars(module).values() if getattr(thing, "__module__", None) == name]
         for thing in (module, *own):
-            sources += cited(getattr(thing, "__doc__", None))
+            sources += cited(docstring(thing))
     return "\n".join(dict.fromkeys(sources))
 
 

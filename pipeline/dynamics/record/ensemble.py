@@ -27,6 +27,7 @@ from flexclear.pipeline.dynamics.run.batched_evaluation import Place
 from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed
+from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
 from flexclear.pipeline.dynamics.run.run import engines, follow, observed
 from flexclear.pipeline.dynamics.run.singular import select_rows
 from flexclear.pipeline.dynamics.run.specialised import abreast
@@ -39,6 +40,14 @@ if TYPE_CHECKING:
 
 def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     """All members (schema ENSEMBLE) of a scene with clearance joints."""
+    try:
+        return _members(scene, bundles, progress)
+    except DearError as dear:
+        progress(None, str(dear))
+        return _members(unverified(scene), bundles, progress)
+
+
+def _members(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
     requested = scene.ensemble or Ensemble()
     if not scene.contacts() and not scene.stop:
         raise InputError(
@@ -53,7 +62,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     jacobian = offset_jacobian(engine, start)
     offsets = ball_offsets(engine.model, requested, requested.members)
     starts = [perturbed(engine, start, jacobian, moved) for moved in offsets]
-    making = Lock()
+    making, judges = Lock(), affordable(scene)
 
     def heir(name: str) -> Engine:
         with making:
@@ -63,7 +72,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         """A member on an engine of its own, so that it does not depend on who ran before."""
         mine = another(engine)
         mine.straight.place = lane
-        last, trajectory, switched = follow(mine, starts[k], alive, heir)
+        last, trajectory, switched = follow(mine, starts[k], alive, heir, judges and judges.run)
         return _member(last, trajectory, names), switched
 
     def done(k: int) -> None:

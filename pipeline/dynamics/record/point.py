@@ -31,6 +31,7 @@ from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.periods import Cursor, periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
 from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallow
 from flexclear.pipeline.dynamics.run.specialised import side_by_side
 from flexclear.pipeline.dynamics.run.start import consistent_start
@@ -72,7 +73,11 @@ class Runner:
         """
         scene = thinned(scene, self.recorded)
         try:
-            values, deviation, count = self._values(scene, lane, alive)
+            try:
+                values, deviation, count = self._values(scene, lane, alive)
+            except DearError:
+                scene = unverified(scene)
+                values, deviation, count = self._values(scene, lane, alive)
             if not self.error:
                 return Point(values, {}, deviation, count)
             tight = with_numbers(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
@@ -105,9 +110,9 @@ class Runner:
         if in_sections(self.recorded):
             values, count = _sections(scene, engine, self.recorded, alive)
             return values, {}, count
-        rows, count = list[Values](), 0
+        rows, count, judges = list[Values](), 0, affordable(scene)
         for start in self._starts(engine):
-            last, trajectory, _ = follow(engine, start, alive, other)
+            last, trajectory, _ = follow(engine, start, alive, other, judges and judges.run)
             with self._looking:
                 rows.append(_kept(scene, last, trajectory, self.recorded))
             count += trajectory.counters["evaluations"]

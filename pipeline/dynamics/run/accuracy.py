@@ -45,6 +45,8 @@ SAVED = 0.25
 REFUSED_FOR_GOOD, TIGHTER = 1e-9, 0.1
 #: an error that does not fall below this fraction when the tolerance falls by FINER has another cause than the steps
 STUCK = 0.3
+#: the default request, as a fraction of each quantity's range; it is searched for at so many tolerances at most
+BY_DEFAULT, FEW_TRIES = 1e-3, 3
 
 
 @dataclass(frozen=True)
@@ -59,12 +61,17 @@ class Attempt:
 
 @dataclass
 class Search:
-    """Runs made so far by tolerance, and what is requested of them."""
+    """Runs made so far by tolerance, and what is requested of them.
+
+    predictable: whether runs are compared up to the horizon of their predictability only; the request is then the
+    default one, and a quantity that never changes meets it.
+    """
 
     scene: Scene
     once: Callable[[Scene, Judges | None], xr.Dataset]
     suit: Suit | None = None
     runs: dict[float, xr.Dataset] = field(default_factory=dict)
+    predictable: bool = False
 
     def run(self, rtol: float) -> xr.Dataset:
         """The run at a tolerance, made once."""
@@ -89,8 +96,13 @@ class Search:
         requested = self.requested(other)
         # all tighter runs are witnesses: with impacts, two neighbours may agree by luck
         witnesses = [other, *(r for tolerance, r in self.runs.items() if tolerance <= 0.1 * rtol)]
-        errors = {q.name: max(quantities.error(run, r, q) for r in witnesses) for q in requested}
-        return Attempt(rtol, run, errors, max(errors[q.name] / w for q, w in requested.items()))
+        errors = {q.name: max(self.error(run, r, q) for r in witnesses) for q in requested}
+        return Attempt(rtol, run, errors, max((errors[q.name] / w for q, w in requested.items()), default=0.0))
+
+    def error(self, run: xr.Dataset, other: xr.Dataset, quantity: Quantity) -> float:
+        """Largest difference of two runs, as far as they are compared, in the unit of the quantity."""
+        horizons = [float(one["horizon"]) for one in (run, other) if self.predictable and "horizon" in one]
+        return quantities.error(run, other, quantity, min(horizons, default=math.inf))
 
     def cheapest(self, attempt: Attempt) -> Attempt:
         """The attempt, or the run that told its error, where another method made that for less.
@@ -106,10 +118,8 @@ class Search:
         if not tighter:
             return replace(attempt, rtol=finer, run=other)
         requested = self.requested(other)
-        errors = {
-            q.name: max(attempt.errors[q.name], *(quantities.error(other, r, q) for r in tighter)) for q in requested
-        }
-        fraction = max(errors[q.name] / w for q, w in requested.items())
+        errors = {q.name: max(attempt.errors[q.name], *(self.error(other, r, q) for r in tighter)) for q in requested}
+        fraction = max((errors[q.name] / w for q, w in requested.items()), default=0.0)
         return Attempt(finer, other, errors, fraction) if fraction <= ENOUGH else attempt
 
     def saves(self, rtol: float, looser: float) -> bool:
@@ -134,6 +144,8 @@ class Search:
             absolute = want.absolute
             if absolute is None:
                 absolute = (want.relative or 0.0) * quantities.scale(run, quantity)
+            if not absolute > 0.0 and self.predictable:
+                continue
             if not absolute > 0.0:
                 raise InputError(
                     f"{self.scene.path or self.scene.name} [accuracy] {name}",
@@ -153,7 +165,27 @@ def deliver(
     the scene names one.  The dataset's attributes say what was requested, estimated and met, and why by which
     integrator.
     """
-    search = Search(scene, once, suit)
+    return _delivered(Search(scene, once, suit), progress)
+
+
+def by_default(
+    scene: Scene,
+    once: Callable[[Scene, Judges | None], xr.Dataset],
+    progress: Progress,
+    suit: Callable[[Scene], Suit],
+) -> xr.Dataset:
+    """The run of a scene that requests no accuracy and leaves its integration open.
+
+    As `deliver`, for BY_DEFAULT of each usual quantity over time (`Scene.requested`), up to the predictability horizon.
+    """
+    progress(None, f"a run good to {BY_DEFAULT:g} of the range of each quantity is made instead")
+    names = [q.name for q in scene.requested() if q.over_time]
+    request = {"quantities": {name: {"relative": BY_DEFAULT} for name in names}, "allow_missed": True, "by_need": True}
+    wanting = edited(scene, {"accuracy": request})
+    return _delivered(Search(wanting, once, suit(wanting), predictable=True), progress)
+
+
+def _delivered(search: Search, progress: Progress) -> xr.Dataset:
     best = search.cheapest(_search(search, progress))
     requested = {q.name: w for q, w in search.requested(best.run).items()}
     met = best.fraction <= ENOUGH
@@ -161,13 +193,16 @@ def deliver(
     progress(None, f"accuracy {'met' if met else 'missed: ' + verdict} (relative tolerance {best.rtol:.1e})")
     if "method_reason" in best.run.attrs:
         progress(None, str(best.run.attrs["method_reason"]))
+    meaning = "largest error of the time integration, estimated by two runs with a tolerance ratio of 100"
+    if search.predictable:
+        meaning += f"; requested by default: {BY_DEFAULT:g} of the range, up to the predictability horizon"
     return best.run.assign_attrs(
         accuracy_wanted=json.dumps({name: f"{w:.3g}" for name, w in requested.items()}, sort_keys=True),
         accuracy_estimated=json.dumps({name: f"{e:.3g}" for name, e in best.errors.items()}, sort_keys=True),
         accuracy_verdict=verdict,
         accuracy_rtol=best.rtol,
         accuracy_runs=len(search.runs),
-        accuracy_meaning="largest error of the time integration, estimated by two runs with a tolerance ratio of 100",
+        accuracy_meaning=meaning,
     )
 
 
@@ -177,7 +212,7 @@ def _search(search: Search, progress: Progress) -> Attempt:
     enough: Attempt | None = None
     nearest: Attempt | None = None
     too_loose = math.inf
-    for _ in range(TRIES):
+    for _ in range(FEW_TRIES if search.predictable else TRIES):
         try:
             now = search.attempt(rtol)
         except SolverError:
@@ -192,7 +227,7 @@ def _search(search: Search, progress: Progress) -> Attempt:
             nearest = now
         if now.fraction <= ENOUGH:
             enough = now if enough is None or now.rtol > enough.rtol else enough
-            if now.fraction >= WASTEFUL or rtol >= LOOSEST:
+            if now.fraction >= WASTEFUL or rtol >= LOOSEST or search.predictable:
                 return now
         else:
             too_loose = min(too_loose, rtol)
@@ -215,10 +250,11 @@ def _first(scene: Scene) -> float:
 
 
 def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float) -> float:
+    """The next tolerance, which two digits describe."""
     if enough is not None and too_loose < math.inf:
-        return math.sqrt(enough.rtol * too_loose)
+        return float(f"{math.sqrt(enough.rtol * too_loose):.1e}")
     change = float(np.clip(AIM / max(fraction, 1e-300), 1e-3, 1e3))
-    return float(np.clip(rtol * change, TIGHTEST, LOOSEST))
+    return float(f"{np.clip(rtol * change, TIGHTEST, LOOSEST):.1e}")
 
 
 def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:
@@ -231,7 +267,7 @@ def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> st
     if looser is None:
         return text
     quantity = parse(name, search.scene.owners())
-    before = quantities.error(search.runs[looser], best.run, quantity)
+    before = search.error(search.runs[looser], best.run, quantity)
     if not best.errors[name] < STUCK * before:
         until = _trusted_until(search, best, quantity, requested[name])
         return f"{text}; tighter tolerances do not help{until}: the motion is chaotic or rounding decides"

@@ -7,12 +7,25 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.integrators import DEFAULT, STIFF
+from flexclear.pipeline.core.scene.load import with_numbers
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import refusal
 from flexclear.pipeline.dynamics.run.engine import Engine
 
 #: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000
+#: a scene that leaves its integration open is run at the default tolerance where that takes no more evaluations than
+#: this, which are some seconds; they are predicted from so many on
+AFFORDABLE, EVERY = 1_500_000, 100_000
+#: tolerance of dear runs that none is compared with: members start a hundredth of a micrometre apart
+UNVERIFIED = 1e-7
+
+
+class DearError(SolverError):
+    """A run at the default tolerance is predicted to take more than AFFORDABLE evaluations."""
 
 
 class Look(NamedTuple):
@@ -85,3 +98,27 @@ def crawls(engine: Engine, looks: Sequence[Look]) -> str:
         return ""
     whole = now.evaluations + pace(looks, TRIAL) * (engine.end - now.time)
     return refusal.stiffness(n, control) if whole > min(HOPELESS, n[m.CAP]) else ""
+
+
+def affordable(scene: Scene) -> Judges | None:
+    """Judges that end a run at the default tolerance by DearError when it is predicted to be dear.
+
+    None where the scene says how it is integrated, or how accurately.
+    """
+    if scene.accuracy is not None or not scene.solver.by_need:
+        return None
+    return Judges({DEFAULT: (Judge(EVERY, _dear), "")}, {})
+
+
+def unverified(scene: Scene) -> Scene:
+    """The scene, whose run is dear, at the method and tolerance of runs that none is compared with: members, points."""
+    return with_numbers(scene, {"solver.integrator": STIFF, "solver.rtol": UNVERIFIED})
+
+
+def _dear(engine: Engine, looks: Sequence[Look]) -> str:
+    now = looks[-1]
+    whole = now.evaluations + pace(looks, TRIAL) * (engine.end - now.time)
+    if whole > AFFORDABLE:
+        rtol = engine.model.scene.solver.rtol
+        raise DearError(f"{DEFAULT} would take some {whole:.1g} evaluations at a relative tolerance of {rtol:g}")
+    return ""

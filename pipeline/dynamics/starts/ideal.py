@@ -1,8 +1,9 @@
 """A run with clearance that begins as its ideal mechanism does: its pose and velocities, pins at rest in their sockets.
 
-The ideal_scene has ideal joints instead of pins and balls with clearance. The force that such a joint carries at the
-start presses the pin onto one side of its socket, and so deep into it that the contact carries that force. Slots and
-planes have no ideal counterpart: they stay as they are, and what touches them where the poses put it.
+The ideal scene has ideal joints instead of pins and balls with clearance. The force that such a joint carries at the
+start presses the pin onto one side of its socket, and so deep into it that the contact carries that force. Flexible
+bodies begin as the loads of that moment deform them, so that they do not spring into their shape. Slots and planes
+have no ideal counterpart: they stay as they are, and what touches them where the poses put it.
 """
 
 from __future__ import annotations
@@ -38,6 +39,10 @@ if TYPE_CHECKING:
 THERE, PASSES = 1e-9, 20
 #: forces below this fraction of the weight press nothing: the pin stays in the middle
 NOTHING = 1e-9
+#: modal coordinates are those of the loads when a pass changes them by less than this fraction; passes, at most
+SETTLED, LOADINGS = 1e-9, 10
+#: difference of a modal coordinate, as a fraction of the mechanism's size [m sqrt(kg)] of its own mass
+STEP = 1e-7
 #: singular values below this fraction of the largest are rounding
 RANK = 1e-9
 
@@ -50,6 +55,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
     """
     ideal_scene, t = placed(scene), scene.time.start
     engine, y = _started(ideal_scene, bundles, progress)
+    y = _loaded(engine, y)
     forces = _forces(scene, engine, y)
     concentric, choice = moving(scene, engine, y, t), engine.model.mechanism.choice
     if not scene.contacts():
@@ -82,6 +88,52 @@ def _started(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     moved, given = driven(scene, bundles, progress)
     engine = prepare(tabulate(build(moved, bundles), given), progress)
     return engine, consistent_start(engine)
+
+
+def _loaded(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """Return the state with flexible bodies deformed as the loads of the start, inertia included, hold them.
+
+    There modal coordinates do not accelerate, as far as loops leave them free.  Where rods buckle or the pose is
+    singular there is no such state, and y is returned.
+    """
+    speeds = _modal_speeds(engine)
+    if not speeds or engine.mobility.singular_start:
+        return y
+    try:
+        state, step = y, STEP * engine.model.length * np.sqrt(sum(link.mass for link in engine.model.links))
+        for _ in range(LOADINGS):
+            pulled = _pulled(engine, state, speeds)
+            slopes = np.array(
+                [_pulled(engine, _bent(engine, state, step * unit), speeds) for unit in np.eye(len(speeds))]
+            )
+            slopes = (slopes - pulled).T / step
+            stiffness = np.maximum(np.abs(np.diag(slopes)), np.finfo(float).tiny)
+            change = np.linalg.lstsq(slopes / stiffness[:, None], -pulled / stiffness, rcond=RANK)[0]
+            state = _bent(engine, state, change)
+            if np.max(np.abs(change)) <= SETTLED * np.max(np.abs(state[_modes(engine)])):
+                return state
+    except SolverError:
+        pass
+    return y
+
+
+def _bent(engine: Engine, y: np.ndarray, change: np.ndarray) -> np.ndarray:
+    """Return the state with other modal coordinates, the loops closed."""
+    bent = y.copy()
+    bent[_modes(engine)] += change
+    engine.select_pieces_after(engine.start)
+    return project(engine, bent)
+
+
+def _pulled(engine: Engine, y: np.ndarray, speeds: list[int]) -> np.ndarray:
+    """Return the accelerations of the modal coordinates, shape (n,)."""
+    return engine.evaluate(y, engine.start)[speeds].copy()
+
+
+def _modal_speeds(engine: Engine) -> list[int]:
+    """Return where in the state the speeds of modal coordinates are."""
+    model = engine.model
+    return [model.nq + k for mine in model.numbering.modal_coordinates.values() for k in mine]
 
 
 def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from flexclear.pipeline.core.citations import docstring
 from flexclear.pipeline.core.registry import lookup, module_of
 
 KIND = "figure or table"
@@ -49,7 +50,7 @@ def needs(name: str) -> tuple[str, ...]:
 
 def title(name: str) -> str:
     """First line of the module's docstring: what the figure or table shows."""
-    return (import_module(_module(name)).__doc__ or name).strip().splitlines()[0].rstrip(".")
+    return (docstring(import_module(_module(name))) or name).strip().splitlines()[0].rstrip(".")
 
 
 def _module(name: str) -> str:

@@ -1,0 +1,143 @@
+"""Guards on which steps end: what a step passes first, in closed form, and what a mechanism's table holds."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+
+import flexclear.pipeline.dynamics.compile.calls  # noqa: F401  (registers the types of named fields)
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.fields import data
+from flexclear.pipeline.dynamics.integrate import guards
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
+from tests.analytic.mechanism_runs import TREE
+from tests.analytic.test_joint_friction_kinks import COULOMB, brakes
+
+RTOL = 1e-10
+LEVEL = 0.1
+#: so close to the level counts as there
+THERE = 0.1 * np.sqrt(RTOL) * LEVEL
+
+
+@cache
+def _compiled() -> Any:
+    first_passed = guards.first_passed
+
+    def passed(h, f, w, n):
+        return first_passed(data(h, f, w, n))
+
+    return njit(passed)
+
+
+def passed(start: tuple, end: tuple, level: float = LEVEL, contact: int = -1, closed: int = 1) -> tuple | None:
+    """(fraction, a, b, fa, fb) of the passage of a guard that watches a vector, or None."""
+    h, f, w = np.zeros(m.HEADER + m.GUARDS.size, np.int64), np.array([level, LEVEL]), np.zeros(60)
+    n = np.zeros(m.INTEGERS + 1, np.int64)
+    n[m.MODE], n[m.INTEGERS] = m.INTEGERS, closed
+    h[m.N_GUARDS], h[m.GUARDS.place], h[m.GUARDED.place], h[m.CONTROL] = 1, m.HEADER, 0, 10
+    h[m.HEADER :] = m.TOUCH.place, 0, 3, contact, -1
+    w[:6], w[10 + m.RTOL] = (*start, *end), RTOL
+    fraction, g, *rest = _compiled()(h, f, w, n)
+    assert g in (-1, 0)
+    return (fraction, *rest) if g == 0 else None
+
+
+def test_a_speed_that_falls_through_a_level() -> None:
+    assert passed((0.3, 0.0, 0.0), (0.05, 0.0, 0.0)) == pytest.approx((0.8, 0.0, 1.0, 0.2, -0.05))
+
+
+@pytest.mark.parametrize("end", [0.2, LEVEL + 0.5 * THERE, LEVEL - 0.5 * THERE])
+def test_a_step_that_ends_before_the_level_or_on_it_passes_nothing(end: float) -> None:
+    assert passed((0.3, 0.0, 0.0), (end, 0.0, 0.0)) is None
+
+
+def test_a_velocity_that_turns_round_passes_its_level_twice_and_first_on_its_way_in() -> None:
+    """From 0.3 to -0.3: the length is 0.1 after a third of the way, before the middle."""
+    assert passed((0.0, 0.3, 0.0), (0.0, -0.3, 0.0)) == pytest.approx((1.0 / 3.0, 0.0, 0.5, 0.2, -0.1))
+
+
+def test_a_velocity_that_leaves_the_level_passes_it_on_its_way_out() -> None:
+    """From 0.1, where the step before ended, to -0.3: out after half of the way."""
+    assert passed((0.0, 0.0, LEVEL), (0.0, 0.0, -0.3)) == pytest.approx((0.5, 0.25, 1.0, -0.1, 0.2))
+
+
+def test_a_velocity_that_turns_at_a_distance_above_the_level_passes_nothing() -> None:
+    assert passed((0.3, 0.15, 0.0), (-0.3, 0.15, 0.0)) is None
+    assert passed((0.3, 0.05, 0.0), (-0.3, 0.05, 0.0)) is not None
+
+
+def test_a_load_reverses_where_it_passes_zero_and_not_beside_it() -> None:
+    assert passed((0.2, 0.1, 0.0), (-0.1, -0.05, 0.0), level=0.0) == pytest.approx(
+        (2.0 / 3.0, 0.0, 1.0, -np.hypot(0.2, 0.1), np.hypot(0.1, 0.05))
+    )
+    assert passed((0.2, 0.1, 0.0), (-0.1, 0.05, 0.0), level=0.0) is None
+    assert passed((0.2, 0.0, 0.0), (0.1, 0.0, 0.0), level=0.0) is None
+
+
+def test_guards_of_an_open_contact_rest() -> None:
+    assert passed((0.3, 0.0, 0.0), (0.05, 0.0, 0.0), contact=0, closed=0) is None
+    assert passed((0.3, 0.0, 0.0), (0.05, 0.0, 0.0), contact=0) is not None
+
+
+@pytest.mark.parametrize("components", [1, 2, 3])
+def test_what_is_watched_is_noted_as_a_vector_that_ends_with_zeros(components: int) -> None:
+    note_start, note_end, accept = guards.note_start, guards.note_end, guards.accept
+
+    @njit
+    def noted(h, f, w, n, before, after):
+        d = data(h, f, w, n)
+        w[20:23] = before
+        note_start(d)
+        w[20:23] = after
+        note_end(d)
+        first = d.guarded[0].start, d.guarded[0].end
+        accept(d)
+        return first, d.guarded[0].start
+
+    h, w = np.zeros(m.HEADER + m.GUARDS.size, np.int64), np.zeros(60)
+    h[m.N_GUARDS], h[m.GUARDS.place], h[m.GUARDED.place], h[m.TOUCH.place] = 1, m.HEADER, 0, 17
+    h[m.HEADER :] = m.TOUCH.place, 3, components, -1, -1
+    before, after = np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0])
+    (start, end), later = noted(h, np.zeros(2), w, np.zeros(m.INTEGERS, np.int64), before, after)
+    kept = np.arange(3) < components
+    assert np.array_equal([start, end, later], [before * kept, after * kept, after * kept])
+
+
+def table(scene: Scene) -> tuple[np.ndarray, np.ndarray, Any]:
+    """Rows of GUARDS and of GUARD_NUMBERS, and the arrays."""
+    arrays = tabulate(build(scene, {})).arrays
+    return arrays.table(m.GUARDS), arrays.table(m.GUARD_NUMBERS), arrays
+
+
+def test_bearings_and_loads_have_the_guards_that_their_laws_name() -> None:
+    rows, numbers, arrays = table(Scene.model_validate(brakes(1e-8)))
+    speeds, of_loads = numbers["level"] > 0.0, rows["table"] == m.LOAD_SPEEDS.place
+    # the load that brakes, at its two speeds; of the ideal joints one has bristles, all others two speeds
+    assert sorted(numbers["level"][of_loads]) == [COULOMB["v_static"], COULOMB["v_dynamic"]]
+    bearings = arrays.size(m.N_BEARINGS)
+    bristly = arrays.table(m.BEARINGS)["bristle"] >= 0
+    sliding = ~of_loads & (rows["components"] == 3)
+    assert np.count_nonzero(sliding & speeds) == 2 * np.count_nonzero(~bristly)
+    assert rows["offset"][sliding & ~speeds].tolist() == [m.BENDS.size * e for e in np.flatnonzero(bristly)]
+    # the force along, the moment about, and the forces at both ends of each bearing, by its own load
+    presses = rows["bearing"] >= 0
+    assert np.bincount(rows["bearing"][presses]).tolist() == [4] * bearings
+    offsets = [m.BENDS.size * e + k for e in range(bearings) for k in (3, 4, 5, 7)]
+    assert rows["offset"][presses].tolist() == offsets
+    assert np.array_equal(presses | speeds | sliding, np.full(len(rows), True))
+
+
+def test_contacts_have_guards_while_they_are_closed() -> None:
+    rows, numbers, _ = table(load_scene(TREE / "scenes/sps4/csj.toml"))
+    assert set(rows["contact"]) == {0}
+    assert set(rows["offset"]) == {m.TOUCH.slip}
+    assert numbers["level"].tolist() == numbers["scale"].tolist()
+    assert len(rows) == 2
+    assert len(table(load_scene(TREE / "scenes/sps4/ideal.toml"))[0]) == 0
