@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     #: what stages read, of which names, dimensions and values are asked alone
-    Labelled = xr.Dataset | "LabelledArrays"
+    Labelled: TypeAlias = "xr.Dataset | LabelledArrays"
 
 
 @dataclass(frozen=True)
