@@ -47,7 +47,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         return _members(unverified(scene), bundles, progress)
 
 
-def _members(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     requested = scene.ensemble or Ensemble()
     if not scene.contacts() and not scene.stop:
         raise InputError(
