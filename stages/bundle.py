@@ -14,15 +14,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
+from flexclear.pipeline.core import file_dependencies
 from flexclear.pipeline.core.artifacts.disk import digest_of, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import TREE, kernel_root, results_root
 from flexclear.pipeline.core.errors import FlexclearError, InputError
-from flexclear.pipeline.core.external_files.checks import require_file
+from flexclear.pipeline.core.external_files import require_file
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import compose, is_file
 from flexclear.pipeline.core.version import version
-from flexclear.pipeline.core.workflow import file_dependencies
-from flexclear.pipeline.core.workflow.file_dependencies import note
 from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.stages import run, s1_mesh
 from flexclear.stages.sweep_points import source_digest
@@ -107,20 +106,16 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
 
 
 def _opened(scene: Path, settings: Sequence[str]) -> list[Path]:
-    """The scene, what it extends, recipes, tables, meshes and whatever their readers open."""
-    files, names = [scene], dict[str, str]()
-    with file_dependencies.watched(
-        scene.parent, outside=(results_root(), kernel_root(), TREE / "flexclear" / "stages")
-    ) as read:
+    """The scene, what it extends, recipes, tables, meshes and whatever their readers note."""
+    files = [scene]
+    with file_dependencies.watched(scene.parent) as read:
         # what is wrong is what the file is made for: each is taken as far as it goes
         with contextlib.suppress(FlexclearError):
             run.loaded(str(scene), settings)
         for recipe in _recipes(scene):
-            note(recipe)
             with contextlib.suppress(FlexclearError):
                 s1_mesh.run({**s1_mesh.params(recipe), "folder": str(recipe.parent)}, {}, silent)
-        names = read
-    files += [Path(os.path.normpath(scene.parent / where)) for where in names]
+    files += [Path(os.path.normpath(scene.parent / where)) for where in read]
     return sorted({path.resolve() for path in files if path.is_file()})
 
 

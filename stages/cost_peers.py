@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.external_files.checks import require_file
+from flexclear.pipeline.core.external_files import require_file
 
 Track = dict[str, Any]
 #: bytes of such a file

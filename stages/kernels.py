@@ -11,6 +11,7 @@ from flexclear.stages import s4_simulate
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
 
@@ -56,7 +57,7 @@ def _processor_time() -> float:
     return sum(os.times()[:4])
 
 
-def warm(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) -> None:
+def warm(scene: Scene, reduced: Mapping[str, Labelled], progress: Progress) -> None:
     """Compile or fetch the kernels and call them, so that no measurement contains it."""
     from flexclear.pipeline.dynamics.run.run import engine_of
     from flexclear.pipeline.dynamics.run.start import consistent_start

@@ -16,10 +16,12 @@ from flexclear.pipeline.core.artifacts.disk import disk_limits, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.errors import InputError, InputErrors, ResourceError, SolverError
+from flexclear.pipeline.core.external_files import reading, require_file
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.scene.resource_estimate import check_run
+from flexclear.pipeline.core.version import DISTRIBUTION
 from flexclear.pipeline.core.workflow.progress import WARNING
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages import as_json, export, owner
@@ -174,10 +176,8 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
 
     import_module("flexclear.pipeline.core.artifacts.modal")
     if str(scene).endswith(".nc"):
-        from flexclear.pipeline.core.external_files import dataset
-
         path = Path(str(scene))
-        return xr.DataTree.from_dict({path.stem: dataset.read(path)}, name=path.absolute().parent.name)
+        return xr.DataTree.from_dict({path.stem: _dataset(path)}, name=path.absolute().parent.name)
     name = scene if isinstance(scene, str) else scene_name(scene) if isinstance(scene, Path) else scene.name
     name = scene_name(Path(name)) if name.endswith(".toml") else name
     folder = results_root() / "runs" / name
@@ -196,6 +196,20 @@ def results(scene: Scene | str | Path) -> xr.DataTree:
     # read and closed: the garbage collector closes what stays open, inside of whatever NetCDF call runs then
     tree = {path.relative_to(folder).with_suffix("").as_posix(): xr.load_dataset(path) for path in files}
     return xr.DataTree.from_dict(tree, name=folder.name)
+
+
+def _dataset(path: Path) -> xr.Dataset:
+    """The dataset in a file; InputError for what is no scene's (a sweep's, another program's)."""
+    import xarray as xr
+
+    require_file(path, str(path))
+    remedy = "name a scene, or a file below results/runs such as run.nc; xarray.open_dataset opens any other"
+    with reading(path, str(path), "cannot be read as a NetCDF dataset", remedy):
+        dataset = xr.load_dataset(path, engine="netcdf4")
+    if not str(dataset.attrs.get("source")).startswith(f"{DISTRIBUTION} "):
+        why = "is a dataset, but no scene's: it has no attribute `source` that names flexclear"
+        raise InputError(str(path), why, remedy)
+    return dataset
 
 
 def _of_another_run(folder: Path) -> bool:

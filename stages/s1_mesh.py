@@ -14,7 +14,6 @@ from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.file_kinds import RECIPE, require_kind
 from flexclear.pipeline.core.scene.limits import Limits, check_cells
 from flexclear.pipeline.core.scene.load import is_file, read_toml
-from flexclear.pipeline.core.workflow import file_dependencies
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,9 +94,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from flexclear.pipeline.structure.kinds import kind
 
     folder = Path(params.get("folder", "."))
-    for path in files(params["recipe"], folder):
-        file_dependencies.note(path)  # some readers are not written in Python
-
     part = kind.of_recipe(params["recipe"])
     try:
         result = part.build(params["recipe"], folder)

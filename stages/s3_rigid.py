@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.core.progress import Progress
 
 #: how inputs are called that hold such bodies, before the body's name
@@ -25,7 +26,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     return {"nc": rigid.build(inputs["mesh"])}
 
 
-def filled(bodies: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> dict[str, Any]:
+def filled(bodies: Mapping[str, Any], inputs: Mapping[str, Labelled]) -> dict[str, Any]:
     """The table of bodies with the numbers of those that inputs ``rigid/<body>`` describe instead of their recipes."""
     import numpy as np
 
@@ -44,7 +45,7 @@ def filled(bodies: Mapping[str, Any], inputs: Mapping[str, xr.Dataset]) -> dict[
             for k, frame in enumerate(data["frame"].values)
         }
         numbers = {
-            "mass": float(data["mass"]),
+            "mass": float(data["mass"].values),
             "com": data["com"].values.tolist(),
             "inertia": data["inertia"].values.tolist(),
             "frames": frames,

@@ -11,11 +11,13 @@ from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.appearance import UNSEEN
 from flexclear.pipeline.core.scene.resource_estimate import check_run
 from flexclear.pipeline.core.workflow import stopping
+from flexclear.pipeline.core.workflow.task import given_arrays
 from flexclear.stages import s3_rigid
 
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
 
@@ -50,7 +52,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
     return sources.modules(scene)
 
 
-def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+@given_arrays
+def run(params: Mapping[str, Any], inputs: Mapping[str, Labelled], progress: Progress) -> dict[str, Any]:
     """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is reported, and
     kept."""
     from flexclear.pipeline import dynamics
@@ -66,7 +69,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     return {"nc": simulated.assign_attrs(warnings=warnings) if warnings else simulated}
 
 
-def missing_compliance(scene: Scene, reduced: Mapping[str, xr.Dataset]) -> list[str]:
+def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[str]:
     """Sentences about flexible bodies whose modes lack static compliance between the frames that joints use."""
     if not reduced:
         return []
@@ -91,12 +94,12 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
         return {"nc": dynamics.ensemble(scene, bundles(inputs), progress)}
 
 
-def bundles(inputs: Mapping[str, xr.Dataset]) -> dict[str, xr.Dataset]:
+def bundles(inputs: Mapping[str, Labelled]) -> dict[str, Labelled]:
     """The inputs called ``bundle/<body>``, by body."""
     return {name.removeprefix("bundle/"): data for name, data in inputs.items() if name.startswith("bundle/")}
 
 
-def rebuild(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset] | None = None) -> Scene:
+def rebuild(params: Mapping[str, Any], inputs: Mapping[str, Labelled] | None = None) -> Scene:
     """The scene again, from `params`; its title is its name, where that is reported.
 
     inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.

@@ -12,6 +12,7 @@ from flexclear.stages.s4_simulate import bundles, rebuild
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
 
@@ -91,7 +92,7 @@ def _variables(way: str, costs: list[Cost | None]) -> dict[str, Any]:
     return variables
 
 
-def _measured(scene: Scene, bundles: Mapping[str, xr.Dataset], *, checked: bool) -> tuple[Cost | None, str]:
+def _measured(scene: Scene, bundles: Mapping[str, Labelled], *, checked: bool) -> tuple[Cost | None, str]:
     """The cost of a run, and why there is none."""
     from flexclear.pipeline import dynamics
     from flexclear.pipeline.core.errors import SolverError
@@ -104,7 +105,7 @@ def _measured(scene: Scene, bundles: Mapping[str, xr.Dataset], *, checked: bool)
         return None, str(error).partition(";")[0]  # what else is to be doubted of such a run is of no use here
 
 
-def _at_equal_error(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[float, Cost]:
+def _at_equal_error(scene: Scene, bundles: Mapping[str, Labelled]) -> tuple[float, Cost]:
     """Tolerance and cost at equal error; decade by decade tighter where the whole run is refused."""
     from flexclear.pipeline.core.errors import SolverError
 
@@ -118,7 +119,7 @@ def _at_equal_error(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[fl
         rtol *= 0.1
 
 
-def equal_tolerance(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> float:
+def equal_tolerance(scene: Scene, bundles: Mapping[str, Labelled]) -> float:
     """The tolerance at which a scene has the common error over the first fraction of its run."""
     from flexclear.pipeline import dynamics
 

@@ -29,8 +29,6 @@ M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, KEPT = -1, -3, 64 << 20
 FILE_SYSTEM, LONG_PATH, SHORT_PATH = r"SYSTEM\CurrentControlSet\Control\FileSystem", 32767, 259
 #: how long a file is awaited that another program has open, and between two attempts [s]
 PATIENCE, PAUSE = 2.0, 0.05
-#: access to a process of Windows that allows to ask whether it runs, and what it answers then (winbase.h, minwinbase.h)
-QUERY_LIMITED, STILL_ACTIVE, ACCESS_DENIED = 0x1000, 259, 5
 
 
 def _module(name: str) -> Any:
@@ -41,13 +39,6 @@ def _module(name: str) -> Any:
         return None
 
 
-def _windows() -> Any:
-    """Functions of Windows; None elsewhere."""
-    import ctypes
-
-    return getattr(ctypes, "windll", None)
-
-
 def cores() -> int:
     """Processors that this process may use."""
     allowed = getattr(os, "sched_getaffinity", None)
@@ -56,9 +47,9 @@ def cores() -> int:
 
 def memory() -> int:
     """Bytes that this process can still get: of the machine, of its container, of its own limit."""
-    bounds = [_physical()]
-    lines = _text("/proc/meminfo").splitlines()
-    bounds += [1024 * int(line.split()[1]) for line in lines if line.startswith("MemAvailable:")]
+    import psutil
+
+    bounds = [psutil.virtual_memory().available]
     limit, used = _text("/sys/fs/cgroup/memory.max"), _text("/sys/fs/cgroup/memory.current")
     if limit.isdigit() and used.isdigit():
         bounds.append(int(limit) - int(used))
@@ -67,23 +58,6 @@ def memory() -> int:
         soft, _ = resource.getrlimit(resource.RLIMIT_AS)
         bounds += [soft] if soft != resource.RLIM_INFINITY else []
     return max(0, min(bounds))
-
-
-def _physical() -> int:
-    """Memory of the machine [B]; of Windows what is free of it; where nobody says, more than there is anywhere."""
-    if hasattr(os, "sysconf"):
-        with contextlib.suppress(ValueError, OSError):
-            return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    windows = _windows()
-    if windows is None:
-        return sys.maxsize
-    import ctypes
-
-    # MEMORYSTATUSEX: its size, load in percent, then total and free memory, and five more
-    status = (ctypes.c_uint64 * 8)()
-    ctypes.cast(status, ctypes.POINTER(ctypes.c_uint32))[0] = ctypes.sizeof(status)
-    windows.kernel32.GlobalMemoryStatusEx(ctypes.byref(status))
-    return int(status[2]) or sys.maxsize
 
 
 def peak_memory() -> int:
@@ -107,29 +81,6 @@ def keep_memory() -> None:
         change = ctypes.CDLL(None).mallopt
         change(M_MMAP_THRESHOLD, min(KEPT, 32 << 20))  # it takes no more than 32 MB
         change(M_TRIM_THRESHOLD, KEPT)
-
-
-def limit_itself(memory: float, seconds: float) -> None:
-    """Let this process take so much more memory [B] and processor time [s], and write no file, where systems do that.
-
-    Beyond its time it is ended by SIGXCPU; memory is limited on Linux alone.
-    """
-    resource = _module("resource")
-    if resource is None:
-        return
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    limits = {
-        "RLIMIT_CPU": int(used.ru_utime + used.ru_stime + seconds) + 1,
-        "RLIMIT_FSIZE": 0,
-        "RLIMIT_CORE": 0,
-    }
-    pages = _text("/proc/self/statm").split()
-    if pages:
-        limits["RLIMIT_AS"] = int(int(pages[0]) * os.sysconf("SC_PAGE_SIZE") + memory)
-    for name, soft in limits.items():
-        kind = getattr(resource, name)
-        _, hard = resource.getrlimit(kind)
-        resource.setrlimit(kind, (soft if hard == resource.RLIM_INFINITY else min(soft, hard), hard))
 
 
 def share_blocks(source: Any, target: Any) -> bool:
@@ -233,25 +184,12 @@ def others_can_write(folder: Path, *, inside: bool) -> bool:
 
 def alive(process: int) -> bool:
     """Whether a process of this number runs, for all that this user may know."""
-    windows = _windows()
-    if windows is None:
-        try:
-            os.kill(process, 0)
-        except ProcessLookupError:
-            return False
-        except (OSError, OverflowError):
-            return True
-        return True
-    # os.kill would end it
-    handle = windows.kernel32.OpenProcess(QUERY_LIMITED, False, process)
-    if not handle:
-        return bool(windows.kernel32.GetLastError() == ACCESS_DENIED)
-    import ctypes
+    import psutil
 
-    code = ctypes.c_ulong()
-    windows.kernel32.GetExitCodeProcess(handle, ctypes.byref(code))
-    windows.kernel32.CloseHandle(handle)
-    return code.value == STILL_ACTIVE
+    try:
+        return psutil.pid_exists(process)
+    except OverflowError:  # no system has such a number
+        return False
 
 
 def end_with_parent() -> None:
@@ -269,7 +207,7 @@ def is_parent(process: int) -> bool:
     On Windows the parent's number says nothing: it also names a parent that is gone, and in a virtual environment
     it is that of a launcher that is between the two.
     """
-    return os.getppid() == process if _windows() is None else alive(process)
+    return alive(process) if sys.platform == "win32" else os.getppid() == process
 
 
 def plain_output() -> None:

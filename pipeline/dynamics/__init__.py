@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+    from flexclear.pipeline.core.artifacts.labelled import Labelled, LabelledArrays
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.cost import Cost
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["campbell", "cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate", "simulated"]
 
 
-def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+def simulate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     """What `simulated` gives, as a dataset; so is what there is of a run that is asked to stop."""
     from flexclear.pipeline.core.errors import StoppedError
 
@@ -30,7 +30,7 @@ def simulate(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         raise
 
 
-def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> LabelledArrays:
+def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> LabelledArrays:
     """One run of a scene (schema RUN).
 
     bundles: reduced flexible bodies by name.  progress(fraction or None, text) is called now and then.
@@ -84,7 +84,7 @@ def simulated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progres
 
 
 def cost(
-    scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, *, checked: bool = True, brief: bool = False
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, *, checked: bool = True, brief: bool = False
 ) -> Cost:
     """One run, and what its integration and its recording cost each (`pipeline.dynamics.record.cost.measure`)."""
     from flexclear.pipeline.dynamics.record.cost import measure
@@ -92,14 +92,14 @@ def cost(
     return measure(scene, bundles, progress, checked=checked, brief=brief)
 
 
-def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     """All members of a scene's ensemble on its regular output times (schema ENSEMBLE)."""
     from flexclear.pipeline.dynamics.record.ensemble import ensemble as run
 
     return run(scene, bundles, progress)
 
 
-def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     """A scene whose laws repeat, sampled once in each period (schema SECTIONS)."""
     from flexclear.pipeline.dynamics.record.sections import sections as run
 
@@ -108,7 +108,7 @@ def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
 def equilibrium(
     scene: Scene,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     progress: Progress,
     time: float | None = None,
     drives: Mapping[str, float] | None = None,
@@ -132,7 +132,7 @@ def equilibrium(
 
 def frequencies(
     scene: Scene,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     progress: Progress,
     time: float | None = None,
     drives: Mapping[str, float] | None = None,
@@ -152,7 +152,7 @@ def frequencies(
 
 def campbell(
     scene: Scene,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     progress: Progress,
     speeds: Sequence[float],
     drive: str | None = None,

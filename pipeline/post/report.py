@@ -9,6 +9,7 @@ from pathlib import Path
 
 import xarray as xr
 
+from flexclear.pipeline.core.file_dependencies import note
 from flexclear.pipeline.post import figures
 from flexclear.pipeline.post.discrepancies import DISCREPANCIES
 from flexclear.pipeline.post.page import Content, html_page
@@ -72,6 +73,7 @@ def _variants(folder: Path) -> list[tuple[str, str]]:
     """Name and title of each scene in a folder."""
     variants = []
     for path in sorted(folder.glob("*.toml")):
+        note(path)
         title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
         variants.append((f"`{path.parent.parent.name}/{path.parent.name}/{path.stem}`", str(title)))
     return variants

@@ -12,11 +12,11 @@ import xarray as xr
 from pydantic import ValidationError
 
 from flexclear import pipeline
+from flexclear.pipeline.core import file_dependencies
 from flexclear.pipeline.core.artifacts.store import write_dataset
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Modes
-from flexclear.pipeline.core.workflow import file_dependencies
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.stages import s1_mesh, s2_modes, s3_bundle

@@ -314,7 +314,7 @@ def test_a_launcher_between_parent_and_child_is_no_end_of_the_parent(monkeypatch
     """Python in a virtual environment of Windows is started by one."""
     parent = os.getppid() + 1
     assert not system.is_parent(parent)
-    monkeypatch.setattr(system, "_windows", lambda: object())
+    monkeypatch.setattr(system.sys, "platform", "win32")
     for runs in (True, False):
         monkeypatch.setattr(system, "alive", lambda process, runs=runs: runs and process == parent)
         assert system.is_parent(parent) == runs

@@ -18,7 +18,7 @@ from flexclear.stages.workplace import Workplace
 
 #: what such a command may import: its own code, and what checks scenes
 ALLOWED = {"flexclear", "pydantic", "pydantic_core", "annotated_types", "typing_extensions"}
-ALLOWED |= {"typing_inspection"}
+ALLOWED |= {"typing_inspection", "psutil"}
 #: what takes a tenth of a second or more, and what it brings
 SLOW = {"numpy", "xarray", "pandas", "scipy", "numba", "matplotlib", "pyvista", "skfem", "meshio", "netCDF4"}
 #: the command, and what it has imported at its end
@@ -92,6 +92,20 @@ def test_what_is_fresh_needs_no_library_that_computes_or_draws(fresh: Path, comm
     assert records(fresh) == before  # nothing was run
     assert found & SLOW == set()
     assert found <= ALLOWED
+
+
+@pytest.mark.parametrize("scene", ["checks/pendulum", "checks/clamped_rod"])
+def test_a_run_imports_neither_xarray_nor_what_scipy_computes(
+    scene: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of rigid bodies and of flexible ones whose bundles are fresh: xarray takes as long as all else of a short run."""
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    short = (scene, "--set", "time.end='0.1 ms'", "--jobs", "1")
+    if scene == "checks/clamped_rod":
+        assert "xarray" in imported("run", *short, "--to", "bundle", results=tmp_path)
+    found = imported("run", *short, results=tmp_path)
+    assert "netCDF4" in found  # it did run
+    assert found & {"xarray", "pandas", "skfem", "matplotlib"} == set()
 
 
 def test_what_needs_a_library_shows_it(fresh: Path) -> None:

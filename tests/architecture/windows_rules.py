@@ -9,7 +9,8 @@ import os
 import stat
 import sys
 
-import platformdirs.unix  # noqa: F401 - asks for functions that are gone below, and would not be here on Windows
+import platformdirs.unix  # noqa: F401 - both ask for functions that are gone below, and would not be here on Windows
+import psutil  # noqa: F401
 
 #: what Windows does not have, of modules and of `os`
 MODULES = ("fcntl", "resource", "grp", "pwd", "termios")

@@ -132,7 +132,8 @@ MESHES: dict[str, tuple[bytes | None, str]] = {
     "mesh.inp": (b"*INCLUDE, INPUT=/dev/zero\n", "no ordinary file"),
     "mesh.xdmf": (b"<a>" + b"a" * 1_000_000, "cannot read|no surface"),
     "mesh.stl": (b"\0" * 80 + struct.pack("<I", 0xFFFFFFFF) + b"\0" * 100, "cannot read|no solid cells|no triangles"),
-    "mesh.ply": (POINTS.encode(), "cannot read|no surface"),
+    "mesh.vtu": (b"<VTKFile type='UnstructuredGrid'>" + b"<a>" * 200_000, "cannot read|no surface"),
+    "mesh.ply": (POINTS.encode(), "more memory than there is, or is damaged"),
     "pipe.vtu": (None, "no ordinary file"),
 }
 
@@ -167,6 +168,7 @@ SOUND = {
 }
 ARRAYS: dict[str, dict[str, Any]] = {
     "no component": {"component": np.full(6, 10**9)},
+    "pickled objects": {"node": np.array([print] * 6, dtype=object)},
     "text": {"position": np.full((6, 3), "a")},
     "complex": {"stiffness_value": 1j * np.ones(6)},
     "records": {"node": np.zeros(6, dtype=[("a", "i4")])},

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
 import shutil
 import sys
 from pathlib import Path
@@ -12,11 +10,12 @@ import meshio
 import numpy as np
 import pytest
 
+from flexclear.pipeline.core import file_dependencies
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.external_files import companions, read_mesh
 from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.workflow import file_dependencies
 from flexclear.pipeline.core.workflow.execute import execute, find, states
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
 from flexclear.pipeline.core.workflow.task import Task, facts
@@ -104,7 +103,6 @@ def made(task: Task, store: Store, sources: Sources) -> Record:
 def test_a_companion_file_counts(
     tmp_path: Path, sources: Sources, body: object, companion: str, old: bytes, new: bytes
 ) -> None:
-    """It is named in no list of the program, or was forgotten there; its reader opens it."""
     assert callable(body)
     folder, store = body(tmp_path / "body"), Store(tmp_path / "results")
     task = mesh_task(folder)
@@ -151,46 +149,56 @@ def test_names_of_opened_files_are_checked(tmp_path: Path, sources: Sources) -> 
     assert find(task, {}, store, sources) == record
 
 
-def test_what_a_task_opens_is_noted_by_whoever_opens_it(tmp_path: Path) -> None:
-    """By name or by descriptor's call, missing ones too; not what it wrote itself, nor code, nor what is left out."""
-    for name in ("a.dat", "b.dat", "c.py"):
-        (tmp_path / name).write_text(name)
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "d.dat").touch()
-    with file_dependencies.watched(tmp_path, outside=[tmp_path / "out"]) as read:
-        (tmp_path / "a.dat").read_bytes()
-        os.close(os.open(tmp_path / "b.dat", os.O_RDONLY))
-        (tmp_path / "c.py").read_text()
-        (tmp_path / "out" / "d.dat").read_text()
-        (tmp_path / "own.dat").write_text("own")
-        (tmp_path / "own.dat").read_text()
-        np.random.default_rng(1)
-    (tmp_path / "b.dat").read_text()
-    assert read.keys() == {"a.dat", "b.dat"}
-    assert read == file_dependencies.digests(read, tmp_path)
+ABAQUS = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n"
+ELEMENT = "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n"
+DOLFIN = """<dolfin><mesh celltype="tetrahedron" dim="3"><vertices size="4">
+<vertex index="0" x="0" y="0" z="0"/><vertex index="1" x="1" y="0" z="0"/><vertex index="2" x="0" y="1" z="0"/>
+<vertex index="3" x="0" y="0" z="1"/></vertices><cells size="1">
+<tetrahedron index="0" v0="0" v1="1" v2="2" v3="3"/></cells></mesh></dolfin>"""
+REGIONS = """<dolfin><mesh_function type="int" dim="3" size="1"><entity index="0" value="7"/>
+</mesh_function></dolfin>"""
 
 
-def test_where_modules_are_looked_for_is_no_fact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What an import that fails looks into is no file of a task: whole places, and bare names of editable installs."""
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(file_dependencies.tempfile, "gettempdir", lambda: os.devnull)
-    monkeypatch.setattr(sys, "path", ["__editable__.finder.__path_hook__", str(tmp_path / "modules.zip")])
-    with file_dependencies.watched(tmp_path) as found:
-        for name in (*sys.path, "data.zip"):
-            with contextlib.suppress(OSError):
-                Path(name).open().close()
-    assert found == {"data.zip": file_dependencies.ABSENT}
+def several_files(folder: Path) -> dict[str, tuple[Path, set[str]]]:
+    """For each format of several files the one to read, and the names of all."""
+    (folder / "a.inp").write_text(ABAQUS + "*Include, input=b.inp\n")
+    (folder / "b.inp").write_text("*INCLUDE,INPUT=c.inp\n")
+    (folder / "c.inp").write_text(ABAQUS + ELEMENT)
+    tetrahedra(folder / "t")
+    (folder / "d.xml").write_text(DOLFIN)
+    (folder / "d_part.xml").write_text(REGIONS)
+    return {
+        "abaqus": (folder / "a.inp", {"a.inp", "b.inp", "c.inp"}),
+        "tetgen": (folder / "t" / "body.ele", {"t/body.ele", "t/body.node"}),
+        "dolfin": (folder / "d.xml", {"d.xml", "d_part.xml"}),
+    }
 
 
-def test_a_project_inside_of_an_environment_is_no_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """As `python -m venv .` makes it: only the folders of libraries there are left out."""
-    monkeypatch.setattr(sys, "prefix", str(tmp_path))
-    file_dependencies._system.cache_clear()
-    (tmp_path / "a.dat").write_text("a")
+@pytest.mark.parametrize("name", ["abaqus", "tetgen", "dolfin"])
+def test_companions_of_a_format_are_what_its_reader_opens(tmp_path: Path, name: str) -> None:
+    """As Python reports it; only these formats of meshio have some."""
+    path, names = several_files(tmp_path)[name]
+    opened, listening = set[str](), [True]
+
+    def hook(event: str, arguments: tuple[object, ...]) -> None:
+        if event == "open" and listening and str(arguments[0]).startswith(str(tmp_path)):
+            opened.add(Path(str(arguments[0])).relative_to(tmp_path).as_posix())
+
+    sys.addaudithook(hook)
+    meshio.read(path)
+    listening.clear()
     with file_dependencies.watched(tmp_path) as read:
-        (tmp_path / "a.dat").read_text()
-    file_dependencies._system.cache_clear()
-    assert read.keys() == {"a.dat"}
+        read_mesh(path, "recipe", "cannot be read", "remedy")
+    assert opened == set(read) == names
+
+
+@pytest.mark.parametrize("numbers", ["points.bin", "points.h5:/data0"])
+def test_numbers_next_to_xdmf_are_companions(tmp_path: Path, numbers: str) -> None:
+    """Its reader needs h5py, which is not required here."""
+    written = 'Format="HDF"' if ":" in numbers else 'Format="Binary"'
+    item = f'<DataItem Dimensions="4 3" {written} Precision="8">\n  {numbers}\n</DataItem>'
+    (tmp_path / "x.xdmf").write_text(f'<Xdmf><DataItem Format="XML">0 1</DataItem>{item}</Xdmf>')
+    assert companions(tmp_path / "x.xdmf") == [tmp_path / numbers.partition(":")[0]]
 
 
 def test_a_file_that_changes_while_it_is_read_is_told(tmp_path: Path) -> None:
@@ -200,7 +208,7 @@ def test_a_file_that_changes_while_it_is_read_is_told(tmp_path: Path) -> None:
 
     def read() -> None:
         with file_dependencies.watched(tmp_path):
-            path.read_text()
+            file_dependencies.note(path)
             (tmp_path / "new").rename(path)
 
     with pytest.raises(ResourceError, match="changed while it was read"):
@@ -240,19 +248,3 @@ def test_what_a_page_opens_counts_each_time(root: Path) -> None:
         found.append(read)
     assert found[0] == found[1]
     assert {Path(name).name for name in found[0]} == {"page.css", "page.js", "viewer.js"}
-
-
-def test_what_a_library_writes_for_itself_is_no_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Matplotlib reads its list of fonts and writes it anew, where the home folder cannot be written in a folder of
-    its own, which the environment names from then on; other processes may do so meanwhile."""
-    own, others, table = tmp_path / "own.json", tmp_path / "state" / "fonts.json", tmp_path / "table.csv"
-    others.parent.mkdir()
-    for path in (own, others, table):
-        path.write_text("before")
-    with file_dependencies.watched(tmp_path) as read:
-        assert own.read_text() == table.read_text() == "before"
-        own.write_text("after")
-        monkeypatch.setenv("MPLCONFIGDIR", str(others.parent))
-        assert others.read_text() == "before"
-        os.replace(shutil.copy(own, tmp_path / "new.json"), others)
-    assert set(read) == {"table.csv"}

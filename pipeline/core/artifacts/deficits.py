@@ -6,9 +6,14 @@ The simulate stage may ask `warnings` with the frames at which joints and drives
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: a fraction of the static compliance below this is worth a warning
 ENOUGH = 0.9
@@ -53,22 +58,23 @@ def _row(frame: str, held: str, values: Sequence[object]) -> str:
     return f"  {frame:<14} {held:<10}" + "".join(f"{value!s:>{WIDTH + 1}}" for value in values)
 
 
-def warnings(bundle: xr.Dataset, frames_used: Sequence[str], body: str = "the body") -> list[str]:
+def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body") -> list[str]:
     """Sentences about static compliance that is missing between the frames at which forces act.
 
     frames_used: named frames of the bundle.  A single frame is judged with nothing held.
     """
     used = list(dict.fromkeys(frames_used))
     pairs = [(i, j) for k, i in enumerate(used) for j in used[k + 1 :]] or [(i, i) for i in used]
-    messages = []
+    messages, names = [], [str(name) for name in bundle["frame"].values]
+    directions = bundle["direction"].values
     for name, held in pairs:
-        both = bundle["compliance_share"].sel(frame=[name, held], frame_held=[held, name]).values
-        fraction = bundle["direction"].copy(data=np.minimum(both[0, 0], both[1, 1]))
-        low = fraction.where(fraction < ENOUGH, drop=True)
-        if low.size == 0:
+        i, j = names.index(name), names.index(held)
+        fraction = np.minimum(bundle["compliance_share"].values[i, j], bundle["compliance_share"].values[j, i])
+        low = fraction < ENOUGH
+        if not low.any():
             continue
         where = f"of '{name}'" if name == held else f"between '{held}' and '{name}'"
-        amounts = ", ".join(f"{d} {_percent(v)} %" for d, v in zip(low["direction"].values, low.values, strict=True))
+        amounts = ", ".join(f"{d} {_percent(v)} %" for d, v in zip(directions[low], fraction[low], strict=True))
         messages.append(
             f"{body}: its {bundle.attrs['reference']} modes have too little of the static compliance {where} "
             f"({amounts} of the full model's); joints there find the body too stiff. {_remedy(bundle, used)}"
@@ -76,7 +82,7 @@ def warnings(bundle: xr.Dataset, frames_used: Sequence[str], body: str = "the bo
     return messages
 
 
-def _remedy(bundle: xr.Dataset, used: Sequence[str]) -> str:
+def _remedy(bundle: Labelled, used: Sequence[str]) -> str:
     """What gives the body the missing compliance: static shapes, those of the frames used, or more modes."""
     if bundle.attrs["reference"] not in STATIC:
         return (

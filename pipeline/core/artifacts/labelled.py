@@ -9,12 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    #: what stages read, of which names, dimensions and values are asked alone
+    Labelled: TypeAlias = "xr.Dataset | LabelledArrays"
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
+from flexclear.pipeline.core.file_dependencies import note
 from flexclear.pipeline.core.scene.fields import Angle, Part, Rate, Time
 from flexclear.pipeline.core.units import any_quantity, quantity, unit, unknown
 
@@ -322,6 +323,7 @@ def read_points(path: Path, time: dict[str, Any], value: dict[str, Any]) -> list
             raise ValueError(f"the table {path.name} cannot be read: it is no ordinary file")
         if path.stat().st_size > LARGEST_TABLE:
             raise ValueError(f"the table {path.name} is larger than {LARGEST_TABLE >> 20} MB: leave rows out")
+        note(path)
         with path.open(newline="", encoding="utf-8-sig") as file:
             rows = [row for row in csv.reader(file) if row and not row[0].lstrip().startswith("#")]
     except (OSError, UnicodeDecodeError, csv.Error) as error:

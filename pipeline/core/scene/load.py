@@ -15,6 +15,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from flexclear.pipeline.core import portable
 from flexclear.pipeline.core.errors import InputError, ResourceError, shown
+from flexclear.pipeline.core.file_dependencies import note
 from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.fields import LONGEST_NAME
 from flexclear.pipeline.core.scene.file_kinds import SCENE, require_kind
@@ -234,6 +235,7 @@ def _require_tables(table: dict[str, Any], path: Path) -> None:
 def read_toml(path: Path) -> dict[str, Any]:
     """A TOML file as a table; InputError when it cannot be read or parsed."""
     try:
+        note(path)
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             raise InputError(str(path), "cannot be read: it is no ordinary file", "name a TOML file")

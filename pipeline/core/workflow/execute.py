@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 
-from flexclear.pipeline.core import machine, threads
+from flexclear.pipeline.core import file_dependencies, machine, threads
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.workflow import file_dependencies, journal
+from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import ARRAYS, Task, facts, in_order, key, reasons
 
@@ -55,7 +55,7 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
             with (
                 threads.one(),
                 journal.storage(begun.parent, begun.stem) as storage,
-                file_dependencies.watched(task.base, outside=(store.root,)) as read,
+                file_dependencies.watched(task.base) as read,
             ):
                 product = run({**task.params, **task.context}, data, progress)
             known |= _noted(task, plain, read, store)
@@ -101,7 +101,7 @@ def _facts(task: Task, inputs: Mapping[str, Record], sources: Sources) -> dict[s
 
 
 def _with_files(task: Task, known: Mapping[str, str], store: Store) -> tuple[Mapping[str, str], str]:
-    """Facts with those of the files that the task has ever opened when all else was as it is, and their key."""
+    """Facts with those of the files that the task has ever read when all else was as it is, and their key."""
     plain = key(known)
     names = store.names(task.stage, plain)
     if not names:
@@ -111,7 +111,7 @@ def _with_files(task: Task, known: Mapping[str, str], store: Store) -> tuple[Map
 
 
 def _noted(task: Task, plain: str, read: Mapping[str, str], store: Store) -> dict[str, str]:
-    """Facts of the files that were opened now, and of others that once were; their names are stored for the next
+    """Facts of the files that were read now, and of others that once were; their names are stored for the next
     time."""
     names = set(store.names(task.stage, plain))
     if not names >= read.keys():

@@ -53,6 +53,8 @@ TITLED = ("flexclear.pipeline.post.figures.",)
 #: how often a source is parsed at most, where threads of libraries come between
 ATTEMPTS = 10
 _PARSING = Lock()
+#: libraries that decide on no result: locks, folders, and what the machine has left
+MACHINE = {"filelock", "platformdirs", "psutil"}
 #: distributions whose name differs from that of their import package
 DISTRIBUTIONS = {"skfem": "scikit-fem", "imageio_ffmpeg": "imageio-ffmpeg", "vtkmodules": "vtk"}
 
@@ -114,7 +116,7 @@ class Sources:
         requested = frozenset(roots)
         if requested not in self.codes:
             closure = self.closure(requested)
-            libraries = frozenset().union(*(module.libraries for module in closure.values()))
+            libraries = frozenset().union(*(module.libraries for module in closure.values())) - MACHINE
             counting = {name: module for name, module in closure.items() if name not in WORDING}
             self.codes[requested] = {f"module {name}": module.digest for name, module in counting.items()} | {
                 f"library {name}": version for name, version in library_versions(libraries).items()

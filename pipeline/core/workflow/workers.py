@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
+import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -13,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 from flexclear.pipeline.core import system
 from flexclear.pipeline.core.errors import ResourceError
 from flexclear.pipeline.core.workflow import cores, stopping
-from flexclear.pipeline.core.workflow.family import follow
 
 if TYPE_CHECKING:
     from concurrent.futures import ProcessPoolExecutor
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 
 #: what is said of a helper that somebody has killed
 LOST = "a helper process was killed; is the memory full? Finished results are stored: run again to go on"
+#: where the system sends no signal at a parent's end, the parent is searched for so often [s]
+LOOK = 1.0
 
 
 @dataclass(frozen=True)
@@ -60,10 +64,26 @@ def pool(width: int, bell: Bell | None = None) -> ProcessPoolExecutor:
 
 
 def _begin(parent: int, bell: Bell | None) -> None:
-    follow(parent)
+    _follow(parent)
     system.keep_memory()
     if bell is not None:
         stopping.obey(bell.rung.wait, lambda: bell.why.value.decode(errors="replace"), bell.count_deaf)
+
+
+def _follow(parent: int) -> None:
+    """In a process that the main thread of `parent` started: end when it does; Ctrl-C is left to it.
+
+    parent: its number, as it says itself: by now the system may have given this process another one.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    system.end_with_parent()
+    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+
+
+def _watch(parent: int) -> None:
+    while system.is_parent(parent):
+        time.sleep(LOOK)
+    os._exit(1)
 
 
 def _context() -> Any:
@@ -107,7 +127,7 @@ class Team:
 
         server, bell = SyncManager(ctx=_context()), Bell.made()
         with without_main():
-            server.start(follow, (os.getpid(),))
+            server.start(_follow, (os.getpid(),))
         return Team(width, pool(width, bell), bell, server, server.Queue())
 
     def end(self) -> None:

@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
 
-from flexclear.pipeline.core.roots import root_between
 from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.dynamics.contact import restitution as closed_form
 
@@ -84,7 +83,7 @@ class Hysteresis:
                 f"the law '{self.name}' delivers no restitution below {lowest:.4g}; ask for more, or choose "
                 "'gonthier', 'hu-guo' or 'flores', which cover the whole range"
             )
-        return root_between(lambda c: self.factor(c) - a, least, 1.0, xtol=1e-17, rtol=1e-15)
+        return closed_form.root(lambda c: self.factor(c) - a, least, 1.0)
 
     def _warning(self, law: NormalLaw, delivered: float) -> str | None:
         if law.restitution is None or abs(delivered - law.restitution) <= CLOSE:

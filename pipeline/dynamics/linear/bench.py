@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress
@@ -26,6 +26,9 @@ from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.run import begun, driven
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT
 from flexclear.pipeline.dynamics.run.tree_factor import bias, mass_factor
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: drives reach the requested pose in strides of this fraction of the mechanism's size, or this angle
 STRIDE = 0.05
@@ -74,7 +77,7 @@ class Balance:
 
 def hold(
     scene: Scene,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     progress: Progress,
     time: float | None,
     drives: Mapping[str, float] | None,

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -27,6 +28,9 @@ from flexclear.pipeline.dynamics.linear.equilibrium import Equilibrium
 from flexclear.pipeline.dynamics.linear.steady import steady_near
 from flexclear.pipeline.dynamics.linear.vibrations import Vibrations
 from flexclear.pipeline.dynamics.record.dataset import attributes, subject
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: fraction of a vibration's displacements, or of its energy, that decides what it is
 MOST = 0.8
@@ -73,7 +77,7 @@ class Branch:
 
 def campbell(
     scene: Scene,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     progress: Progress,
     speeds: Sequence[float],
     drive: str | None = None,

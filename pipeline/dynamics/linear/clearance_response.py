@@ -19,9 +19,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
@@ -38,6 +38,9 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: the motion is examined so often
 LOOKS = 32
@@ -193,7 +196,7 @@ def modal_forces(
     model: Model,
     motions: Motions,
     name: str,
-    bundle: xr.Dataset,
+    bundle: Labelled,
     loads: Mapping[str, tuple[np.ndarray, np.ndarray]],
     rows: slice,
 ) -> np.ndarray:
@@ -226,7 +229,7 @@ class Carried:
 
 
 def openings(
-    model: Model, poses: Sequence[Placement], lever: Lever, name: str, bundle: xr.Dataset
+    model: Model, poses: Sequence[Placement], lever: Lever, name: str, bundle: Labelled
 ) -> tuple[np.ndarray, dict[str, Carried]]:
     """How the elastic coordinates of a body open the joints, shape (rows, mode), and move what is fixed to it."""
     i = model.mechanism.link_of[name]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
@@ -18,6 +18,9 @@ from flexclear.pipeline.dynamics.record.dataset import attributes, dataset, subj
 from flexclear.pipeline.dynamics.record.motion import Motion, Motions
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 PARTS = ("real", "imaginary")
 
@@ -143,7 +146,7 @@ def _rigid(body: RigidBody, motion: Motion) -> np.ndarray:
     return body.mass * np.sum(v * v, axis=1) + np.einsum("ti,ij,tj->t", omega, np.array(body.inertia), omega)
 
 
-def _flexible(bundle: xr.Dataset, frame: Motion, q: np.ndarray, u: np.ndarray) -> np.ndarray:
+def _flexible(bundle: Labelled, frame: Motion, q: np.ndarray, u: np.ndarray) -> np.ndarray:
     """Twice the kinetic energy of a modally reduced body whose frame moves; see `bodies.flexible`."""
     v, omega = _relative(frame)
     E, F, C = (bundle[n].values for n in ("position_mode_moment", "mode_mode_moment", "modal_first_moment"))
@@ -153,7 +156,7 @@ def _flexible(bundle: xr.Dataset, frame: Motion, q: np.ndarray, u: np.ndarray) -
     inertia = np.trace(second) * np.eye(3) - second
     first, rate = bundle["first_moment"].values + C @ q, u @ C.T
     spin = np.array([P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]])
-    energy = float(bundle["mass"]) * np.sum(v * v, axis=1)
+    energy = float(bundle["mass"].values) * np.sum(v * v, axis=1)
     energy += 2.0 * np.sum(v * (np.cross(omega, first) + rate), axis=1)
     energy += np.einsum("ti,ij,tj->t", omega, inertia, omega) + 2.0 * np.sum(omega * (u @ spin.T), axis=1)
     return energy + np.einsum("ti,ij,tj->t", u, bundle["modal_mass"].values, u)

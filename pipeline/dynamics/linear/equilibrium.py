@@ -13,9 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.progress import Progress
@@ -23,6 +23,9 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.linear.bench import Bench, closed, hold
 from flexclear.pipeline.dynamics.linear.tangent import Tangent, magnitude, stiffness, tangent
 from flexclear.pipeline.dynamics.model.model import Model
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: iterations before giving up
 MOST = 200
@@ -49,7 +52,7 @@ class Equilibrium:
 
 def equilibrium(
     scene: Scene,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     progress: Progress,
     time: float | None,
     drives: Mapping[str, float] | None,

@@ -20,10 +20,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
-import xarray as xr
 
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
@@ -34,6 +34,9 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: poses at which the vibrations are examined
 LOOKS = 8
@@ -65,7 +68,7 @@ class Response:
 
 def response(
     run: Run,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     chosen: Sequence[Quantity],
 ) -> Response:
     """The response of flexible bodies to the ideal motion of their mechanism, the run of its rigid version.
@@ -126,7 +129,7 @@ class _Assembled:
 
 
 def _assembled(
-    model: Model, lever: clearance_response.Lever, poses: Sequence[Placement], bundles: Mapping[str, xr.Dataset]
+    model: Model, lever: clearance_response.Lever, poses: Sequence[Placement], bundles: Mapping[str, Labelled]
 ) -> _Assembled | None:
     """The elastic mechanism in a pose; None where no motion is left."""
     first = np.concatenate([[0], np.cumsum([int(b.sizes["mode"]) for b in bundles.values()])])
@@ -156,7 +159,7 @@ def _assembled(
 def _mass(
     model: Model,
     poses: Sequence[Placement],
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     first: np.ndarray,
     own: Mapping[str, tuple[np.ndarray, np.ndarray]],
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -188,7 +191,7 @@ def _mass(
     return 0.5 * (M + M.T), momenta
 
 
-def _momenta(bundle: xr.Dataset, placement: Placement, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _momenta(bundle: Labelled, placement: Placement, centre: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Linear momentum of a body's deformation, and its moment about a point, per rate of q, world axes, (3, mode)."""
     push = placement.R @ bundle["modal_first_moment"].values
     P = bundle["position_mode_moment"].values

@@ -12,9 +12,9 @@ Rotating Systems, sec. 2.4 (self-centring).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.progress import Progress
@@ -26,6 +26,9 @@ from flexclear.pipeline.dynamics.linear.equilibrium import BALANCED, LONGEST, SH
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, stiffness, tangent
 from flexclear.pipeline.dynamics.linear.vibrations import NOTHING, Vibrations, vibrations
 from flexclear.pipeline.dynamics.run.singular import built_rows
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: corrections of one pose; each is at most this fraction of the one before, else a stride has to be shorter
 CORRECTIONS, CONTRACTION = 20, 0.5
@@ -41,7 +44,7 @@ PROBE = 0.1
 
 def steady(
     scene: Scene,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     progress: Progress,
     time: float | None,
     drives: Mapping[str, float] | None,

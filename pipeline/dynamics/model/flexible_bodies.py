@@ -12,6 +12,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.interface_basis import (
     NEGLIGIBLE,
     InterfaceBasis,
+    frame_index,
     frame_shapes,
     mass_coupled,
 )
@@ -19,7 +20,7 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 
 def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
@@ -49,7 +50,7 @@ def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
         entry_value += [basis.matrix[where_] for where_ in entries]
         interface.append(_interface_data(bundle, basis))
         flex_real.append(
-            [float(bundle["mass"]), *bundle["first_moment"].values, *bundle["second_moment"].values.ravel()]
+            [float(bundle["mass"].values), *bundle["first_moment"].values, *bundle["second_moment"].values.ravel()]
         )
         data.append(chunk)
         value.append(moments)
@@ -75,7 +76,7 @@ def fill(numbering: Numbering, losses: list[int]) -> dict[Any, Any]:
     }
 
 
-def _body(mechanism: Mechanism, link: int) -> tuple[str, xr.Dataset]:
+def _body(mechanism: Mechanism, link: int) -> tuple[str, Labelled]:
     """Name and bundle of a flexible link's body."""
     name, bundle = mechanism.links[link].flexible, mechanism.links[link].bundle
     assert name is not None
@@ -99,7 +100,7 @@ def bow(mechanism: Mechanism, link: int, frame: str | None = None) -> np.ndarray
         )
     if frame is None:
         return bundle["shortening_first_moment"].values
-    return bundle["frame_shortening"].sel(frame=frame).values
+    return bundle["frame_shortening"].values[frame_index(bundle, frame)]
 
 
 def shift(
@@ -119,7 +120,7 @@ def shift(
     return displacement, rate, second
 
 
-def _damping(name: str, body: FlexibleBody, bundle: xr.Dataset) -> np.ndarray:
+def _damping(name: str, body: FlexibleBody, bundle: Labelled) -> np.ndarray:
     """Damping 2 zeta omega of every mode [1/s]; InputError when ratios and modes differ in number."""
     square = np.diag(bundle["modal_stiffness"].values)
     given = body.damping
@@ -142,7 +143,7 @@ def _forms(mechanism: Mechanism, link: int, n: int) -> list[np.ndarray]:
     return [np.zeros(n * n) if form is None else form.ravel() for form in (first, second)]
 
 
-def _data(bundle: xr.Dataset, damping: np.ndarray) -> np.ndarray:
+def _data(bundle: Labelled, damping: np.ndarray) -> np.ndarray:
     """C1 (3n), E (9n), modal mass (n n), stiffness omega^2 (n), damping 2 zeta omega (n).
 
     The coordinates of a bundle are mass-normalised eigenmodes of its reduced matrices.
@@ -158,7 +159,7 @@ def _data(bundle: xr.Dataset, damping: np.ndarray) -> np.ndarray:
     return np.concatenate([c.ravel() for c in chunks])
 
 
-def _interface_data(bundle: xr.Dataset, basis: InterfaceBasis) -> np.ndarray:
+def _interface_data(bundle: Labelled, basis: InterfaceBasis) -> np.ndarray:
     """C1 (3n), modal mass (n n) and stiffness (n n) in the interface basis."""
     T, mass = basis.matrix, bundle["modal_mass"].values
     mixed = mass if mass_coupled(bundle) else np.diag(np.diag(T.T @ np.diag(np.diag(mass)) @ T))
@@ -166,7 +167,7 @@ def _interface_data(bundle: xr.Dataset, basis: InterfaceBasis) -> np.ndarray:
     return np.concatenate([(bundle["modal_first_moment"].values @ T).ravel(), mixed.ravel(), stiffness.ravel()])
 
 
-def _moments(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _moments(bundle: Labelled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Nonzero int rho S_ki S_lj, row (3k + l) n + j after row: values, modes i, and per row how many end with it."""
     F = bundle["mode_mode_moment"].values
     n = F.shape[-1]

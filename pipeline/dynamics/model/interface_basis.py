@@ -7,13 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.sparse_graphs import components
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, named_frames
 
 if TYPE_CHECKING:
-    import xarray as xr
-
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.dynamics.model.arrays import Arrays
 
 #: a shape or moment below this fraction of the largest of its kind is rounding, not coupling
@@ -60,13 +58,13 @@ def interface_basis(mechanism: Mechanism, link: int) -> InterfaceBasis:
     return basis(_motions(bundle, sorted(used)), np.diag(bundle["modal_stiffness"].values))
 
 
-def mass_coupled(bundle: xr.Dataset) -> bool:
+def mass_coupled(bundle: Labelled) -> bool:
     """Whether modes have common entries of the modal mass."""
     mass = bundle["modal_mass"].values
     return bool(np.any(np.abs(mass - np.diag(np.diag(mass))) > UNCOUPLED))
 
 
-def _motions(bundle: xr.Dataset, frames: list[str]) -> np.ndarray:
+def _motions(bundle: Labelled, frames: list[str]) -> np.ndarray:
     """Displacements and turns of frames per mode, each in units of the largest, shape (6 frames, mode)."""
     shapes = [frame_shapes(bundle, frame.partition(".")[2])[1:] for frame in frames]
     kinds = []
@@ -82,12 +80,20 @@ def basis(motions: np.ndarray, stiffness: np.ndarray) -> InterfaceBasis:
     Modes that move frames in different ways, as in bending and in torsion, are not mixed.
     """
     held, moving, n = list[np.ndarray](), list[np.ndarray](), len(stiffness)
-    for modes in components((np.abs(motions).T @ np.abs(motions)) > 0.0):
+    for modes in _families((np.abs(motions).T @ np.abs(motions)) > 0.0):
         for kind, columns in zip((held, moving), _family(motions[:, modes], stiffness[modes]), strict=True):
             for column in columns.T:
                 kind.append(np.zeros(n))
                 kind[-1][modes] = column
     return InterfaceBasis(np.array([*held, *moving]).T, len(held))
+
+
+def _families(common: np.ndarray) -> list[list[int]]:
+    """Modes that are connected by common motions, ascending; common: symmetric (modes, modes), true for such pairs."""
+    reached = common | np.eye(len(common), dtype=bool)
+    for _ in range(len(common).bit_length()):
+        reached = reached @ reached
+    return [np.flatnonzero(reached[first]).tolist() for first in np.unique(reached.argmax(axis=1))]
 
 
 def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -107,9 +113,14 @@ def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.
     return still @ axes, moving @ turns_first
 
 
-def frame_shapes(bundle: xr.Dataset, frame: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def frame_index(bundle: Labelled, frame: str) -> int:
+    """Return the index of a named frame of a bundle; ValueError when there is none."""
+    return [str(name) for name in bundle["frame"].values].index(frame)
+
+
+def frame_shapes(bundle: Labelled, frame: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Undeformed pose row (12), translation and rotation shapes (3, n) of a named frame."""
-    k = list(bundle["frame"].values).index(frame)
+    k = frame_index(bundle, frame)
     pose = np.concatenate([bundle["frame_position"].values[k], bundle["frame_rotation"].values[k].ravel()])
     shapes = [bundle[name].values[k].copy() for name in ("frame_translation_shape", "frame_rotation_shape")]
     for name, shape in zip(("frame_translation_shape", "frame_rotation_shape"), shapes, strict=True):

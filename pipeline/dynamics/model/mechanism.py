@@ -32,7 +32,7 @@ from flexclear.pipeline.dynamics.model.stops import STOP, End, ends
 from flexclear.pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, span
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: fraction of the largest radius of gyration below which the distances of a scene are no size of it
 NOTHING = 1e-9
@@ -99,7 +99,7 @@ class Link:
     joint: InboardJoint
     inboard: Site | None
     inertia: RigidInertia | None = None
-    bundle: xr.Dataset | None = None
+    bundle: Labelled | None = None
 
     @property
     def kind(self) -> str:
@@ -120,7 +120,7 @@ class Link:
     def mass(self) -> float:
         """Mass [kg]; 0 for the ground and for massless links within a joint."""
         if self.bundle is not None:
-            return float(self.bundle["mass"])
+            return float(self.bundle["mass"].values)
         return 0.0 if self.inertia is None else self.inertia.mass
 
     @cached_property
@@ -212,7 +212,7 @@ def _site(frames: Mapping[str, Frame], links: list[Link], link_of: Mapping[str, 
     return Site(i, placement, name if links[i].flexible else None)
 
 
-def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Mechanism:
+def build(scene: Scene, bundles: Mapping[str, Labelled]) -> Mechanism:
     """The mechanism that a scene describes; InputError for what cannot be built.
 
     bundles: reduced flexible bodies by name.
@@ -265,7 +265,7 @@ class _Body:
     scene: Scene
     group: Group
     start: Placement
-    bundle: xr.Dataset | None
+    bundle: Labelled | None
 
     def link(self, branch: Branch, own: Placement, inboard: Site, joint: InboardJoint) -> Link:
         """The link, its bodies in its frame, which is `own` in the host's unless it is flexible."""

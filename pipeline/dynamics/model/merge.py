@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigi
 from flexclear.pipeline.core.scene.schema import Scene
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 GROUND = "ground"
 
@@ -65,7 +65,7 @@ class RigidInertia(NamedTuple):
     moments: np.ndarray
 
 
-def frames_of(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, Frame]:
+def frames_of(scene: Scene, bundles: Mapping[str, Labelled]) -> dict[str, Frame]:
     """Every named frame of the scene by ``body.FRAME``."""
     frames: dict[str, Frame] = {}
     for name, body in scene.body.items():

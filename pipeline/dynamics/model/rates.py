@@ -26,6 +26,7 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.constraints import demands, freedoms, outboard_place
 from flexclear.pipeline.dynamics.model.couplings import Coupling, Side
+from flexclear.pipeline.dynamics.model.interface_basis import frame_index
 from flexclear.pipeline.dynamics.model.mechanism import Closure
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
@@ -214,7 +215,7 @@ def _shape_motions(model: Model, link: int, frame: str, pose: Placement) -> tupl
 def _frame_motions(model: Model, link: int, frame: str, pose: Placement) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     bundle = model.links[link].bundle
     assert bundle is not None
-    k = list(bundle["frame"].values).index(frame.partition(".")[2])
+    k = frame_index(bundle, frame.partition(".")[2])
     turn = (pose.R @ bundle["frame_rotation_shape"].values[k]).T
     shift = (pose.R @ bundle["frame_translation_shape"].values[k]).T
     return turn, shift, pose.of(Placement(bundle["frame_position"].values[k])).p

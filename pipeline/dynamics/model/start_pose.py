@@ -25,6 +25,8 @@ from flexclear.pipeline.dynamics.model.start_table import given_coordinates
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
+
 #: residuals below these are rounding of a closed mechanism: a fraction of its size, and an angle [rad]
 CLOSED, STRAIGHT = 1e-8, 1e-7
 
@@ -59,7 +61,7 @@ class StartPose:
     refused: InputError | None
 
 
-def start_pose(scene: Scene, bundles: Mapping[str, xr.Dataset], drawn: Mapping[str, xr.Dataset]) -> StartPose:
+def start_pose(scene: Scene, bundles: Mapping[str, Labelled], drawn: Mapping[str, xr.Dataset]) -> StartPose:
     """The start of a scene as its joints place it, or, where they cannot fit, as the poses and the joints' tree do.
 
     bundles: of flexible bodies, undeformed (mass, inertia, frames), by name.  drawn: the same of all bodies with a

@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.driving import coordinate_of
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def _measure(value: float | str | None, dimension: str, path: str) -> float | No
         raise InputError(path, str(error)) from None
 
 
-def given_modes(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, np.ndarray]:
+def given_modes(scene: Scene, bundles: Mapping[str, Labelled]) -> dict[str, np.ndarray]:
     """Modal coordinates at the start of the flexible bodies that the scene gives some, [m], shape (mode,).
 
     Raises InputError for bodies that are not flexible, and for more numbers than modes.
@@ -79,7 +79,7 @@ def given_modes(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, np
     return {name: _padded(scene, bundles, name, "coordinate", start.coordinate) for name, start in given.items()}
 
 
-def given_modal_velocities(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> dict[str, np.ndarray]:
+def given_modal_velocities(scene: Scene, bundles: Mapping[str, Labelled]) -> dict[str, np.ndarray]:
     """The same for their rates [m/s], of the bodies that the scene gives some."""
     given = scene.start.modal if scene.start is not None else {}
     return {
@@ -90,7 +90,7 @@ def given_modal_velocities(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> d
 
 
 def _padded(
-    scene: Scene, bundles: Mapping[str, xr.Dataset], name: str, key: str, values: tuple[float, ...]
+    scene: Scene, bundles: Mapping[str, Labelled], name: str, key: str, values: tuple[float, ...]
 ) -> np.ndarray:
     if name not in scene.flexible():
         known = suggestion(name, scene.flexible()) if scene.flexible() else "the scene has no flexible body"

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.sparse_graphs import reverse_cuthill_mckee
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import arrays, flexible_bodies
 from flexclear.pipeline.dynamics.model.couplings import Coupling
@@ -157,6 +156,30 @@ def _order(supports: list[set[int]]) -> list[int]:
     if n < 2:
         return list(range(n))
     return reverse_cuthill_mckee(np.array([[bool(a & b) for b in supports] for a in supports]))
+
+
+def reverse_cuthill_mckee(joined: np.ndarray) -> list[int]:
+    """Return an order of the nodes for a thin envelope; joined: symmetric (n, n), true between neighbours.
+
+    Breadth first from nodes of low degree, neighbours by rising degree, and all of it backwards.  A node that is its
+    own neighbour counts twice.  As of `scipy.sparse.csgraph`, whose import takes 0.7 s of a run's 2.5 s.
+    Source: Cuthill & McKee (1969), Proc. 24th Nat. Conf. ACM, 157-172; George & Liu (1981), sec. 4.3.
+    """
+    degree = (joined.sum(axis=1) + np.diag(joined)).astype(np.int32)
+    order, seen = list[int](), set[int]()
+    for seed in np.argsort(degree).tolist():
+        if seed in seen:
+            continue
+        seen.add(seed)
+        level = [seed]
+        while level:
+            order += level
+            above, level = level, []
+            for node in above:
+                new = [k for k in np.flatnonzero(joined[node]).tolist() if k not in seen]
+                seen.update(new)
+                level += sorted(new, key=lambda k: int(degree[k]))
+    return order[::-1]
 
 
 def _couplings(closure: np.ndarray, supports: list[list[int]]) -> dict[Any, Any]:

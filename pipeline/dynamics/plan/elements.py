@@ -10,11 +10,15 @@ so the number that an accuracy calls for follows.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.decisions import Mesh
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: twice as many elements are compared with; errors fall with this power of their length
 TWICE, ORDER = 2, 4
@@ -26,7 +30,7 @@ TURNED = 2.0
 
 def mesh(
     given: int,
-    bundle: xr.Dataset,
+    bundle: Labelled,
     finer: xr.Dataset,
     bending: Mapping[str, float],
     requested: Mapping[str, float],
@@ -47,7 +51,7 @@ def mesh(
     return Mesh(given, max(1, int(np.ceil(called_for))), beyond * frequency, beyond * compliance, error)
 
 
-def _frequencies(bundle: xr.Dataset, finer: xr.Dataset, duration: float) -> tuple[float, float]:
+def _frequencies(bundle: Labelled, finer: xr.Dataset, duration: float) -> tuple[float, float]:
     """Largest change of a frequency, as a fraction, and phase by which the lowest vibration is off in the end [rad]."""
     one, two = (np.sort(b["frequency"].values) for b in (bundle, finer))
     there = min(len(one), len(two))
@@ -59,7 +63,7 @@ def _frequencies(bundle: xr.Dataset, finer: xr.Dataset, duration: float) -> tupl
     return float((change / two[firm]).max()), float(2.0 * np.pi * change[0] * duration)
 
 
-def _compliance(bundle: xr.Dataset, finer: xr.Dataset) -> float:
+def _compliance(bundle: Labelled, finer: xr.Dataset) -> float:
     """Largest change of an entry of the frames' compliance, as a fraction of those of its two directions."""
     one, two = (_matrix(b) for b in (bundle, finer))
     scale = np.sqrt(np.abs(np.outer(np.diag(two), np.diag(two))))
@@ -67,7 +71,7 @@ def _compliance(bundle: xr.Dataset, finer: xr.Dataset) -> float:
     return float((np.abs(one - two)[scale > least] / scale[scale > least]).max(initial=0.0))
 
 
-def _matrix(bundle: xr.Dataset) -> np.ndarray:
+def _matrix(bundle: Labelled) -> np.ndarray:
     """Motions of all frames under unit loads there, shape (6 frames, 6 frames), in the body frame."""
     shapes = np.concatenate([bundle["frame_translation_shape"].values, bundle["frame_rotation_shape"].values], axis=1)
     moved = shapes.reshape(-1, shapes.shape[-1])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -21,6 +22,9 @@ from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.run.run import placed
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: starts of pilots with contacts: enough to see whether the motion parts
 MEMBERS = 3
@@ -66,7 +70,7 @@ class Pilots:
     """
 
     scene: Scene
-    bundles: Mapping[str, xr.Dataset]
+    bundles: Mapping[str, Labelled]
     fewer: Sequence[Mapping[str, xr.Dataset]]
     filled: Callable[[Scene], Scene]
     chosen: Sequence[Quantity]
@@ -153,7 +157,7 @@ class Pilots:
         """Variables of the full scene for each one that is left with so few modes."""
         return self.extent.variables / self._variables({**self.bundles, **self.fewer[level]})
 
-    def _variables(self, bundles: Mapping[str, xr.Dataset]) -> int:
+    def _variables(self, bundles: Mapping[str, Labelled]) -> int:
         """Of the full scene with these flexible bodies."""
         left_out = sum(b.sizes["mode"] for b in self.bundles.values()) - sum(b.sizes["mode"] for b in bundles.values())
         return max(self.extent.variables - 2 * int(left_out), 1)

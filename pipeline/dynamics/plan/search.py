@@ -10,6 +10,7 @@ Effects that are not shown to be small stay.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -31,6 +32,9 @@ from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, 
 from flexclear.pipeline.dynamics.plan.tolerance import DEFAULT, no_dearer, smooth
 from flexclear.pipeline.dynamics.run.run import Run, integrate
 
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
+
 #: what bounds of clearances, which hold whatever happens, may use up of the budget
 BY_BOUND = 0.9
 #: by how much the first-order response of flexible bodies counts for more: it leaves out that the pose turns meanwhile,
@@ -44,7 +48,7 @@ UNCOUPLED = "nothing couples it to what is asked for"
 
 def plan(
     scene: Scene,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     fewer: Sequence[Mapping[str, xr.Dataset]],
     meshes: Mapping[str, tuple[int, xr.Dataset]],
     filled: Callable[[Scene], Scene],

@@ -24,6 +24,7 @@ from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Trajectory
 
 if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.dynamics.run.horizon import PerturbedRun
 
 #: an integration is repeated so often, and short ones until they have taken this time together, but no more often than
@@ -47,7 +48,7 @@ class Cost:
 
 def measure(
     scene: Scene,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     progress: Progress = silent,
     *,
     checked: bool = True,

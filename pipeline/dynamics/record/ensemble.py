@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from threading import Lock
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -33,8 +34,11 @@ from flexclear.pipeline.dynamics.run.specialised import abreast
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, output_times
 
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+
+def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     """All members (schema ENSEMBLE) of a scene with clearance joints."""
     try:
         return _members(scene, bundles, progress)
@@ -43,7 +47,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
         return _members(unverified(scene), bundles, progress)
 
 
-def _members(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     requested = scene.ensemble or Ensemble()
     if not scene.contacts() and not scene.stop:
         raise InputError(

@@ -12,6 +12,7 @@ from flexclear.pipeline.core.algebra import continued, cross, turned
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift
+from flexclear.pipeline.dynamics.model.interface_basis import frame_index
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 
@@ -161,7 +162,7 @@ class Motions:
             link, bundle = self.link(i), self.model.links[i].bundle
             if bundle is not None:
                 label = name.partition(".")[2]
-                S = bundle["frame_translation_shape"].sel(frame=label).values
+                S = bundle["frame_translation_shape"].values[frame_index(bundle, label)]
                 bent = placement.p + self.modal(i).shift(S, bow(self.model.mechanism, i, label))[0]
                 positions[:, k] = link.p + turned(link.R, bent)
 
@@ -181,7 +182,8 @@ class Motions:
                 velocities[name] = link.at(placement.p).v, link.omega
                 continue
             label, state = name.partition(".")[2], self.modal(i)
-            S, P = (bundle[f"frame_{k}_shape"].sel(frame=label).values for k in ("translation", "rotation"))
+            at = frame_index(bundle, label)
+            S, P = (bundle[f"frame_{k}_shape"].values[at] for k in ("translation", "rotation"))
             arm, rate, second = state.shift(S, bow(self.model.mechanism, i, label))
             turning = turned(link.R, _angular_velocity(state.q @ P.T, state.u @ P.T))
             velocities[name] = link.moving(placement.p + arm, rate, second).v, link.omega + turning

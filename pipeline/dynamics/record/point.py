@@ -38,7 +38,7 @@ from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: where only final values are recorded, the ledger of energy is examined so often
 LOOKS = 50
@@ -56,7 +56,7 @@ class Runner:
     error: whether each point is run at a tighter tolerance as well.
     """
 
-    bundles: Mapping[str, xr.Dataset]
+    bundles: Mapping[str, Labelled]
     recorded: Sequence[Recorded]
     members: int = 0
     error: bool = False

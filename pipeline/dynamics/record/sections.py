@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -29,12 +30,15 @@ from flexclear.pipeline.dynamics.run.run import engines, observed
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
+
 #: of impacts, known when they end
 LATER = ("peak_force", "duration")
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
-def sections(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> xr.Dataset:
+def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     """Sections of a scene whose laws repeat (schema SECTIONS).
 
     Raises InputError for laws that do not repeat, SolverError when the run cannot continue.

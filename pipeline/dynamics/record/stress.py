@@ -27,7 +27,7 @@ from flexclear.pipeline.dynamics.record.solid_stress import factors, gauge_nodes
 from flexclear.pipeline.dynamics.record.wrenches import Wrench
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
@@ -78,7 +78,7 @@ def _of_gauges(gauged: Mapping[str, Gauged]) -> tuple[Variables, dict[str, objec
 
 
 def _of_solids(
-    motions: Motions, solids: Mapping[str, xr.Dataset], gauged: dict[str, Gauged]
+    motions: Motions, solids: Mapping[str, Labelled], gauged: dict[str, Gauged]
 ) -> tuple[Variables, dict[str, object]]:
     """The factors of the stress fields; what follows from them into `gauged`."""
     every, fields, owners = [], list[str](), list[str]()
@@ -98,7 +98,7 @@ def _of_solids(
 
 
 def _of_rods(
-    motions: Motions, rods: Mapping[str, xr.Dataset], gauged: dict[str, Gauged]
+    motions: Motions, rods: Mapping[str, Labelled], gauged: dict[str, Gauged]
 ) -> tuple[Variables, dict[str, object]]:
     """Section forces and peak stresses; the latter are left out when a rod has a section without known outline.
 
@@ -133,7 +133,7 @@ def _of_rods(
     }
 
 
-def section_forces(bundle: xr.Dataset, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
+def section_forces(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
     """N, Qy, Qz [N], T, My, Mz [N m] of every section, in axes of the deformed section, shape (time, section, 6).
 
     moment, force: of joints and loads at every named frame, body axes, moments about the body's origin [N m, N],
@@ -149,7 +149,7 @@ def section_forces(bundle: xr.Dataset, motion: Motion, moment: np.ndarray, force
     return np.concatenate([np.einsum("tsij,tsi->tsj", R_BS, part) for part in (F, M)], axis=-1)
 
 
-def peak_stresses(bundle: xr.Dataset, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def peak_stresses(bundle: Labelled, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Axial stress that is largest in size, and largest von Mises stress [Pa], shape (time, section) each.
 
     And the six components of stress at the fibre of the latter, axes of the section, (time, section, 6).
@@ -192,7 +192,7 @@ def _turned(forces: np.ndarray, angle: np.ndarray) -> np.ndarray:
     return turned
 
 
-def _inertia(bundle: xr.Dataset, motion: Motion) -> Wrench:
+def _inertia(bundle: Labelled, motion: Motion) -> Wrench:
     """Rate of momentum of every slice less its weight: moment about the body's origin, force, (time, slice, 3)."""
     S = [_moved(bundle, "slice_translation_shape", x) for x in (motion.q, motion.u, motion.du)]
     theta = [skew(_moved(bundle, "slice_rotation_shape", x)) for x in (motion.q, motion.u, motion.du)]
@@ -209,7 +209,7 @@ def _inertia(bundle: xr.Dataset, motion: Motion) -> Wrench:
     return np.cross(r, force) + own, force
 
 
-def _moved(bundle: xr.Dataset, name: str, q: np.ndarray) -> np.ndarray:
+def _moved(bundle: Labelled, name: str, q: np.ndarray) -> np.ndarray:
     """Shapes (point, 3, mode) times coordinates (time, mode): (time, point, 3)."""
     return np.einsum("pim,tm->tpi", bundle[name].values, q, optimize=True)
 

@@ -16,11 +16,11 @@ from flexclear.pipeline.dynamics.run.engine import Engine, assemble
 from flexclear.pipeline.dynamics.run.run import engine_of, engines
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 
 def engines_alike(
-    known: Engine | None, scene: Scene, bundles: Mapping[str, xr.Dataset]
+    known: Engine | None, scene: Scene, bundles: Mapping[str, Labelled]
 ) -> tuple[Engine, Callable[[str], Engine]]:
     """What `engines` gives, to the last bit, at less cost where an engine of a similar scene is `known`.
 

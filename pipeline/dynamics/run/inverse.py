@@ -18,9 +18,9 @@ as loads, linear between two outputs, so that joint forces and works are those o
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 from scipy.linalg import null_space, qr
 
 from flexclear.pipeline.core.errors import InputError
@@ -43,11 +43,14 @@ from flexclear.pipeline.dynamics.run.observation import observe
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
+
 #: singular values below this fraction of the largest are zero
 RANK = 1e-8
 
 
-def actuated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, dict[str, Pieces]]:
+def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, dict[str, Pieces]]:
     """The scene with its actuators driven instead of the paths, and the laws by which they move.
 
     Raises InputError when the actuators cannot produce the motion, or could in more than one way.
@@ -70,7 +73,7 @@ def actuated(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
 
 
 def _started(
-    scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress, laws: Mapping[str, Pieces] = NONE
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, laws: Mapping[str, Pieces] = NONE
 ) -> tuple[Engine, np.ndarray]:
     """An engine and its consistent start."""
     engine = prepare(tabulate(build(scene, bundles), laws), progress)
@@ -212,7 +215,7 @@ def _unit_wrench(sites: np.ndarray, a: int, b: int, coordinate: Coordinate) -> n
 
 
 def _shared(
-    scene: Scene, laws: dict[str, Pieces], names: list[str], bundles: Mapping[str, xr.Dataset], progress: Progress
+    scene: Scene, laws: dict[str, Pieces], names: list[str], bundles: Mapping[str, Labelled], progress: Progress
 ) -> tuple[Scene, dict[str, Pieces]]:
     """The scene in which the actuators without a law act as loads, and the laws of all.
 

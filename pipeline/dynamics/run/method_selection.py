@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -27,6 +28,9 @@ from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges, Look, Panel, limited, pace
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.start import consistent_start
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: evaluations of a step of the default method, and how far its region of stability reaches where steps swing about it,
 #: along both axes; the product of rate and step that its error control settles at
@@ -243,7 +247,7 @@ class Suit:
 ORDERS = {DEFAULT: 7.0, VIBRATING: 4.0, STIFF: 3.0}
 
 
-def suit(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Suit:
+def suit(scene: Scene, bundles: Mapping[str, Labelled]) -> Suit:
     """What is known of a scene before any run."""
     names = by_need(bool(scene.flexible()))
     engine = engine_of(

@@ -34,8 +34,7 @@ from flexclear.pipeline.dynamics.run.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
 
 if TYPE_CHECKING:
-    import xarray as xr
-
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.dynamics.run.collocation import Collocation
     from flexclear.pipeline.dynamics.run.horizon import PerturbedRun
 
@@ -64,7 +63,7 @@ class Run:
         return self.engine.model
 
 
-def engine_of(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Engine:
+def engine_of(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Engine:
     """The compiled engine of a scene where its run begins; paths are not searched for."""
     return prepare(tabulate(build(begun(scene, bundles, progress)[0], bundles)), progress)
 
@@ -78,7 +77,7 @@ def placed(scene: Scene) -> Scene:
     return scene_placed
 
 
-def driven(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
+def driven(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, Mapping[str, Pieces]]:
     """The scene with actuators driven as the paths that they shall produce demand, and the laws of their motion."""
     if not any(isinstance(drive, PathDrive) and drive.actuators for drive in scene.drive.values()):
         return scene, {}
@@ -87,7 +86,7 @@ def driven(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
     return actuated(scene, bundles, progress)
 
 
-def begun(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, str]:
+def begun(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
     """The scene with the poses and velocities of where it says that the run begins, instead of its own.
 
     With it which of several ways it was assembled in, in words; empty where there is one, or the scene chooses.
@@ -100,14 +99,14 @@ def begun(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -
 
 
 def engines(
-    scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress
 ) -> tuple[Engine, Callable[[str], Engine]]:
     """The engine of a run, and the maker of one that continues with another integrator, given by its name."""
     made = _maker(scene, bundles, progress)
     return made("", progress), cache(lambda name: made(name, progress))
 
 
-def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> Callable[[str, Progress], Engine]:
+def _maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[[str, Progress], Engine]:
     """What makes the engine of a run by an integrator's name, that of the scene's own by none; it reports progress."""
     posed, choice = begun(scene, bundles, progress)
     moved, given = driven(posed, bundles, progress)
@@ -126,7 +125,7 @@ def _maker(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) 
 
 def integrate(
     scene: Scene,
-    bundles: Mapping[str, xr.Dataset],
+    bundles: Mapping[str, Labelled],
     progress: Progress,
     judges: Judges | None = None,
 ) -> Run:

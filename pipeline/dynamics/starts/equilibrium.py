@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import xarray as xr
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
+
 
 from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.drives import JointDrive
@@ -19,7 +21,7 @@ from flexclear.pipeline.dynamics.model.start_table import given_coordinates
 from flexclear.pipeline.dynamics.starts.snapshot import posed, resting
 
 
-def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, str]:
+def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
     """The scene at its equilibrium, and how it was assembled; velocities stay as the scene gives them.
 
     Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium close to its poses.

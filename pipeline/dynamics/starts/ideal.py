@@ -9,9 +9,9 @@ have no ideal counterpart: they stay as they are, and what touches them where th
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.progress import Progress
@@ -31,6 +31,9 @@ from flexclear.pipeline.dynamics.run.run import driven
 from flexclear.pipeline.dynamics.run.start import consistent_start, project, rates_at_speeds
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
+
 #: a pin has its final position when it is this fraction of the clearance from it; passes in which that is reached, at
 #: most
 THERE, PASSES = 1e-9, 20
@@ -44,7 +47,7 @@ STEP = 1e-7
 RANK = 1e-9
 
 
-def begin(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Scene, str]:
+def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
     """The scene as its ideal mechanism starts, and how that was assembled; one without clearance is its own.
 
     Raises InputError for an ideal scene that cannot be built, SolverError when the pins cannot be put
@@ -81,7 +84,7 @@ def placed(scene: Scene) -> Scene:
     return scene.model_copy(update={"joint": joints, "start": start})
 
 
-def _started(scene: Scene, bundles: Mapping[str, xr.Dataset], progress: Progress) -> tuple[Engine, np.ndarray]:
+def _started(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Engine, np.ndarray]:
     moved, given = driven(scene, bundles, progress)
     engine = prepare(tabulate(build(moved, bundles), given), progress)
     return engine, consistent_start(engine)

@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.paths import TREE
+from flexclear.pipeline.core.file_dependencies import note
 from flexclear.pipeline.post.figures import measured
 from flexclear.pipeline.post.figures.measured import SEPARATION, SLIGHT, Data, difference, mode_set
 from flexclear.pipeline.post.figures.table10 import ratios
@@ -324,6 +325,7 @@ def _ratio(value: float) -> str:
 
 def _becomes_chaotic(data: Data) -> Outcome:
     """Periodic without clearance is a matter of course; quasi-periodic with it, chaotic with the rod's modes too."""
+    note(SECTIONS)
     if not SECTIONS.is_file():
         return _one_stroke(data)
     with SECTIONS.open(newline="", encoding="utf-8") as file:

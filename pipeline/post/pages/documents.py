@@ -7,6 +7,8 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
+from flexclear.pipeline.core.file_dependencies import note
+
 #: what generated pages put around what they measured
 COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
 
@@ -17,6 +19,7 @@ def section(page: Path, headings: Sequence[str] = (), pictures: Sequence[str] | 
     headings: only what is below these; "" is what is before the first of them.  pictures: endings of the
     names of those that are shown; default: all.
     """
+    note(page)
     if not page.is_file():
         return ""
     parts = _parts(COMMENT.sub("", page.read_text(encoding="utf-8")))
@@ -50,6 +53,7 @@ def _pictures(text: str, folder: Path, requested: Sequence[str] | None) -> str:
         path = folder / name
         if not path.is_file() or (requested is not None and not name.endswith(tuple(requested))):
             return ""
+        note(path)
         data = base64.b64encode(path.read_bytes()).decode()
         return f"<figure class='plot'><img src='data:image/png;base64,{data}' alt='{alt}'></figure>"
 

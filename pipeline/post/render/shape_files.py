@@ -7,9 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.external_files import mesh as foreign_mesh
-from flexclear.pipeline.core.external_files.checks import require_mesh
-from flexclear.pipeline.core.external_files.isolated import UnreadableError
+from flexclear.pipeline.core.external_files import read_mesh
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.surfaces import Surface
 
@@ -24,17 +22,10 @@ _SIDES = {
 
 def read(path: Path, unit: float) -> Surface:
     """A surface from a file that meshio reads; tetrahedra and hexahedra give their boundary."""
-    require_mesh(path, f"{path}", LARGEST)
-    try:
-        mesh = foreign_mesh.read(path)
-    except UnreadableError as error:
-        raise InputError(
-            f"{path}", f"is no surface that can be drawn: {error}", "give an STL, VTK, PLY or OBJ file"
-        ) from None
+    remedy = "give an STL, VTK, PLY or OBJ file"
+    mesh = read_mesh(path, f"{path}", "is no surface that can be drawn", remedy, LARGEST)
     faces = []
     for block in mesh.cells:
-        if block.data.ndim != 2:
-            continue  # polygons
         if block.type in ("triangle", "quad"):
             faces.append(surfaces.triangulated(block.data.astype(int)))
         elif block.type in _SIDES:

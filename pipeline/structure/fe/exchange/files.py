@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
+import bz2
 import csv
+import gzip
+import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.errors import FlexclearError, InputError, shown
-from flexclear.pipeline.core.external_files import archive
-from flexclear.pipeline.core.external_files.checks import require_file
-from flexclear.pipeline.core.external_files.isolated import UnreadableError
-from flexclear.pipeline.structure.fe.exchange import market
-from flexclear.pipeline.structure.fe.exchange.market import COPIES, SMALLER
+from flexclear.pipeline.core import machine
+from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.external_files import reading, require_file
 from flexclear.pipeline.structure.fe.model import Model
 
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz", "internal")
 COLUMNS = ("node", "x", "y", "z", "component")
 #: bodies with more unknowns are exported without their integrals, which are then taken from the mass matrix
 MOMENTS_UP_TO = 1500
+#: what a file holds is in memory so many times while it is checked and brought into SI units
+COPIES = 4.0
+SMALLER = "condense the body, or leave out what no frame needs"
+OPENERS: dict[str, Callable[..., TextIO]] = {".gz": gzip.open, ".bz2": bz2.open}
 
 
 @dataclass(frozen=True)
@@ -104,8 +110,8 @@ def moments(model: Model) -> dict[str, Any]:
 def read_npz(path: Path, where: str) -> Contents:
     """A file as `write_npz` makes it; InputError when something is missing."""
     require_file(path, where)
-    try:
-        data = archive.read(path, where, COPIES, SMALLER)
+    with reading(path, where, f"'{path.name}' holds no matrices", "write it with exchange.files"):
+        data = _unpacked(path, where)
         content = Table(
             _array(data, "node", "iu"), _array(data, "component", "iu"), _array(data, "position", "iuf", (None, 3))
         )
@@ -120,12 +126,16 @@ def read_npz(path: Path, where: str) -> Contents:
             matrices.append(sp.coo_array((_array(data, f"{name}_value", "iuf"), (row, column)), shape=(n, n)))
         for name in list(data):
             data[name] = _array(data, name, "iuf", None)
-    except FlexclearError:
-        raise
-    except Exception as error:  # what arrays are lacking or do not fit makes NumPy and SciPy fail in many ways
-        reason = shown(str(error) or type(error).__name__)
-        raise InputError(where, f"'{path.name}' holds no matrices: {reason}", "write it with exchange.files") from None
     return Contents(matrices[0], matrices[1], content, data)
+
+
+def _unpacked(path: Path, where: str) -> dict[str, np.ndarray]:
+    """All arrays of an npz file by name; pickled objects, which would be code, are refused."""
+    with zipfile.ZipFile(path) as packed:
+        need = COPIES * sum(entry.file_size for entry in packed.infolist())
+    machine.require_memory(need, f"{where}: '{path.name}' unpacked", SMALLER)
+    with np.load(path, allow_pickle=False) as file:
+        return {name: file[name] for name in file.files}
 
 
 def _array(
@@ -157,11 +167,46 @@ def read_matrix_market(stiffness: Path, mass: Path, unknowns: Path, where: str) 
 
 
 def _matrix(path: Path, where: str) -> sp.coo_array:
+    """A real matrix in a MatrixMarket file: coordinates or array, general or symmetric.
+
+    `scipy.io.mmread` (1.17) ends the process where a file was cut or a bit of it flipped: NumPy reads the numbers.
+    """
     require_file(path, where)
-    try:
-        return market.read(path, where)
-    except UnreadableError as error:
-        raise InputError(where, f"'{path.name}' is no MatrixMarket file: {error}") from None
+    with reading(path, where, f"'{path.name}' is no MatrixMarket file"):
+        rows, columns, count, layout, field, symmetry = scipy.io.mminfo(path)
+        if field not in ("real", "integer", "double") or symmetry not in ("general", "symmetric"):
+            raise ValueError(f"its header says {field} {symmetry}; known: real or integer, general or symmetric")
+        machine.require_memory(COPIES * 24.0 * count, f"{where}: '{path.name}'", SMALLER)
+        with OPENERS.get(path.suffix, open)(path, "rt", encoding="utf-8") as file:
+            next(line for line in file if line.strip() and not line.startswith("%"))  # the sizes
+            # one more than there should be: packed files have no end that follows from their size
+            held = np.loadtxt(file, comments="%", ndmin=2, max_rows=count + 1)
+        if layout == "array":
+            return _dense(held.ravel(), rows, columns, symmetry == "symmetric")
+        return _sparse(held, rows, columns, count, symmetry == "symmetric")
+
+
+def _sparse(held: np.ndarray, rows: int, columns: int, count: int, symmetric: bool) -> sp.coo_array:
+    """The matrix with these lines of row, column and value; of a symmetric one they are one triangle."""
+    if len(held) != count or (count and held.shape[1] != 3):
+        raise ValueError(f"it holds {len(held)} entries where its header says {count}")
+    index = held[:, :2].T - 1
+    if not ((index >= 0) & (index < np.array([[rows], [columns]])) & (index == np.floor(index))).all():
+        raise ValueError(f"an entry lies outside of its {rows} x {columns}")
+    matrix = sp.coo_array((held[:, 2], index.astype(np.int64)), shape=(rows, columns))
+    return sp.coo_array(matrix + sp.tril(matrix, -1).T + sp.triu(matrix, 1).T) if symmetric else matrix
+
+
+def _dense(value: np.ndarray, rows: int, columns: int, symmetric: bool) -> sp.coo_array:
+    """The matrix with these columns, one after the other; of a symmetric one their parts below the diagonal."""
+    if symmetric and rows == columns and len(value) == rows * (rows + 1) // 2:
+        column, row = np.triu_indices(rows)
+        whole = np.zeros((rows, columns))
+        whole[row, column] = whole[column, row] = value
+        return sp.coo_array(whole)
+    if symmetric or len(value) != rows * columns:
+        raise ValueError(f"it holds {len(value)} entries, which do not fill {rows} x {columns}")
+    return sp.coo_array(value.reshape(columns, rows).T)
 
 
 def _component(text: str) -> int:
@@ -174,10 +219,12 @@ def _component(text: str) -> int:
 def _table(path: Path, where: str, count: int) -> Table:
     """The table of so many rows; one more is read, so that a longer one is noticed."""
     require_file(path, where)
-    try:
-        rows = market.read_unknowns(path, count)
-        component = np.array([_component(text) for text in rows["component"]])
-    except ValueError as error:
-        hint = f"a line `{','.join(COLUMNS)}`, then one per row of the matrices; components: {', '.join(COMPONENTS)}"
-        raise InputError(where, f"'{path.name}' is no table of unknowns: {error}", hint) from None
-    return Table(rows["node"], component, rows["position"])
+    hint = f"a line `{','.join(COLUMNS)}`, then one per row of the matrices; components: {', '.join(COMPONENTS)}"
+    with (
+        reading(path, where, f"'{path.name}' is no table of unknowns", hint),
+        path.open(encoding="utf-8", newline="") as file,
+    ):
+        rows = list(islice(csv.DictReader(file, skipinitialspace=True), count + 1))
+        position = np.array([[float(row[axis]) for axis in "xyz"] for row in rows]).reshape(-1, 3)
+        component = np.array([_component(row["component"]) for row in rows])
+        return Table(np.array([int(row["node"]) for row in rows], dtype=np.int64), component, position)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.external_files import mesh as foreign_mesh
-from flexclear.pipeline.core.external_files.checks import require_mesh
-from flexclear.pipeline.core.external_files.isolated import UnreadableError
-from flexclear.pipeline.core.external_files.mesh import Mesh
+from flexclear.pipeline.core.external_files import read_mesh
 from flexclear.pipeline.core.units import UNITS
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
+
+if TYPE_CHECKING:
+    from meshio import Mesh
 
 #: names of types by meshio's
 NAMES = {element.cell: name for name, element in ELEMENTS.items()}
@@ -23,13 +24,13 @@ FACES = ("triangle", "triangle6", "triangle7", "quad", "quad8", "quad9")
 BESIDES = ("vertex", "line", "line3", *FACES)
 #: an integer array of cell data with more values than this numbers the cells and names no regions
 MOST_REGIONS = 1000
-HDF5 = "MED and other formats in HDF5 need h5py: pip install 'flexclear[med]'"
 REWRITE = "write it again, only its solid cells and named sets, or as VTU or Gmsh"
 
 
 def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
     """The mesh in a file; InputError when it cannot be read, has no solid cells or several types of them."""
-    mesh = _read(folder / shape.file, where)
+    path = folder / shape.file
+    mesh = read_mesh(path, where, f"meshio cannot read '{path.name}'", REWRITE)
     name = _cell_type(mesh, where)
     scale = UNITS[shape.length_unit][0]
     solid = [k for k, block in enumerate(mesh.cells) if block.type == name]
@@ -40,15 +41,6 @@ def read(shape: MeshFile, folder: Path, where: str) -> Geometry:
     cell_regions, node_regions = _regions(mesh, solid, renumber)
     nodes = scale * _points(mesh, where)[used]
     return Geometry(NAMES[name], nodes, inverse.reshape(cells.shape), node_regions, cell_regions)
-
-
-def _read(path: Path, where: str) -> Mesh:
-    require_mesh(path, where)
-    try:
-        return foreign_mesh.read(path)
-    except UnreadableError as error:
-        remedy = HDF5 if "'h5py'" in str(error) else REWRITE
-        raise InputError(where, f"meshio cannot read '{path.name}': {error}", remedy) from None
 
 
 def _cell_type(mesh: Mesh, where: str) -> str:
