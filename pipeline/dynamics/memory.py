@@ -13,7 +13,8 @@ names of their fields (`named`), and rows of the record by what they hold (`reco
 ``m.LINKS.parent`` where a field begins in a row of it.
 
 Arrays are flat, because call and compilation cost what the arguments cost.  No two overlap, and the compiler knows:
-what a kernel has read from h stays read, whatever it writes into w.  So a kernel that writes never gets one of them twice.
+what a kernel has read from h stays read, whatever it writes into w.  So a kernel that writes never gets one of them
+twice.
 
 Words: a *link* is a body after rigidly joined ones are merged (link 0 is the ground). A *site* is a frame on a link
 that a joint, closure, contact or load uses. A *port* is a site on a flexible link. A *coordinate* is one generalised
