@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene import provenance
@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
 
+#: of one kind: datasets or labelled arrays
+Data = TypeVar("Data")
 #: limits of a scene that is made again without its own: what it asks for was judged when it was read
 JUDGED = {"rows": sys.maxsize, "members": sys.maxsize}
 
@@ -94,7 +96,7 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
         return {"nc": dynamics.ensemble(scene, bundles(inputs), progress)}
 
 
-def bundles(inputs: Mapping[str, Labelled]) -> dict[str, Labelled]:
+def bundles(inputs: Mapping[str, Data]) -> dict[str, Data]:
     """The inputs called ``bundle/<body>``, by body."""
     return {name.removeprefix("bundle/"): data for name, data in inputs.items() if name.startswith("bundle/")}
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.effect_size import Influence, influence, recorded, with_members
@@ -71,7 +70,7 @@ class Pilots:
 
     scene: Scene
     bundles: Mapping[str, Labelled]
-    fewer: Sequence[Mapping[str, xr.Dataset]]
+    fewer: Sequence[Mapping[str, Labelled]]
     filled: Callable[[Scene], Scene]
     chosen: Sequence[Quantity]
     progress: Progress

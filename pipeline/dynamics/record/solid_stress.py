@@ -14,13 +14,13 @@ from flexclear.pipeline.core.algebra import skew, von_mises
 from flexclear.pipeline.dynamics.record.body_loads import Motion
 
 if TYPE_CHECKING:
-    import xarray as xr
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: components of stress that are held at once; bounds the memory
 AT_ONCE = 10_000_000
 
 
-def factors(bundle: xr.Dataset, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
+def factors(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
     """What each field of a solid's bundle is multiplied by, in SI, shape (time, field).
 
     moment, force: as `body_loads.motion_and_loads` returns them.
@@ -35,7 +35,7 @@ def factors(bundle: xr.Dataset, motion: Motion, moment: np.ndarray, force: np.nd
     return np.hstack([motion.q, loads.reshape(rows, -1), motion.a, slope.reshape(rows, 9), motion.du])
 
 
-def gauge_nodes(bundle: xr.Dataset) -> dict[str, np.ndarray]:
+def gauge_nodes(bundle: Labelled) -> dict[str, np.ndarray]:
     """Nodes of the whole surface, by the empty name, where stress is none of an artefact; and of each gauge."""
     nodes = {"": np.flatnonzero(bundle["node_doubtful"].values == 0)}
     for k, name in enumerate(bundle["gauge"].values.tolist()):
