@@ -65,6 +65,8 @@ def command(options: argparse.Namespace) -> None:
         return
     if options.drive is not None:
         raise InputError("--drive", "belongs to a Campbell diagram", "add --speeds, e.g. 0:500rpm:50")
+    if any(target.suffix in PICTURES for target in options.out or ()):
+        raise InputError("--out", "pictures are of Campbell diagrams", "add --speeds, e.g. 0:500rpm:50")
     targets = _targets(options, ())
     modes = run.linear(graph.scene, time, moving=options.moving, workplace=open_workplace(options))
     print(as_json.as_json(modes) if options.json else text(modes).rstrip("\n"))

@@ -235,16 +235,21 @@ class Graph:
             raise InputError(where, f"there is no {name} of {whose}", suggestion(body, tasks))
         return tasks[body]
 
-    def tighter(self, run: Mapping[str, Any]) -> Task:
-        """The same run at a tighter tolerance, or of half the step where steps are fixed, to determine its error.
+    @cached_property
+    def tight(self) -> Task:
+        """The same run at a tighter tolerance, or of half the step where steps are fixed, to determine its error."""
+        return self._tighter(self.scene.solver.integrator, self.scene.solver.rtol, {"accuracy": None})
 
-        run: attributes of the dataset of the run.  The other one may take MOST times its evaluations.
-        """
+    def tighter(self, run: Mapping[str, Any]) -> Task:
+        """`tight` for a run, given by the attributes of its dataset, that may take MOST times its evaluations."""
         solver = self.scene.solver
         most = min(max(MOST * int(run["evaluations"]), LEAST), solver.evaluations)
-        change: dict[str, object] = {"solver.evaluations": most, "accuracy": None}
+        change = {"solver.evaluations": most, "accuracy": None}
+        return self._tighter(*of_run(solver, self.scene.by_need(), run), change)
+
+    def _tighter(self, integrator: str, rtol: float, change: dict[str, object]) -> Task:
+        solver = self.scene.solver
         if solver.step is None:
-            integrator, rtol = of_run(solver, self.scene.by_need(), run)
             change |= {"solver.integrator": integrator, "solver.rtol": max(TIGHTER * rtol, TIGHTEST)}
         else:
             change["solver.step"] = 0.5 * solver.step

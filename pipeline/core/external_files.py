@@ -151,6 +151,8 @@ def companions(path: Path) -> list[Path]:
         return sorted(path.parent.glob(f"{glob.escape(path.stem)}_*.xml"))
     if path.suffix not in _NAMED:
         return []
-    named = [Path(name.strip()) for name in _NAMED[path.suffix].findall(path.read_text("utf-8", errors="replace"))]
+    named = [
+        Path(name.strip()) for name in _NAMED[path.suffix].findall(path.read_text(encoding="utf-8", errors="replace"))
+    ]
     # as meshio finds them: from the folder of the process, if they are there
     return [name if name.exists() and path.suffix == ".inp" else path.parent / name for name in dict.fromkeys(named)]

@@ -7,6 +7,11 @@ from collections.abc import Callable
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
+@kernel
+def nothing(d):
+    """Do what the parts do of which a mechanism has none."""
+
+
 def choose(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
     """chosen(kind, *arguments) over the kernels of the kinds, numbered from `first`."""
     head = kernels[0]

@@ -101,7 +101,7 @@ def test_inertia_of_the_rod_is_that_of_table_1() -> None:
 @pytest.mark.parametrize(
     "change, message",
     [
-        ({"on": {"region": "strat"}}, r"\[frames.top.on\].region: no region is called 'strat'\n.*'start'"),
+        ({"on": {"region": "strat"}}, r"\[frames.top.on.region\]: no region is called 'strat'\n.*'start'"),
         ({"on": {"plane": {"point": [240.0, 0, 0], "normal": [1, 0, 0]}}}, r"selects no node; .*\n.*units"),
         ({"on": {"cylinder": {"point": [0, 0, 0], "axis": [1, 0, 0], "radius": 0.02}}}, "selects no node"),
         ({"on": {"region": "start"}}, "'bottom' and 'top' tie the same nodes rigidly"),

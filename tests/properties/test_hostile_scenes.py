@@ -53,7 +53,7 @@ HOSTILE: dict[str, tuple[str, ...]] = {
     "body = [1, 2]": ("[body]", "expected a table", "[body.NAME]"),
     "body = 3": ("[body]", "expected a table"),
     BASE.replace("crank.A", "crankA"): ("[joint.A.between.1]", "body.FRAME"),
-    BASE.replace('"ground.O", ', ""): ("[joint.A.between.1]", "is missing"),
+    BASE.replace('"ground.O", ', ""): ("[joint.A.between]", "has 1 entry, and needs at least 2"),
     BASE.replace("mass = 1.0", "mass = nan"): ("[body.crank.mass]", "not a finite number"),
     BASE.replace("mass = 1.0", "mass = 1e300"): ("[body.crank.mass]", "beyond what can be computed with"),
     BASE.replace("mass = 1.0", "mas = 1.0"): ("[body.crank.mas]", "unknown key", "did you mean 'mass'?"),

@@ -10,11 +10,12 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
+from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
 from flexclear.pipeline.dynamics.equations.named_bodies import OF_BODIES, SIZE, put_bodies, put_frames
 from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
 from flexclear.pipeline.dynamics.equations.projection import BLIND, keep_scales, largest, open_by
-from flexclear.pipeline.dynamics.equations.right_hand_side import make_forces, nothing, spread_state
+from flexclear.pipeline.dynamics.equations.right_hand_side import make_forces, spread_state
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, add_wrench, dot, put, scale

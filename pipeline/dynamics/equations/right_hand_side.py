@@ -11,16 +11,12 @@ from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
+from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
 from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO
-
-
-@kernel
-def nothing(d):
-    """Stands for the forces of parts that a mechanism does not have."""
 
 
 @kernel

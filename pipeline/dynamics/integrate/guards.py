@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate.stepper import none_closed
+from flexclear.pipeline.dynamics.integrate.poses import never
 from flexclear.pipeline.dynamics.integrate.within_step import make_evaluate_at, make_locate, make_repeat
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub
@@ -220,5 +220,5 @@ def make_resolve_events(
 
 
 #: `events` of such scenes, as `contact_events.located` gives them, and what that takes where there are contacts as well
-GUARDS = (note_start, make_resolve_events, none_closed)
+GUARDS = (note_start, make_resolve_events, never)
 AMONG_CONTACTS = (note_start, note_end, accept, make_end_on_guard)

@@ -33,6 +33,12 @@ class Poses:
 
 
 @kernel
+def never(d):
+    """No polynomial lies ready; no contact is closed."""
+    return False
+
+
+@kernel
 def note_nothing(d):
     """No closure."""
 
@@ -46,12 +52,6 @@ def stand_anywhere(d, t):
 def step_as_planned(d, t):
     """No pose to stop before."""
     return d.step
-
-
-@kernel
-def never_ready(d):
-    """No polynomial."""
-    return False
 
 
 @kernel
@@ -88,7 +88,7 @@ NO_POSES = Poses(
     note_nothing,
     stand_anywhere,
     step_as_planned,
-    never_ready,
+    never,
     nothing_done,
     make_foresee_nothing,
     make_along_nothing,

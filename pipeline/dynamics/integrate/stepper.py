@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.projection import keep_scales, largest
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.integrate.norms import finite
-from flexclear.pipeline.dynamics.integrate.poses import NO_POSES, Poses
+from flexclear.pipeline.dynamics.integrate.poses import NO_POSES, Poses, never
 from flexclear.pipeline.dynamics.integrate.recording import (
     hold_modes,
     holds_outputs,
@@ -56,12 +56,6 @@ def watch_nothing(d):
     """Do nothing: neither contacts nor guards are there."""
 
 
-@kernel
-def none_closed(d):
-    """No contact to be closed."""
-    return False
-
-
 def make_end_nowhere(evaluate_at: Callable, extend: Callable, repeat: Callable) -> Callable:
     """The kernel end_on_guard of scenes without guards (`guards.make_end_on_guard`)."""
 
@@ -85,7 +79,7 @@ def make_no_events(evaluate: Callable, attempt: Callable, extend: Callable, proj
 #: `guards.AMONG_CONTACTS` of scenes without guards
 NO_GUARDS = (watch_nothing, watch_nothing, watch_nothing, make_end_nowhere)
 #: `events` of scenes without contacts and guards
-NO_CONTACTS = (watch_nothing, make_no_events, none_closed)
+NO_CONTACTS = (watch_nothing, make_no_events, never)
 
 
 def make_advance(

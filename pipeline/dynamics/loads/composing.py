@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
@@ -15,11 +16,6 @@ def make_loads(kinds: tuple[Any, ...]) -> Callable:
 
 def _in_order(kernels: tuple[Callable, ...], first: int = 0) -> Callable:
     if not kernels:
-
-        @kernel
-        def nothing(d):
-            """No kind is left."""
-
         return nothing
     head, tail = kernels[0], _in_order(kernels[1:], first + 1)
 

@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics.run.engine import Engine
 TRIAL, HOPELESS = 400_000, 10_000_000
 #: a scene that leaves its integration open is run at the default tolerance where that takes no more evaluations than
 #: this, which are some seconds; they are predicted from so many on
-AFFORDABLE, EVERY = 1_500_000, 100_000
+AFFORDABLE, EARLIEST = 1_500_000, 100_000
 #: tolerance of dear runs that none is compared with: members start a hundredth of a micrometre apart
 UNVERIFIED = 1e-7
 
@@ -41,11 +41,11 @@ class Look(NamedTuple):
 class Judge:
     """Who looks at a run now and then, whether another method should continue with it.
 
-    every: evaluations between two looks.  verdict: why another one should, or nothing; given the looks so far, too, of
-    which the first is where the method began and the last the present one.
+    every: evaluations between two looks; None: as often as the run pauses.  verdict: why another one should, or nothing;
+    given the looks so far, of which the first is where the method began and the last the present one.
     """
 
-    every: int
+    every: int | None
     verdict: Callable[[Engine, Sequence[Look]], str]
 
 
@@ -107,7 +107,7 @@ def affordable(scene: Scene) -> Judges | None:
     """
     if scene.accuracy is not None or not scene.solver.by_need:
         return None
-    return Judges({DEFAULT: (Judge(EVERY, _dear), "")}, {})
+    return Judges({DEFAULT: (Judge(None, _dear), STIFF)}, {})
 
 
 def unverified(scene: Scene) -> Scene:
@@ -118,7 +118,7 @@ def unverified(scene: Scene) -> Scene:
 def _dear(engine: Engine, looks: Sequence[Look]) -> str:
     now = looks[-1]
     whole = now.evaluations + pace(looks, TRIAL) * (engine.end - now.time)
-    if whole > AFFORDABLE:
+    if now.evaluations >= EARLIEST and whole > AFFORDABLE:
         rtol = engine.model.scene.solver.rtol
         raise DearError(f"{DEFAULT} would take some {whole:.1g} evaluations at a relative tolerance of {rtol:g}")
-    return ""
+    return crawls(engine, looks)

@@ -299,7 +299,7 @@ def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: P
     n, control = engine.n, engine.control
     while True:
         if n[m.EVALUATIONS] >= n[m.BUDGET]:  # segments may be so short that no pause falls into one
-            n[m.BUDGET] = n[m.EVALUATIONS] + judge.every
+            n[m.BUDGET] = n[m.EVALUATIONS] + (judge.every or SLICE)
         engine.advance(tape.outputs, tape.rows, tape.events)
         t = float(control[m.TIME])
         progress((t - engine.start) / control[m.SPAN], f"t = {t:.5f} s, {n[m.EVALUATIONS]} evaluations")
