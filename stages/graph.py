@@ -247,8 +247,8 @@ class Graph:
         change = {"solver.evaluations": most, "accuracy": None}
         return self._tighter(*of_run(solver, self.scene.by_need(), run), change)
 
-    def _tighter(self, integrator: str, rtol: float, change: dict[str, object]) -> Task:
-        solver = self.scene.solver
+    def _tighter(self, integrator: str, rtol: float, limits: Mapping[str, object]) -> Task:
+        solver, change = self.scene.solver, dict(limits)
         if solver.step is None:
             change |= {"solver.integrator": integrator, "solver.rtol": max(TIGHTER * rtol, TIGHTEST)}
         else:

@@ -19,7 +19,7 @@ from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.effects import schemes
 from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.pipeline.dynamics.run import progress_rate
+from flexclear.pipeline.dynamics.run import progress_rate, trajectory
 from flexclear.pipeline.dynamics.run.accuracy import FINER, Attempt, Search
 from flexclear.pipeline.dynamics.run.method_selection import Rates, Suit
 from flexclear.pipeline.dynamics.run.progress_rate import Look, limited, pace
@@ -71,7 +71,8 @@ def test_a_scene_without_solver_and_accuracy_runs_at_the_default_tolerance_where
 
 def test_where_that_is_dear_it_is_as_exact_as_a_thousandth_of_each_range(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress_rate, "AFFORDABLE", 500)
-    monkeypatch.setattr(progress_rate, "EVERY", 200)
+    monkeypatch.setattr(progress_rate, "EARLIEST", 200)
+    monkeypatch.setattr(trajectory, "SLICE", 200)
     said: list[str] = []
     scene = load_scene(RINGING, {**SHORT, "solver.by_need": True})
     run = simulated(scene, said)
@@ -88,7 +89,8 @@ def test_dear_points_and_members_have_the_tolerance_of_runs_that_none_is_compare
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(progress_rate, "AFFORDABLE", 500)
-    monkeypatch.setattr(progress_rate, "EVERY", 200)
+    monkeypatch.setattr(progress_rate, "EARLIEST", 200)
+    monkeypatch.setattr(trajectory, "SLICE", 200)
     scene = load_scene(RIGID, {**SHORT, "solver.by_need": True})
     given = load_scene(RIGID, {**SHORT, "solver.integrator": "radau", "solver.rtol": progress_rate.UNVERIFIED})
     speed = recorded_quantities(scene.owners(), [parse("platform.velocity", scene.owners())])

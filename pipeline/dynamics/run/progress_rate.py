@@ -41,8 +41,8 @@ class Look(NamedTuple):
 class Judge:
     """Who looks at a run now and then, whether another method should continue with it.
 
-    every: evaluations between two looks; None: as often as the run pauses.  verdict: why another one should, or nothing;
-    given the looks so far, of which the first is where the method began and the last the present one.
+    every: evaluations between two looks; None: as often as the run pauses.  verdict: why another one should, or
+    nothing; given the looks so far, of which the first is where the method began and the last the present one.
     """
 
     every: int | None
