@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.specialised import specialise
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.dynamics.specialise import straight
+from flexclear.pipeline.dynamics.specialise import straight as straight_code
 from flexclear.pipeline.dynamics.specialise.code import Emitter
 from flexclear.pipeline.dynamics.specialise.straight import program
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
@@ -70,7 +70,7 @@ def apart(model: Model, one: np.ndarray, other: np.ndarray) -> float:
 
 def test_what_would_be_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     model = tabulate(build(load_scene(TREE / "scenes/checks/pendulum.toml"), {}))
-    monkeypatch.setattr(straight, "LONGEST", 10)
+    monkeypatch.setattr(straight_code, "LONGEST", 10)
     with pytest.raises(UnsuitedError, match="too long"):
         program(rates_kernel(model), wiring(model.arrays, model.arrays.work_space(lambda _: m.Room(2, 0, 0)).h))
 
