@@ -52,12 +52,19 @@ def test_threads_that_somebody_asks_for_do_not_change_bytes(root: Path):
     assert done.stdout.strip() == "['1', '1']"
 
 
+def forget(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Load code from disk again, as a new process does."""
+    monkeypatch.setattr(files, "loaded", {})
+    monkeypatch.setattr(functions, "loaded", files.loaded)
+
+
 def test_what_was_compiled_before_a_run_is_all_that_it_calls(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Also by the methods among which it chooses; the usual kinds are compiled where no scene is named."""
     monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     monkeypatch.setattr(ahead, "USUAL", ("pendulum",))
+    forget(monkeypatch)  # what is in memory may have been pruned from the disk by now
     assert main(["doctor", "--compile"]) == 0
     assert not (tmp_path / "results").exists()
     scene = new.write("pendulum", tmp_path)[0]
@@ -68,8 +75,7 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(
         raise AssertionError(f"{path.name} was to be there")
 
     monkeypatch.setattr(files, "_compile", refused)
-    monkeypatch.setattr(files, "loaded", {})
-    monkeypatch.setattr(functions, "loaded", files.loaded)
+    forget(monkeypatch)
     assert main(["run", str(scene), "--to", "simulate", "-q"]) == 0
 
 
