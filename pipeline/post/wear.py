@@ -62,7 +62,7 @@ def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Variables:
 
 
 def _area(joint: dict[str, Any], side: str) -> float:
-    """Area of a surface [m^2]; half a sphere is not told from a whole one."""
+    """Area of a surface [m^2]; half a sphere is not distinguished from a whole one."""
     widened = float(joint["clearance"]) if side == "outer" else 0.0
     if "ball_radius" in joint:
         return float(4.0 * np.pi * (joint["ball_radius"] + widened) ** 2)

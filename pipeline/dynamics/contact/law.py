@@ -1,4 +1,4 @@
-"""A normal law with its numbers, and the family of laws that a factor of hysteresis tells apart."""
+"""A normal law with its numbers, and the family of laws that a factor of hysteresis distinguishes."""
 
 from __future__ import annotations
 

@@ -12,9 +12,9 @@ from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.dynamics.contact.law import Resolved
 
-#: above this share of the inner radius a contact is no longer small and Hertz's theory ends
+#: above this fraction of the inner radius a contact is no longer small and Hertz's theory ends
 SMALL = 0.3
-#: above this share of the inner radius a penetration is no local indentation any more, whatever the law
+#: above this fraction of the inner radius a penetration is no local indentation any more, whatever the law
 SHALLOW = 0.1
 
 

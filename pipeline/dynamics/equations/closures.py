@@ -22,7 +22,7 @@ from flexclear.pipeline.dynamics.equations.envelope import backward, factor, for
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, accumulate, add, at, axis, cross, dot, dot_wrench, scale, sub
 
-#: pivots of J M^-1 J^T below this share of their diagonal mean a singular configuration
+#: pivots of J M^-1 J^T below this fraction of their diagonal mean a singular configuration
 SINGULAR_PIVOT = 1e-13
 
 
@@ -146,7 +146,7 @@ def couple_all(d):
 
 @kernel
 def independence(d):
-    """Smallest pivot of J M^-1 J^T as share of the largest that its row's diagonal entry has been on the way."""
+    """Smallest pivot of J M^-1 J^T as a fraction of the largest that its row's diagonal entry has been on the way."""
     most = 1.0
     for r in range(d.n_kept_rows):
         inverse = d.schur[d.closure_envelope[r].origin + r]

@@ -26,7 +26,7 @@ def base(h, e, a, i):
 def factor(h, e, w, a, n, threshold):
     """Overwrite a symmetric matrix with its factor L, reciprocals on the diagonal; whether it is one.
 
-    It is not, and unusable, where a pivot is at most this share of its diagonal entry before elimination: the matrix
+    It is not, and unusable, where a pivot is at most this fraction of its diagonal entry before elimination: the matrix
     is not positive definite to working precision.
     """
     sound = True

@@ -53,11 +53,12 @@ from flexclear.pipeline.dynamics.vectors import (
     turn_back,
 )
 
-#: Newton's iterations for the loads; the change of a load, as share of the largest, at which they end, and below which
+#: Newton's iterations for the loads; the change of a load, as a fraction of the largest, at which they end, and below
+#: which
 #: they end when it shrinks no more, near a jam, where rounding grows; in how many strides friction is turned on where
 #: they do not
 ITERATIONS, CONVERGED, ROUNDED, STRIDES = 30, 1e-13, 1e-9, 32
-#: below this share of their diagonal pivots of the slopes count as zero
+#: below this fraction of their diagonal pivots of the slopes count as zero
 SINGULAR_SLOPES = 1e-12
 
 
@@ -231,7 +232,7 @@ def load(d, e, M, F):
 
 @kernel
 def balance(d, share):
-    """Residuals of the bearings' loads, and their slopes, with a share of the friction's influence on the reactions."""
+    """Residuals of the bearings' loads, and their slopes, with part of the friction's influence on the reactions."""
     bearings = d.n_bearings
     for e in range(bearings):
         first = d.bearings[e].joint * (1 + bearings)

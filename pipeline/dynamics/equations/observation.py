@@ -26,7 +26,7 @@ ENERGY = m.layout("kinetic potential elastic")
 #: tolerance by which the loops of rows stay as they are, and nothing but frames is written
 AS_RECORDED = -1.0
 #: of so many rows one is closed first, and those between two of them start from what that changed there, where rows
-#: follow at distances in time that differ by no more than this share
+#: follow at distances in time that differ by no more than this fraction
 APART, EVEN = 4, 1e-6
 
 

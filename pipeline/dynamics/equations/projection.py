@@ -20,7 +20,7 @@ ITERATIONS = 8
 BLIND = 1e-8
 #: rounding may stop the residuals this far above a very tight tolerance
 ROUNDING = 1e3
-#: rows that are not solved for may open by this share of the mechanism's size: joints whose axes miss each other by
+#: rows that are not solved for may open by this fraction of the mechanism's size: joints whose axes miss each other by
 #: less than `model.rates.ZERO` count as redundant, and on the way they part by that much times some turns
 APART = 1e-6
 #: a gap is closed as if over this time [s]: modes with shorter periods follow by their stiffness, not by their mass
@@ -84,7 +84,7 @@ def no_modes(d, b):
 
 
 def make_stiffen(closures: Any) -> Callable:
-    """The kernel stiffen(d): the factors of an evaluation, with the modal stiffness beside the mass.
+    """The kernel stiffen(d): the factors of an evaluation, with the modal stiffness next to the mass.
 
     closures: kernels of all closures.
     """

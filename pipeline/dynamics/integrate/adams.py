@@ -25,7 +25,7 @@ LAST = rk4.STAGES
 # memory: number of slopes kept, their distance, then the slopes themselves, the latest first
 COUNT, DISTANCE, KEPT = range(3)
 MOST = 3
-#: steps whose lengths differ by less than this share are alike: rounding of times
+#: steps whose lengths differ by less than this fraction are alike: rounding of times
 ALIKE = 1e-8
 
 

@@ -29,12 +29,12 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 #: mode changes at one and the same time before the solver gives up (Zeno)
 MOST_IMMEDIATE = 200
-#: what a contact does in a small share of a step is not where the dense output of the whole step has it;
-#: the step is then repeated, at most so often, with this share of its length or more
+#: what a contact does in a small fraction of a step is not where the dense output of the whole step has it;
+#: the step is then repeated, at most so often, with this fraction of its length or more
 MOST_SHORTENED, SHORTER = 8, 0.1
-#: a contact that begins deeper than this share of its clearance, and so many tolerances, has been stepped over
+#: a contact that begins deeper than this fraction of its clearance, and so many tolerances, has been stepped over
 DEEP, ERRORS = 1e-6, 100.0
-#: share of its length by which a step may miss the event that it is to end on
+#: fraction of its length by which a step may miss the event that it is to end on
 CLOSE = 1e-6
 #: a contact that would end where it has just begun is looked at in shorter steps, down to one in which it moves by so
 #: many times what its gap is off zero

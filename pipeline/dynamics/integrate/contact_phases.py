@@ -17,7 +17,7 @@ from flexclear.pipeline.dynamics.integrate.recording import add_event, snapshot
 from flexclear.pipeline.dynamics.integrate.within_step import make_locate, make_maximum
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: share of the step over which trends at its end are measured; a force's peak nearer to the end than this is
+#: fraction of the step over which trends at its end are measured; a force's peak nearer to the end than this is
 #: the force at the end, to the square of this
 BACK = 1e-3
 
@@ -88,7 +88,7 @@ def make_follow_contacts(
 ) -> Callable:
     """The kernel follow_contacts(d, step, ready, rows, events) -> dense output ready?, after an accepted step.
 
-    evaluate_at(d, step, theta): evaluates the dense output at a share of the step.
+    evaluate_at(d, step, theta): evaluates the dense output at a fraction of the step.
     has_regimes: `regimes` or `no_regimes`.
     """
     last, spare, interpolate = method.last, method.slopes - 1, method.interpolate

@@ -106,7 +106,7 @@ def basis(d):
 # Exponential quadrature -----------------------------------------------------------------------------------------------
 @kernel
 def find_phi(d, j, step, theta):
-    """The phi functions of all oscillators at a share of the step, as of node j, and what the sources do there."""
+    """The phi functions of all oscillators at a fraction of the step, as of node j, and what the sources do there."""
     o, tau = basis(d), theta * step
     for i in range(count(d)):
         at = phi(d, j, i)
@@ -164,7 +164,7 @@ def add_term(d, j, tau, k, weight, source, factor):
 
 @kernel
 def cubic_share(theta, e):
-    """Integral of the cubic that is 1 at node e alone, from the start to a share of the step, in steps."""
+    """Integral of the cubic that is 1 at node e alone, from the start to a fraction of the step, in steps."""
     total, power = 0.0, theta
     for k in range(NODES):
         power *= theta
@@ -174,7 +174,7 @@ def cubic_share(theta, e):
 
 @kernel
 def advance_to(d, step, theta, j, out):
-    """State at a share of the step into w from place out, with the phi functions that stand at node j."""
+    """State at a fraction of the step into w from place out, with the phi functions that stand at node j."""
     first, tau = slope(d, 0), step * theta
     a, b, c = vector(d, DEPARTURE), vector(d, DEPARTURE + 1), vector(d, DEPARTURE + 2)
     wa, wb, wc = step * cubic_share(theta, 0), step * cubic_share(theta, 1), step * cubic_share(theta, 2)

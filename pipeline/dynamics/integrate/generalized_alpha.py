@@ -281,7 +281,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
 
     @kernel
     def line_search(d, step, norm):
-        """Take the correction, or the share of it that makes the residual less; what is left of it, or -1."""
+        """Take the correction, or the fraction of it that makes the residual less; what is left of it, or -1."""
         correction, new = vector(d, CORRECTION), vector(d, NEW)
         share, there = 1.0, 0.0
         for _ in range(MOST_HALVINGS):

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: rows of DENSE: coefficients of the powers of the share of the step
+#: rows of DENSE: coefficients of the powers of the fraction of the step
 ROWS = 4
 
 

@@ -26,9 +26,9 @@ from flexclear.pipeline.dynamics.equations.envelope import backward, forward
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot
 
-#: off-diagonal entries of this share of the diagonal ones' geometric mean are zero; sweeps, quadratically convergent
+#: off-diagonal entries of this fraction of the diagonal ones' geometric mean are zero; sweeps, quadratically convergent
 NOTHING, SWEEPS = 1e-13, 20
-#: oscillators below this share of the largest frequency are not stiff, and left alone
+#: oscillators below this fraction of the largest frequency are not stiff, and left alone
 SLOW = 1e-6
 #: largest change of a coordinate by which the positions' rates are asked for
 A_LITTLE = 1e-9

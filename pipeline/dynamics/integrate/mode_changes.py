@@ -16,21 +16,21 @@ from flexclear.pipeline.dynamics.integrate.within_step import NEAR
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot, sub
 
-#: a gap is zero below this share of the clearance plus this one, four roundings, of the mechanism's size: a difference
-#: of the sites' positions has no digits below, which matters where clearances are of micrometres
+#: a gap is zero below this fraction of the clearance plus this one, four roundings, of the mechanism's size: a
+#: difference of the sites' positions has no digits below, which matters where clearances are of micrometres
 ZERO_GAP, ROUNDING = 1e-12, 8.9e-16
 ROOT_ITERATIONS, TURN_ITERATIONS = 60, 40
-#: share of the step at which a contact changes its mode that does not
+#: fraction of the step at which a contact changes its mode that does not
 NEVER = 2.0
-#: the cubic through a step's ends is trusted to this share of its own departure from a straight line; in long steps of
-#: order 8 it is off by a tenth of that
+#: the cubic through a step's ends is trusted to this fraction of its own departure from a straight line; in long steps
+#: of order 8 it is off by a tenth of that
 TRUST = 0.2
-#: where it says that something may happen, the step is searched in stretches of at most this share; they are halved
-#: where the cubic through a stretch's ends misses its middle by more than this share of its departure, and of the
+#: where it says that something may happen, the step is searched in stretches of at most this fraction; they are halved
+#: where the cubic through a stretch's ends misses its middle by more than this fraction of its departure, and of the
 #: distance from which the mode change is reached (what lies behind it may be thousands of times larger), and while the
 #: ball travels more than its clearance, of which the gap may tell nothing
 WIDEST, FAITHFUL = 0.25, 0.05
-#: to this share: even the rate of a gap jumps where a ball passes the centre of its socket
+#: to this fraction: even the rate of a gap jumps where a ball passes the centre of its socket
 SHORTEST = 2.0**-13
 #: by more than a cubic, of this departure, may be lower between the quarters of its halves
 DIP = 0.05
@@ -94,8 +94,8 @@ def cubic_tells(d, c, step):
 def make_locate_change(evaluate_at: Callable) -> Callable:
     """The kernel locate_change(d, step, c), after `ends_tell` or `cubic_tells`.
 
-    It gives the share of the step where contact c changes its mode: 0 at once, NEVER not at all.
-    evaluate_at(d, step, theta): evaluates the dense output at a share of the step.
+    It gives the fraction of the step where contact c changes its mode: 0 at once, NEVER not at all.
+    evaluate_at(d, step, theta): evaluates the dense output at a fraction of the step.
     """
 
     @kernel
@@ -106,7 +106,7 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
 
     @kernel
     def turning_point(d, step, c, sign, low, high):
-        """Share of the step where sign * distance is first least, or where it is seen to be negative at once.
+        """Fraction of the step where sign * distance is first least, or where it is seen to be negative at once.
 
         With sign -1 the distance rises from zero and is negative at the end: wherever it is seen negative, its first
         rise and fall lie before, whatever it does after.
@@ -133,7 +133,7 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
 
     @kernel
     def root(d, step, c, low, high):
-        """Share of the step where the distance falls through zero, given > 0 at low and < 0 at high."""
+        """Fraction of the step where the distance falls through zero, given > 0 at low and < 0 at high."""
         theta, enough = 0.5 * (low + high), 1e-3 * zero_gap(d, c)
         for _ in range(ROOT_ITERATIONS):
             value, rate = distance_at(d, step, theta, c)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: what is left may be this share of the tolerance, or ten roundings if that is more
+#: what is left may be this fraction of the tolerance, or ten roundings if that is more
 SHARE, ROUNDING = 1e-2, 2.2e-15
 #: a first correction this far below the limit needs no second one to know how fast they fall
 SMALL = 1e-3

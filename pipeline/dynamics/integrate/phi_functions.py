@@ -21,7 +21,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 COUNT = 5
 #: below this a + b the series of phi_4 is taken, and the others from it: upwards, division by a leaves rounding
 SERIES, TERMS = 1.0, 14
-#: where (b / 2)^2 - a is more, two decays are told from each other; where it is less, a is not small
+#: where (b / 2)^2 - a is more, two decays are distinguished; where it is less, a is not small
 APART = 0.0625
 #: even order to which sine and cosine are expanded in between
 ALIKE = 12

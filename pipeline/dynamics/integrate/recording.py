@@ -11,13 +11,14 @@ from collections.abc import Callable
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: recorded states are projected to this share of rtol times the mechanism's size; to more of a loose rtol, up to the
-#: second share, as it grows by so many times rtol: what a run left open itself need not cost an evaluation in every row
+#: recorded states are projected to this fraction of rtol times the mechanism's size; to more of a loose rtol, up to the
+#: second fraction, as it grows by so many times rtol: what a run left open itself need not cost an evaluation in every
+#: row
 RECORD_SHARE, MOST_SHARE, LOOSER = 1e-3, 0.1, 1e3
 
 
 def record_share(rtol: float) -> float:
-    """Share of rtol times the mechanism's size to which the loops of recorded states are closed."""
+    """Fraction of rtol times the mechanism's size to which the loops of recorded states are closed."""
     return min(MOST_SHARE, max(RECORD_SHARE, LOOSER * rtol))
 
 

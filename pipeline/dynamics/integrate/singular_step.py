@@ -24,18 +24,18 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 NEVER = 1e300
 #: steps ahead within which the zero of a row's independence is looked for more closely; so it is, however short the
-#: steps, once a row has only this share left of the most that it had
+#: steps, once a row has only this fraction left of the most that it had
 STEPS_AHEAD, LOW = 4.0, 0.05
-#: the polynomial begins, and ends, where a row has this share left of the most that it had or, where that is more, of
-#: half of its own length: near enough for one polynomial, so far that rounding is blown up little
+#: the polynomial begins, and ends, where a row has this fraction left of the most that it had or, where that is more,
+#: of half of its own length: near enough for one polynomial, so far that rounding is blown up little
 FROM, HALF = 0.3, 0.5
-#: a row that has less than this share left cannot be stepped from, foreseen or not
+#: a row that has less than this fraction left cannot be stepped from, foreseen or not
 TOO_LITTLE = 2e-4
-#: steps up to there end this share of the way before it short; the time of the pose is known better from nearer
+#: steps up to there end this fraction of the way before it short; the time of the pose is known better from nearer
 MARGIN, NEARER = 0.1, 0.7
-#: share of a step over which a slope is taken: the state there comes from the slope at the end
+#: fraction of a step over which a slope is taken: the state there comes from the slope at the end
 A_LITTLE = 1e-4
-#: share of the mechanism's size to which closures are closed where the polynomial ends
+#: fraction of the mechanism's size to which closures are closed where the polynomial ends
 TIGHTLY = 1e-15
 
 
@@ -73,7 +73,7 @@ def note(d):
 
 @kernel
 def left(d):
-    """Least share that a row has of the most that it had, in what has been noted."""
+    """Least fraction that a row has of the most that it had, in what has been noted."""
     least = 1.0
     for r in range(d.n_kept_rows):
         if d.w[now(d, r)] < least * d.w[most(d, r)]:
@@ -167,7 +167,7 @@ def steer(d, t):
 
 @kernel
 def follow(d, share, out):
-    """State at a share of the polynomial, a Chebyshev series in 2 share - 1, into w from `out`."""
+    """State at a fraction of the polynomial, a Chebyshev series in 2 share - 1, into w from `out`."""
     size, last, x = d.ny, m.COLLOCATION_ROWS - 1, 2.0 * share - 1.0
     for c in range(size):
         a = b = 0.0
@@ -237,7 +237,7 @@ def make_arrive(evaluate: Callable, project: Callable, attempt: Callable, method
 
     @kernel
     def arrive(d, step, t_new):
-        """To the end of the polynomial, or of a share of it; closed there unless that is too near to the pose."""
+        """To the end of the polynomial, or of a fraction of it; closed there unless that is too near to the pose."""
         attempt(d, step)
         evaluate(d, t_new, d.at_y_new, d.at_slopes + d.ny * last)
         d.evaluations += 1

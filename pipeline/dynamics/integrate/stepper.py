@@ -32,15 +32,15 @@ RESTART = 1
 #: for a step of chosen length that cannot be made with its end on the event found in it; other negative numbers end the
 #: run
 AGAIN = -2
-#: share of the planned step below which a step has been cut short
+#: fraction of the planned step below which a step has been cut short
 CUT = 0.9
-#: such a step is tried again with this share of its length
+#: such a step is tried again with this fraction of its length
 SHORTER = 0.3
 #: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
 FAILED = 1e9
-#: a step below this share of the time reached cannot be told from rounding
+#: a step below this fraction of the time reached cannot be distinguished from rounding
 SMALLEST_STEP = 4e-16
 
 

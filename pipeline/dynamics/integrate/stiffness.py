@@ -14,9 +14,9 @@ from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: changes of state below this share of the tolerance are rounding, from which no rate can be told
+#: changes of state below this fraction of the tolerance are rounding, from which no rate can be computed
 LEAST_CHANGE = 1e-2
-#: where stability limits them, steps of chosen length swing about its limit: from this share of it on they count
+#: where stability limits them, steps of chosen length swing about its limit: from this fraction of it on they count
 SWINGING = 0.7
 
 

@@ -12,14 +12,15 @@ from typing import Any
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.kernels import kernel
 
-#: a root's last correction, as a share of the step: what is left is its square, nearly; a maximum's, since it is flat
+#: a root's last correction, as a fraction of the step: what is left is its square, nearly; a maximum's, since it is
+#: flat
 NEAR, NEAR_MAXIMUM = 1e-8, 1e-6
 GOLDEN = 0.3819660112501051
 MOST_LOOKS = 60
 
 
 def make_evaluate_at(evaluate: Callable, method: Any) -> Callable:
-    """The kernel evaluate_at(d, step, theta): evaluates the dense output at a share of the step."""
+    """The kernel evaluate_at(d, step, theta): evaluates the dense output at a fraction of the step."""
     interpolate, spare = method.interpolate, method.slopes - 1  # a row of SLOPES that no stage uses
 
     @kernel

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 #: a number of each independent mechanism
 Floors = Sequence[float] | np.ndarray
 #: least impact rates where the scene gives none: far below the approach speeds of common machines [m/s or rad/s], and
-#: the share of the size of a mechanism of 10 cm that this is [1/s]; in one of micrometres 1 um/s would be fast
+#: the fraction of the size of a mechanism of 10 cm that this is [1/s]; in one of micrometres 1 um/s would be fast
 LEAST_RATE, SLOW = 1e-6, 1e-5
 #: wiring of a contact but for the kinds of its laws
 Touching = Sequence[tuple[int, int]]

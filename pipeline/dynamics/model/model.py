@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 #: places in the ledger of an independent mechanism that is not the first one: work of drives, loss of modal damping,
 #: work and loss of loads
 OTHER_BOOKS = 4
-#: four roundings of a length, as a share of it
+#: four roundings of a length, as a fraction of it
 ROUNDED = 8.9e-16
 
 

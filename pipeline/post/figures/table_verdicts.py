@@ -65,7 +65,7 @@ SECTIONS = TREE / "docs/chaos/verdicts.csv"
 SMALL = 0.05
 #: a cost agrees with the paper's within this factor
 NEAR = 1.5
-#: shares below this are rounding of the runs
+#: fractions below this are rounding of the runs
 ROUNDING = 1e-9
 HOLDS, NOT, PARTLY = "holds", "does not hold", "in part"
 Outcome = tuple[str, str]  #: verdict, and the numbers that say so

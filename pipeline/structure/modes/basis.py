@@ -130,7 +130,7 @@ def _enough(body: Body, static: np.ndarray, modes: Normal, count: int, requested
 
 
 def _mass_share(model: Model, vectors: np.ndarray) -> float:
-    """Least share, over three directions, of the mass that moves with the basis when the body is translated."""
+    """Least fraction, over three directions, of the mass that moves with the basis when the body is translated."""
     momentum = model.mass @ model.rigid[:, :3]
     inner = vectors.T @ (model.mass @ vectors)
     taken = np.einsum("nd,nd->d", vectors.T @ momentum, np.linalg.solve(inner, vectors.T @ momentum))

@@ -36,7 +36,7 @@ def family(model: Model, vectors: np.ndarray) -> list[str]:
     families = model.families
     fraction = (families.local @ vectors) * (families.local @ (model.mass @ vectors))
     totals = np.stack([fraction[families.member == k].sum(axis=0) for k in range(len(families.names))])
-    # a solid's torsion has equal shares along y and z
+    # a solid's torsion has equal fractions along y and z
     return [families.names[k] for k in first_largest(totals, axis=0)]
 
 

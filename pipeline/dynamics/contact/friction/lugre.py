@@ -6,7 +6,7 @@ r"""LuGre friction: bristles that bend, slip and give back, as a state.
 
 per unit of normal force, so that the force ends with the contact and sigma_0 |z| <= mu_s always.
 The damping fades with speed: a constant one would drive the sliding at high speed. k <= 1 is the
-largest share of the damping that keeps the force below mu_s F_n. The bristles hold
+largest fraction of the damping that keeps the force below mu_s F_n. The bristles hold
 sigma_0 F_n z^2 / 2; they stand on the socket's surface, turn with it, and stay in the tangent plane
 by parallel transport. They are straight where a contact begins.
 Source: Canudas de Wit, Olsson, Astrom & Lischinsky (1995), IEEE Trans. Automatic Control 40,

@@ -67,7 +67,7 @@ def _on_surface(geometry: Geometry, on: On) -> np.ndarray:
 
 
 def areas(geometry: Geometry, nodes: np.ndarray) -> np.ndarray:
-    """Integrals of the nodes' shape functions over the selected faces [m^2]; of scattered nodes, equal shares."""
+    """Integrals of the nodes' shape functions over the selected faces [m^2]; of scattered nodes, equal fractions."""
     weight = np.zeros(len(geometry.nodes))
     cells, faces = boundary(geometry)
     whole = np.isin(face_nodes(geometry, cells, faces), nodes).all(axis=1)
