@@ -168,12 +168,14 @@ class Answers:
             study = {"study": self._study.task()}
         except SolverError:
             study = {}
+        graph = Graph(self.scene, shown=False)
+        members = {"post": graph.post} if graph.ensemble else {}
         task = Task(
             stage="stability",
             scene=self.scene.name,
             run="flexclear.stages.s8_stability:run",
             params={},
-            inputs={"run": Graph(self.scene, shown=False).simulate, **study},
+            inputs={"run": graph.simulate, **study, **members},
             folder=f"stability/{self.scene.name.replace('/', '_')}",
             names={"nc": "stability.nc"},
         )

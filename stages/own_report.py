@@ -79,9 +79,10 @@ def make(
     if loose(scene) or scene.flexible():
         with in_file(scene.path):
             compared = compare.bring([scene], workplace, "both")
-    drawn = graph.render
-    outcome = workplace.bring([graph.overview, *drawn.values()])
-    if any(failure.task not in drawn.values() for failure in outcome.failures):
+    drawn = graph.render.values()
+    members = [graph.ensemble, graph.post] if graph.ensemble else []
+    outcome = workplace.bring([graph.overview, *members, *drawn])
+    if any(failure.task not in [*drawn, *members] for failure in outcome.failures):
         check(outcome)
     for failure in outcome.failures:
         workplace.monitor.say(f"not in the report: {failure.message}")
@@ -147,6 +148,7 @@ def _page(
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs
     doubts = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
     assumptions = by_weight(assumed(s5_post.sources(scene)), run)
+    members = _members(graph, workplace, records)
     parts: list[Any] = [
         Part("film", "The mechanism moving", _moving(graph, workplace, records)),
         Part("run", "The run", _media(workplace, graph.overview, records, FIGURES)),
@@ -163,7 +165,7 @@ def _page(
         Part(
             "stability",
             "Stability and constraints",
-            "" if "stability" in answers else listed(_stability(run), ("figure", "value")),
+            "" if "stability" in answers else listed(_stability(run, members), ("figure", "value")),
         ),
         Part("provenance", "Provenance", listed(_provenance(graph, workplace, records), ("item", "value"))),
         Part("downloads", "Downloads", downloads(_files(graph, compared))),
@@ -171,7 +173,7 @@ def _page(
     dataset = None if compared is None else compared.dataset()
     lead = " ".join(scene.description.split()) or scene.name
     changes = ideal_sentences(answers["matters"].dataset()) if "matters" in answers else []
-    return page(scene.title, lead, parts, answer(dataset, run, doubts, changes))
+    return page(scene.title, lead, parts, answer(dataset, run, doubts, changes, members))
 
 
 def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:
@@ -190,12 +192,19 @@ def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, 
     return rows
 
 
-def _stability(run: xr.Dataset | None) -> dict[str, str]:
+def _members(graph: Graph, workplace: Workplace, records: Mapping[int, Record]) -> float | None:
+    """Horizon of the scene's ensemble [s]; None where there is none, or where it cannot be made."""
+    if graph.ensemble is None or id(graph.post) not in records:
+        return None
+    return float(workplace.store.load(records[id(graph.post)])["ensemble_horizon"])
+
+
+def _stability(run: xr.Dataset | None, members: float | None) -> dict[str, str]:
     if run is None:
         return {}
     rows = _rows(run.attrs, STABILITY)
     if "horizon" in run:
-        rows["predictability"] = sentence(float(run["horizon"]), float(run["time"].values[-1]))
+        rows["predictability"] = sentence(float(run["horizon"]), float(run["time"].values[-1]), members)
     for name, label, unit in (
         ("energy_error", "largest error of the energy balance", "J"),
         ("constraint_error", "largest error of a closed loop", "m"),

@@ -39,14 +39,21 @@ def horizon(time: np.ndarray, velocity: np.ndarray, fraction: float = SEPARATED)
     return float(time[-1] if first is None else time[first])
 
 
-def sentence(horizon: float, end: float) -> str:
-    """Statement on a run's predictability horizon [s]; end: of the run [s]."""
+def sentence(horizon: float, end: float, members: float | None = None) -> str:
+    """Statement on a run's predictability horizon [s]; end: of the run [s].
+
+    members: horizon of its ensemble [s], which may start further from the run than the perturbed run does.
+    """
     neighbour = f"A run whose contacts start {100.0 * PERTURBATION:g} % of their clearance elsewhere"
     difference = f"{100.0 * SEPARATED:g} % of each body's largest motion"
     if horizon >= end:
-        return f"{neighbour} stays within {difference} to the end, but for moments of impacts."
-    whole = f"the run lasts {1e3 * end:.4g} ms"
-    return f"{neighbour} differs by more than {difference} from {1e3 * horizon:.4g} ms on ({whole})."
+        text = f"{neighbour} stays within {difference} to the end, but for moments of impacts."
+    else:
+        whole = f"the run lasts {1e3 * end:.4g} ms"
+        text = f"{neighbour} differs by more than {difference} from {1e3 * horizon:.4g} ms on ({whole})."
+    if members is None or members >= end:
+        return text
+    return f"{text} The members of its ensemble differ by {100.0 * SEPARATED:g} % from {1e3 * members:.4g} ms on."
 
 
 def ensemble_statistics(ensemble: xr.Dataset | LabelledArrays) -> Variables:

@@ -46,10 +46,13 @@ class Check:
         return "–" if self.good else self.remedy
 
 
-def checks(run: xr.Dataset, study: xr.Dataset | None) -> list[Check]:
-    """All that a run and its cost study say of its stability.  study: None where there is none."""
+def checks(run: xr.Dataset, study: xr.Dataset | None, members: float | None = None) -> list[Check]:
+    """All that a run and its cost study say of its stability.  study: None where there is none.
+
+    members: horizon of the scene's ensemble [s], None where there is none.
+    """
     result = [_energy(run), *_loops(run), *([] if study is None else _agreement(study)), _rejected(run), _stiff(run)]
-    return [*result, *_condition(run), *_predictable(run)]
+    return [*result, *_condition(run), *_predictable(run, members)]
 
 
 def largest_energy(run: xr.Dataset) -> float:
@@ -128,10 +131,11 @@ def _condition(run: xr.Dataset) -> list[Check]:
     ]
 
 
-def _predictable(run: xr.Dataset) -> list[Check]:
+def _predictable(run: xr.Dataset, members: float | None) -> list[Check]:
     if "horizon" not in run:
         return []
-    horizon, end = float(run["horizon"]), float(run["time"][-1])
+    end = float(run["time"][-1])
+    horizon = min(float(run["horizon"]), end if members is None else members)
     return [
         Check(
             "predictability",
@@ -143,8 +147,8 @@ def _predictable(run: xr.Dataset) -> list[Check]:
     ]
 
 
-def answer(run: xr.Dataset, result: list[Check]) -> str:
-    """What the checks say together, in words."""
+def answer(run: xr.Dataset, result: list[Check], members: float | None = None) -> str:
+    """What the checks say together, in words.  members: as in `checks`."""
     bad = [check for check in result if not check.good and check.name != "predictability"]
     disagreeing = [check for check in bad if check.name.startswith("agreement")]
     bad = [check for check in bad if check not in disagreeing[1:]]  # one says it, the table has the others
@@ -156,7 +160,7 @@ def answer(run: xr.Dataset, result: list[Check]) -> str:
         else "Not in everything: " + "; ".join(f"{c.name} ({c.value}, limit {c.limit}): {c.remedy}" for c in bad) + "."
     )
     if "horizon" in run:
-        text += " " + sentence(float(run["horizon"]), float(run["time"][-1]))
+        text += " " + sentence(float(run["horizon"]), float(run["time"][-1]), members)
     return text
 
 

@@ -64,3 +64,15 @@ def test_each_check_fails_where_its_value_exceeds_its_limit(changed: dict[str, f
 def test_the_figure_needs_no_loops_and_no_contacts():
     bare = run().drop_vars(["constraint_error", "condition", "horizon"])
     assert set(stability.figure(bare)) == {"stability.png", "stability.svg"}
+
+
+def test_no_sentence_says_less_than_the_ensemble():
+    """Members start further from the run than its perturbed run: where they differ, it is no comfort."""
+    made = run(horizon=1.0)
+    assert failing(stability.checks(made, None, 1.0)) == []
+    found = stability.checks(made, None, 0.25)
+    assert failing(found) == ["predictability"]
+    text = stability.answer(made, found, 0.25)
+    assert "The members of its ensemble differ by 0.1 % from 250 ms on." in text
+    assert not text.startswith("Yes")
+    assert "members" not in stability.answer(made, found, 1.0)

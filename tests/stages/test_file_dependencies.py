@@ -24,6 +24,7 @@ from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.stages import s4_simulate
 from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import Workplace
 from tests.analytic.solid_models import block, build
 
 SCENE = """
@@ -248,3 +249,17 @@ def test_what_a_page_opens_counts_each_time(root: Path) -> None:
         found.append(read)
     assert found[0] == found[1]
     assert {Path(name).name for name in found[0]} == {"page.css", "page.js", "viewer.js"}
+
+
+def test_a_page_made_twice_in_one_process_depends_on_the_same_files(root: Path, tmp_path: Path, sources: Sources):
+    """Equal inputs have equal keys, and an edit of the viewer makes the second page stale as well."""
+    seen = []
+    for k in range(2):
+        store = Store(tmp_path / f"results{k}")
+        page = Graph(load_scene(root / "scenes" / "checks" / "pendulum.toml")).picture("motion", "html")
+        outcome = Workplace(store, sources).bring([page], jobs=1)
+        assert not outcome.failures
+        record = outcome.records[id(page)]
+        seen.append((record.key, sorted(path.read_text() for path in store.root.glob("cache/render/*.names"))))
+    assert seen[0] == seen[1]
+    assert "viewer.js" in str(seen[1])

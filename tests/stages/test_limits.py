@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import errno
+import os
+import subprocess
+import sys
 import time
 import zipfile
 from pathlib import Path
@@ -175,3 +178,25 @@ def test_a_page_that_the_disk_has_no_room_for_is_told_by_its_place(
     with pytest.raises(ResourceError, match=f"cannot write below {tmp_path}: the disk is full"):
         pages[command](tmp_path / "page.md")
     assert (tmp_path / "page.md").read_text() == "old"
+
+
+#: a figure of a run, in this process
+DRAWN = """
+from flexclear.stages.run import graphs, open_workplace
+(graph,) = graphs(["checks/pendulum"])
+print([failure.message for failure in open_workplace().bring([graph.overview], jobs=1).failures])
+"""
+
+
+def test_figures_need_no_home_folder(root: Path, tmp_path: Path) -> None:
+    """Libraries that draw write caches of their own elsewhere then, as in containers; these are no inputs."""
+    (tmp_path / "file").touch()
+    removed = ("MPLCONFIGDIR", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
+    environment = {name: value for name, value in os.environ.items() if name not in removed}
+    environment |= {"HOME": str(tmp_path / "file" / "home"), "FLEXCLEAR_RESULTS": str(tmp_path / "results")}
+    environment |= {"FLEXCLEAR_KERNELS": str(tmp_path / "kernels")}
+    done = subprocess.run(
+        [sys.executable, "-c", DRAWN], cwd=root, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.stdout == "[]\n", done.stderr
+    assert list((tmp_path / "results").glob("cache/*/*.json"))

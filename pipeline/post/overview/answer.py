@@ -30,19 +30,21 @@ def answer(
     run: xr.Dataset | None,
     doubts: Sequence[str],
     changes: Sequence[str] = (),
+    members: float | None = None,
 ) -> str:
     """A list of sentences, as HTML.
 
     compared: of `overview.comparison`, the ideal counterpart first and the scene last; None where there is none.
     run: schema RUN of the scene.  doubts: warnings of the run.  changes: sentences of `post.matters` on what
-    differs from the ideal mechanism, which replace those that two runs alone allow.
+    differs from the ideal mechanism, which replace those that two runs alone allow.  members: horizon of the scene's
+    ensemble [s], None where there is none.
     """
     said = [] if compared is None else [*changes] or _effects(compared)
     if compared is None and run is not None:
         lacks = "Slots, planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
         said.append(f"{lacks}, so there is no idealised run to compare it with.")
     if run is not None:
-        said += [*_impacts(run), *_horizon(run), *_trust(run)]
+        said += [*_impacts(run), *_horizon(run, members), *_trust(run)]
     if doubts:
         many = "one warning" if len(doubts) == 1 else f"{len(doubts)} warnings"
         said.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
@@ -95,16 +97,16 @@ def _impacts(run: xr.Dataset) -> list[str]:
     return sentences
 
 
-def _horizon(run: xr.Dataset) -> list[str]:
+def _horizon(run: xr.Dataset, members: float | None) -> list[str]:
     if "horizon" not in run:
         return []
     end, horizon = float(run["time"].values[-1]), float(run["horizon"])
     later = (
         " Later values are those of this one run; use averages over several runs (<code>[ensemble]</code>) there."
-        if horizon < end
+        if min(horizon, end if members is None else members) < end
         else ""
     )
-    return [html.escape(sentence(horizon, end)) + later]
+    return [html.escape(sentence(horizon, end, members)) + later]
 
 
 def _trust(run: xr.Dataset) -> list[str]:
