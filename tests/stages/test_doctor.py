@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.dynamics.compile import files, functions
+from flexclear.pipeline.dynamics.compile import files
 from flexclear.pipeline.post.render import gl
 from flexclear.stages import ahead, doctor, new
 from flexclear.stages.__main__ import main
@@ -52,31 +52,33 @@ def test_threads_that_somebody_asks_for_do_not_change_bytes(root: Path):
     assert done.stdout.strip() == "['1', '1']"
 
 
-def forget(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Load code from disk again, as a new process does."""
-    monkeypatch.setattr(files, "loaded", {})
-    monkeypatch.setattr(functions, "loaded", files.loaded)
-
-
-def test_what_was_compiled_before_a_run_is_all_that_it_calls(
+def test_the_usual_kinds_are_compiled_where_no_scene_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Also by the methods among which it chooses; the usual kinds are compiled where no scene is named."""
     monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     monkeypatch.setattr(ahead, "USUAL", ("pendulum",))
-    forget(monkeypatch)  # what is in memory may have been pruned from the disk by now
     assert main(["doctor", "--compile"]) == 0
-    assert not (tmp_path / "results").exists()
-    scene = new.write("pendulum", tmp_path)[0]
-    assert main(["doctor", "--compile", str(scene)]) == 0
     assert "compiled: all that runs of pendulum call" in capsys.readouterr().out
+    assert not (tmp_path / "results").exists()
 
-    def refused(path: Path) -> None:
-        raise AssertionError(f"{path.name} was to be there")
 
-    monkeypatch.setattr(files, "_compile", refused)
-    forget(monkeypatch)
-    assert main(["run", str(scene), "--to", "simulate", "-q"]) == 0
+def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path, root: Path) -> None:
+    """Also by the methods among which it chooses; in processes of their own, as a user has them."""
+    kernels = tmp_path / "kernels"
+    environment = {**os.environ, "FLEXCLEAR_RESULTS": str(tmp_path / "results"), "FLEXCLEAR_KERNELS": str(kernels)}
+
+    def command(*words: str) -> None:
+        subprocess.run([sys.executable, "-m", "flexclear.stages", *words], cwd=root, env=environment, check=True)
+
+    def code() -> dict[Path, int]:
+        return {path: path.stat().st_mtime_ns for path in kernels.rglob(f"*{files.CODE}")}
+
+    scene = new.write("pendulum", tmp_path)[0]
+    command("doctor", "--compile", str(scene))
+    before = code()
+    assert before
+    command("run", str(scene), "--to", "simulate", "-q")
+    assert code() == before
 
 
 def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(
