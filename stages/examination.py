@@ -208,9 +208,9 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) ->
     from flexclear.pipeline.dynamics.model.mobility import analyse
     from flexclear.pipeline.dynamics.model.model import tabulate
 
-    simplified = bool(loose(whole) or whole.flexible())
+    idealised = bool(loose(whole) or whole.flexible())
     try:
-        mechanism = _mechanism(ideal(whole) if simplified else whole, rigid)
+        mechanism = _mechanism(ideal(whole) if idealised else whole, rigid)
         free = analyse(tabulate(mechanism)).mobility
     except InputError as error:  # others: only as flexible bodies or with clearance it moves
         if error.place.startswith(ACTING):

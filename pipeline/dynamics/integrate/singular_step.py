@@ -29,7 +29,7 @@ STEPS_AHEAD, LOW = 4.0, 0.05
 #: the polynomial begins, and ends, where a row has this fraction left of the most that it had or, where that is more,
 #: of half of its own length: near enough for one polynomial, so far that rounding is blown up little
 FROM, HALF = 0.3, 0.5
-#: a row that has less than this fraction left cannot be stepped from, foreseen or not
+#: a row that has less than this fraction left cannot be stepped from, predicted or not
 TOO_LITTLE = 2e-4
 #: steps up to there end this fraction of the way before it short; the time of the pose is known better from nearer
 MARGIN, NEARER = 0.1, 0.7
