@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.horizon import sentence
+from flexclear.pipeline.post.answers.stability import ENERGY, largest_energy
+from flexclear.pipeline.post.derived.horizon import sentence
+from flexclear.pipeline.post.derived.series import parameters
 from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
-from flexclear.pipeline.post.series import parameters
-from flexclear.pipeline.post.stability import ENERGY, largest_energy
 
 #: a difference is reported from none where it is so many times larger than both runs' own errors
 DISTINGUISHED = 2.0
@@ -35,7 +35,7 @@ def answer(
     """A list of sentences, as HTML.
 
     compared: of `overview.comparison`, the ideal counterpart first and the scene last; None where there is none.
-    run: schema RUN of the scene.  doubts: warnings of the run.  changes: sentences of `post.matters` on what
+    run: schema RUN of the scene.  doubts: warnings of the run.  changes: sentences of `post.answers.matters` on what
     differs from the ideal mechanism, which replace those that two runs alone allow.  members: horizon of the scene's
     ensemble [s], None where there is none.
     """
