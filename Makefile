@@ -66,7 +66,7 @@ docs: $(READY) ## The documentation as a site: results/site/index.html
 
 clean: ## Remove results and caches; .venv stays
 	rm -rf results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
-	find pipeline stages tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find flexclear papers pipeline stages tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Made once, and again when the versions that are asked for change. Bytecode is made of what is imported, when it is.
 INSTALL := $(RUN) -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt

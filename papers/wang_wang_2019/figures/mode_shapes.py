@@ -8,8 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
-from flexclear.papers.wang_wang_2019.plotting.drawing import View, shell, triad, view
 from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting.drawing import View, shell, triad, view
 from flexclear.pipeline.post.shapes.rod_shape import scale_to, surface
 
 COUNT = 4

@@ -12,8 +12,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from flexclear.papers.wang_wang_2019.plotting.drawing import View, shell, skin, view
 from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting.drawing import View, shell, skin, view
 from flexclear.pipeline.post.plotting.style import SOFT
 from flexclear.pipeline.post.shapes.body_shape import faces, is_rod, scale_to, surface
 from flexclear.pipeline.post.shapes.rod_shape import AROUND
