@@ -13,7 +13,15 @@ first: what is fresh comes from the cache. Examples run as tests. What the datas
 [datasets.md](../datasets.md), which errors there are at the end of this page.
 
 """
-ERRORS = """## Errors
+ERRORS = """## What stays
+
+The names in `fc.__all__` above and below, the keys of scene files, recipes and sweeps, the commands with their options and
+exit codes, and the variables of [datasets.md](../datasets.md) are public. From 1.0 on a release that changes one of
+them in a way that breaks its users has a new first number. Before that the old name works for one release at least and
+warns (`DeprecationWarning`, or one line of the command), and CHANGELOG.md names what replaces it. Everything else,
+`flexclear.pipeline` and `flexclear.stages` included, may change with each release.
+
+## Errors
 
 All are `fc.FlexclearError`: `fc.InputError` where something given is wrong (the message names the place, the value, the
 rule and the remedy), `fc.SolverError` where a computation refuses or gives up (with the time, the part and the reason),
