@@ -28,7 +28,7 @@ PARTS: Mapping[str, Mapping[str, str]] = {
     f"{_RUN}.run.horizon": {"Pair.perturbed_run": "integrating"},
     f"{_RUN}.run.run": {"observed": "recording"},
     f"{_RUN}.record.dataset": {"recorded": "recording"},
-    "flexclear.pipeline.post.derived.series": {"derived": "deriving"},
+    "flexclear.pipeline.post.single_run.series": {"derived": "deriving"},
 }
 _spent: dict[str, float] = {}
 _adding = Lock()

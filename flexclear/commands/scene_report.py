@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.provenance import assumed
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.pipeline.post.derived.horizon import sentence
+from flexclear.pipeline.post.single_run.horizon import sentence
 from flexclear.stages import derived_series
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import FailedTasksError
@@ -142,8 +142,8 @@ def _page(
 ) -> bytes:
     from flexclear.pipeline.post.answers.matters import ideal_sentences
     from flexclear.pipeline.post.answers.summary import answer, by_weight, effects
-    from flexclear.pipeline.post.derived.series import parameters
     from flexclear.pipeline.post.overview.page import Part, downloads, listed, page
+    from flexclear.pipeline.post.single_run.series import parameters
 
     scene = graph.scene
     attributes: Mapping[Any, Any] = {} if run is None else run.attrs

@@ -20,10 +20,10 @@ from flexclear.pipeline.core.numerics.rotations import components, matrices, pri
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import FlexclearError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.post.derived.series import derive
 from flexclear.pipeline.post.render import player
 from flexclear.pipeline.post.render.mechanism import mechanism
 from flexclear.pipeline.post.shapes import body_stress
+from flexclear.pipeline.post.single_run.series import derive
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.model import solid_of, unknowns_of
 from flexclear.pipeline.structure.kinds.kind import of_mesh

@@ -57,7 +57,7 @@ def test_import_rules_hold(root: Path):
 @pytest.mark.parametrize(
     "module, line, broken",
     [
-        ("pipeline/post/derived/series.py", "import flexclear.pipeline.dynamics.memory", "three towers"),
+        ("pipeline/post/single_run/series.py", "import flexclear.pipeline.dynamics.memory", "three towers"),
         ("pipeline/core/scene/units.py", "import flexclear.papers.wang_wang_2019.deviations", "three towers"),
         ("pipeline/dynamics/memory.py", "import flexclear.stages.graph", "three towers"),
         ("papers/wang_wang_2019/deviations.py", "import meshio", "finite elements"),

@@ -18,7 +18,7 @@ from flexclear.pipeline.core.numerics.rotations import (
     rotation_vector_to_quaternion,
 )
 from flexclear.pipeline.post import derive
-from flexclear.pipeline.post.derived.horizon import horizon, spread
+from flexclear.pipeline.post.single_run.horizon import horizon, spread
 from tests.paper import synthetic
 
 angles = st.floats(-1.5, 1.5)

@@ -7,9 +7,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CB, IDEAL, JOINT
-from flexclear.pipeline.post.derived.series import parameters
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.drawing import View, shell, triad, tube, view
+from flexclear.pipeline.post.single_run.series import parameters
 
 NEEDS = ("sps4/ideal:run",)
 

@@ -7,8 +7,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT
-from flexclear.pipeline.post.derived.series import parameters
 from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.single_run.series import parameters
 
 NEEDS = (
     "sps4/csj:run",

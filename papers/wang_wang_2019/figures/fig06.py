@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from flexclear.papers.wang_wang_2019.models import CSJ, JOINT
-from flexclear.pipeline.post.derived.series import parameters
 from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.single_run.series import parameters
 
 NEEDS = ("sps4/csj:run",)
 

@@ -6,8 +6,8 @@ import xarray as xr
 
 from flexclear.papers.wang_wang_2019.models import CSJ, JOINT
 from flexclear.papers.wang_wang_2019.published import TABLE6
-from flexclear.pipeline.post.derived.series import parameters
 from flexclear.pipeline.post.plotting.table import Table, files
+from flexclear.pipeline.post.single_run.series import parameters
 
 NEEDS = ("sps4/csj:run",)
 

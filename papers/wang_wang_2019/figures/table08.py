@@ -18,8 +18,8 @@ from flexclear.papers.wang_wang_2019.models import (
 )
 from flexclear.papers.wang_wang_2019.plotting.error_table import MEANING, comparison, heads, paper, rows, single
 from flexclear.papers.wang_wang_2019.published import TABLE8
-from flexclear.pipeline.post.derived.series import parameters
 from flexclear.pipeline.post.plotting.table import Table, files
+from flexclear.pipeline.post.single_run.series import parameters
 
 #: a velocity within this factor of the printed one agrees: restitution, which is not printed, moves it by a tenth
 VELOCITY = 1.5

@@ -6,11 +6,11 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from flexclear.pipeline.post.derived.series import parameters
 from flexclear.pipeline.post.overview.curves import rounded, scaled
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render.mechanism import SOCKET, Mechanism
 from flexclear.pipeline.post.render.view import ANGLE, eye
+from flexclear.pipeline.post.single_run.series import parameters
 
 #: longest bar [pixels]
 LONGEST = 190.0

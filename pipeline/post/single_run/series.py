@@ -12,10 +12,10 @@ from flexclear.pipeline.core.artifacts.quantities import IMPACT, SEPARATED
 from flexclear.pipeline.core.artifacts.schema import conformed, require_complete
 from flexclear.pipeline.core.numerics.angles import angle_about_y
 from flexclear.pipeline.core.numerics.rotations import first_largest, rotation_between
-from flexclear.pipeline.post.derived.horizon import QUANTILES, Variables, ensemble_statistics, horizon
-from flexclear.pipeline.post.derived.impacts import impacts, of_kind
-from flexclear.pipeline.post.derived.schema import POST
-from flexclear.pipeline.post.derived.wear import wear
+from flexclear.pipeline.post.single_run.horizon import QUANTILES, Variables, ensemble_statistics, horizon
+from flexclear.pipeline.post.single_run.impacts import impacts, of_kind
+from flexclear.pipeline.post.single_run.schema import POST
+from flexclear.pipeline.post.single_run.wear import wear
 
 if TYPE_CHECKING:
     import xarray as xr
