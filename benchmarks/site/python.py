@@ -15,11 +15,11 @@ first: what is fresh comes from the cache. Examples run as tests. What the datas
 """
 ERRORS = """## What stays
 
-The names in `fc.__all__` above and below, the keys of scene files, recipes and sweeps, the commands with their options and
-exit codes, and the variables of [datasets.md](../datasets.md) are public. From 1.0 on a release that changes one of
-them in a way that breaks its users has a new first number. Before that the old name works for one release at least and
-warns (`DeprecationWarning`, or one line of the command), and CHANGELOG.md names what replaces it. Everything else,
-`flexclear.pipeline` and `flexclear.stages` included, may change with each release.
+Public are the names in `fc.__all__`, the keys of scene files, recipes and sweeps, the commands with their options and
+exit codes, and the variables of [datasets.md](../datasets.md). A release that breaks one of them has a new first
+number. Before that the old name works for at least one release and warns (`DeprecationWarning`, or one line of the
+command), and CHANGELOG.md names what replaces it. Everything else may change with each release, `flexclear.pipeline`
+and `flexclear.stages` included.
 
 ## Errors
 

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from flexclear.pipeline.core.artifacts.disk import read_checked
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.workflow.fingerprint import ABOVE, (
+from flexclear.pipeline.core.workflow.fingerprint import (
+    ABOVE,
     TREE,
     Sources,
     code_digest,
