@@ -20,12 +20,11 @@ import pytest
 from flexclear.commands import cost_peers, scenes
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import checked, read_checked, sha256
-from flexclear.pipeline.core.artifacts.seal import sealed
 from flexclear.pipeline.core.artifacts.store import Store, read_record
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
-from flexclear.pipeline.core.workflow.journal import Journal, State
+from flexclear.pipeline.core.workflow.journal import Journal, State, sealed
 from flexclear.pipeline.post.render import shape_files
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.solid import imported

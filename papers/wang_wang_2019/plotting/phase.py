@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
 from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion
-from flexclear.papers.wang_wang_2019.plotting import poincare
 from flexclear.pipeline.core.artifacts.quantities import common_times
 from flexclear.pipeline.post.plotting import style
 
@@ -80,7 +79,7 @@ def at_impacts(axes: Axes, plane: Plane, run: Motion, ideal: Motion, post: xr.Da
     axes.plot(plane.x(ideal), plane.y(ideal), color="#c9c9c9", lw=0.8, zorder=1)
     if "impact_time" not in post or post.sizes.get("impact", 0) == 0:
         return
-    when, x, y = poincare.at_times(run.time, post.impact_time.values, run.time, plane.x(run), plane.y(run))
+    when, x, y = at_times(run.time, post.impact_time.values, run.time, plane.x(run), plane.y(run))
     inside = when <= run.horizon
     axes.scatter(x[inside], y[inside], s=11, color=run.model.color, zorder=3, lw=0)
     axes.scatter(x[~inside], y[~inside], s=11, facecolors="none", edgecolors=run.model.color, lw=0.7, zorder=3)
@@ -93,3 +92,13 @@ def _say(axes: Axes, text: str) -> None:
 
 def _short(model: Model) -> str:
     return model.label.replace(" modes", "").replace("Craig-Bampton (added)", "CB (added)")
+
+
+def at_times(time: np.ndarray, requested: np.ndarray, *values: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Each of `values` (first dimension time) at the output times that equal the requested ones.
+
+    Requested times that are no output times (to 1 ns) are left out: nothing is interpolated.
+    """
+    nearest = np.clip(np.searchsorted(time, requested - 1e-9), 0, time.size - 1)
+    index = nearest[np.abs(time[nearest] - requested) <= 1e-9]
+    return tuple(value[index] for value in values)
