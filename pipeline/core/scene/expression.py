@@ -7,6 +7,7 @@ evaluates that order in any algebra: of units, of numbers, of arrays, of lines o
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -217,6 +218,8 @@ class Reader:
             return self._function(name)
         if name in self.constants:
             return [self.constants[name]]
+        if name == "pi":
+            return [(math.pi, "1")]
         term = self.term(name)
         if not term.over_time or term.dim == "quat":
             raise ValueError(f"'{name}' cannot be part of an expression: it is no number or vector over time")

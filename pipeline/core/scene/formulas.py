@@ -8,7 +8,7 @@ and share code.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,9 +88,8 @@ def formula(scene: Any, name: str) -> Formula | None:
     load = scene.forces()[name]
     if not isinstance(load, (JointExpression, LineExpression, PointExpression)):
         return None
-    known = _constants(load.values)
-    if unused := [key for key in known if not any(_names(key, text) for text in load.texts)]:
-        raise ValueError(f"values.{unused[0]} is not used: remove it, or name it in the expression")
+    known = constants_of(load.values)
+    require_used(known, load.texts)
     dimension = "torque" if isinstance(load, JointExpression) and turns(scene, load) else "force"
     vector = isinstance(load, PointExpression) and isinstance(load.force, str)
     numbers, reads, codes = list[float](), list[tuple[str, str]](), list[str]()
@@ -107,22 +106,25 @@ def formula(scene: Any, name: str) -> Formula | None:
     return Formula(" ; ".join(codes), tuple(numbers), tuple(reads))
 
 
-def _constants(values: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
+def constants_of(values: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
     """Value and SI unit of named constants; ValueError for what is no name of one."""
     known = {}
     for name, value in values.items():
-        if not re.fullmatch(r"[^\W\d]\w*", name) or name in (*FUNCTIONS, *SEVERAL, "t", "time", *OF_LINES):
+        if not re.fullmatch(r"[^\W\d]\w*", name) or name in (*FUNCTIONS, *SEVERAL, "t", "time", "pi", *OF_LINES):
             raise ValueError(
                 f"values.{name}: '{name}' is no name for a constant: choose letters, digits and _, and no function, t, "
-                "length or rate"
+                "pi, length or rate"
             )
         number, _, unit = value.partition(" ") if isinstance(value, str) else (value, "", "1")
         known[name] = float(number), unit
     return known
 
 
-def _names(name: str, text: str) -> bool:
-    return re.search(rf"(?<![\w.-]){re.escape(name)}(?![\w.-])", text) is not None
+def require_used(known: Iterable[str], texts: Sequence[str]) -> None:
+    """ValueError for a constant that no text names."""
+    for name in known:
+        if not any(re.search(rf"(?<![\w.]){re.escape(name)}(?![\w.])", text) for text in texts):
+            raise ValueError(f"values.{name} is not used: remove it, or name it in the expression")
 
 
 def _check(scene: Any, step: Any) -> None:

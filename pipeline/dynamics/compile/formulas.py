@@ -9,7 +9,7 @@ from flexclear.pipeline.core.scene.formulas import VECTORS, operands
 FORMS = {"+": "{} + {}", "-": "{} - {}", "*": "{} * {}", "/": "{} / {}", "^": "{} ** {}", "minus": "-{}"}
 FORMS |= {name: f"looks.np.{name}({{}})" for name in ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh")}
 #: kernel of `loads.looks` that reads a leaf of this letter
-READERS = {"c": "number", "p": "position", "v": "velocity", "o": "omega", "q": "coordinate", "r": "coordinate_rate"}
+READERS = {"c": "constant", "p": "position", "v": "velocity", "o": "omega", "q": "coordinate", "r": "coordinate_rate"}
 #: leaves that are the only ones of their kind
 ALONE = {"t": "looks.law(d, k, 0)", "l": "looks.line(d, k)[0]", "s": "looks.line(d, k)[1]"}
 

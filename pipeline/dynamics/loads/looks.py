@@ -7,7 +7,7 @@ import numpy as np
 from flexclear.pipeline.dynamics import gauge
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import law, number  # noqa: F401
-from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub  # noqa: F401
+from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub
 
 
 @kernel
@@ -17,9 +17,15 @@ def index(d, k, i):
 
 
 @kernel
+def constant(d, k, i):
+    """Return the i-th number of the expression of load k."""
+    return number(d, k, 3 + i)
+
+
+@kernel
 def position(d, k, i):
-    """Return the origin of a site, world axes."""
-    return d.site_frames[index(d, k, i)].origin
+    """Return the origin of a site in the world."""
+    return add(d.site_frames[index(d, k, i)].origin, (number(d, k, 0), number(d, k, 1), number(d, k, 2)))
 
 
 @kernel

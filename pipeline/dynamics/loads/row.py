@@ -20,7 +20,8 @@ class Row:
     its frame.  counts_turns: whether it needs its angle beyond half a turn.  states: number of internal states.
     bends: of each number that its kernel keeps in LOAD_BENDS, the magnitudes at which its slope or curvature jumps, as
     speeds; 0.0: where it changes its sign; none: nowhere. Its parameters say by `bends` that steps end there.
-    reads: sort and name of what an expression reads (`formulas.Formula`).
+    reads: sort and name of what an expression reads (`formulas.Formula`).  located: whether the kernels' origin, from
+    which positions are measured, comes before its numbers.
     """
 
     frames: tuple[str, ...] = ()
@@ -32,9 +33,10 @@ class Row:
     states: int = 0
     bends: tuple[tuple[float, ...], ...] = ()
     reads: tuple[tuple[str, str], ...] = ()
+    located: bool = False
 
 
 def by_formula(formula: Formula, path: str, **acts: Any) -> Row:
     """The row of a load by an expression.  acts: what it acts on."""
     bends, laws = ((0.0,),) * formula.bends, ((TIME, "time", path),)
-    return Row(laws=laws, numbers=formula.numbers, bends=bends, reads=formula.reads, **acts)
+    return Row(laws=laws, numbers=formula.numbers, bends=bends, reads=formula.reads, located=True, **acts)

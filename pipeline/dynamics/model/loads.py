@@ -89,7 +89,7 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
         else:
             laws += [checked_law(scene, law, dimension, path) for law, dimension, path in row.laws]
         rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows), len(looks), len(bends)))
-        numbers += row.numbers
+        numbers += [*(mechanism.origin if row.located else ()), *row.numbers]
         looks += [_look(mechanism, numbering, gauges, *one) for one in row.reads]
         bends += row.bends
     counts = [list(kind_of.values()).count(kind) for kind in kinds]
