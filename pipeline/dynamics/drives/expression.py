@@ -7,6 +7,7 @@ Products of sines become sums, so that value and rates are those of any other la
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
 from itertools import pairwise
@@ -66,7 +67,8 @@ def pieces(law: Expression, dimension: str) -> Pieces:
 def _applied(operator: str, operands: list[Course], span: tuple[float, float]) -> Course:
     """Result of an operation, piece by piece."""
     if operator in ("max", "min"):
-        return _chosen(*operands, span, greater=operator == "max")
+        a, b = operands
+        return _split(_each(_difference, a, b), *((a, b) if operator == "max" else (b, a)), span)
     if operator in ("abs", "sign", "step"):
         one = operands[0]
         low = {"abs": _each(_negative, one), "sign": _constant(-1.0, span), "step": _constant(0.0, span)}[operator]
@@ -76,17 +78,13 @@ def _applied(operator: str, operands: list[Course], span: tuple[float, float]) -
     return _each(operation, *operands)
 
 
-def _each(operation, *courses: Course) -> Course:  # type: ignore[no-untyped-def]
+def _each(operation: Callable[..., Piece], *courses: Course) -> Course:
     starts = tuple(sorted({start for course in courses for start in course.starts}))
     return Course(starts, tuple(operation(*(course.at(start) for course in courses)) for start in starts))
 
 
 def _constant(value: float, span: tuple[float, float]) -> Course:
     return Course((span[0],), (Piece(0.0, (value,)),))
-
-
-def _chosen(a: Course, b: Course, span: tuple[float, float], *, greater: bool) -> Course:
-    return _split(_each(_difference, a, b), *((a, b) if greater else (b, a)), span)
 
 
 def _split(switch: Course, above: Course, below: Course, span: tuple[float, float]) -> Course:
