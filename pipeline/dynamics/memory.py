@@ -195,9 +195,8 @@ CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: t
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first
 PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
 #: a: site, -1 where the world holds against it; gauge, measured: of the joint coordinate that it acts along, and of one
-#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame; look0, bend0:
-#: first of what its expression reads, and of its rows in LOAD_BENDS; book: where in the ledger its work is, and then
-#: its loss
+#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame; look0, bend0: its
+#: first of LOOKS and LOAD_BENDS; book: where in the ledger its work is, and then its loss
 LOADS = wiring("a b law0 number0 gauge measured internal0 follows look0 bend0 book")
 LOOKS = wiring("index")  # what expressions read: number of a site, or of a gauge
 LOAD_KINDS = wiring("load0 n_loads")
@@ -305,8 +304,7 @@ LAW = work("value rate second_rate")
 #: what a load does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
 #: energy, power that it brings in, power that it loses
 LOAD = work("force:3 moment:3 value rate stored power loss")
-#: of loads that bend: speeds along their coordinates, and what expressions take the magnitude or the larger of
-LOAD_BENDS = work("now")
+LOAD_BENDS = work("now")  # of loads that bend: speeds along their coordinates, arguments of max, min and abs
 #: what a bearing does now; unit: wrench of its friction on the joint's second body per normal force, about the kernels'
 #: origin; loss: what it takes per normal force [m/s]
 BEARING = work("load slip loss unit_moment:3 unit_force:3")

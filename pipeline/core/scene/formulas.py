@@ -106,6 +106,15 @@ def formula(scene: Any, name: str) -> Formula | None:
     return Formula(" ; ".join(codes), tuple(numbers), tuple(reads))
 
 
+def check_formulas(scene: Any) -> None:
+    """ValueError, with the load's name, for an expression of a scene that cannot be computed."""
+    for name in scene.forces():
+        try:
+            formula(scene, name)
+        except ValueError as error:
+            raise ValueError(f"load.{name}: {error}") from None
+
+
 def constants_of(values: Mapping[str, Any]) -> dict[str, tuple[float, str]]:
     """Value and SI unit of named constants; ValueError for what is no name of one."""
     known = {}

@@ -16,7 +16,7 @@ from flexclear.pipeline.core.scene.clearance import (
 )
 from flexclear.pipeline.core.scene.drives import Drive
 from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
-from flexclear.pipeline.core.scene.formulas import formula
+from flexclear.pipeline.core.scene.formulas import check_formulas
 from flexclear.pipeline.core.scene.gears import Gear
 from flexclear.pipeline.core.scene.limits import Limits, check_members, check_rows
 from flexclear.pipeline.core.scene.loads import Gravity, Load, SampledPid
@@ -253,13 +253,6 @@ class Scene(Part):
             except ValueError as error:
                 raise ValueError(f"{where}{name}: {error}") from None
 
-    def _expressions_are_computable(self) -> None:
-        for name in self.forces():
-            try:
-                formula(self, name)
-            except ValueError as error:
-                raise ValueError(f"load.{name}: {error}") from None
-
     def _stressed_bodies_are_flexible(self) -> None:
         for name in self.output.stress or ():
             if name not in self.flexible():
@@ -308,7 +301,7 @@ class Scene(Part):
         self._amounts_are_allowed()
         self._samples_can_be_made()
         self._quantities_are_there()
-        self._expressions_are_computable()
+        check_formulas(self)
         self._stressed_bodies_are_flexible()
         self._bodies_have_files_of_their_own()
 

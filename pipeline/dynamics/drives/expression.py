@@ -74,8 +74,9 @@ def _applied(operator: str, operands: list[Course], span: tuple[float, float]) -
         low = {"abs": _each(_negative, one), "sign": _constant(-1.0, span), "step": _constant(0.0, span)}[operator]
         high = one if operator == "abs" else _constant(1.0, span)
         return _split(one, high, low, span)
-    operation = _OPERATIONS.get(operator) or (lambda a: _function(operator, a))
-    return _each(operation, *operands)
+    if operator in _OPERATIONS:
+        return _each(_OPERATIONS[operator], *operands)
+    return _each(lambda a: _function(operator, a), *operands)
 
 
 def _each(operation: Callable[..., Piece], *courses: Course) -> Course:
@@ -193,4 +194,11 @@ def _function(name: str, a: Piece) -> Piece:
     return _sine(1.0, rate, phase + (0.5 * math.pi if name == "cos" else 0.0))
 
 
-_OPERATIONS = {"+": _sum, "-": _difference, "*": _product, "/": _quotient, "^": _power, "minus": _negative}
+_OPERATIONS: dict[str, Callable[..., Piece]] = {
+    "+": _sum,
+    "-": _difference,
+    "*": _product,
+    "/": _quotient,
+    "^": _power,
+    "minus": _negative,
+}
