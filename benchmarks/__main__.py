@@ -16,11 +16,11 @@ from pathlib import Path
 
 from benchmarks import families, log, page, system
 from benchmarks.family import WRONG, Case, Family, Record
-from flexclear.pipeline.core.errors import FlexclearError, InputError
-from flexclear.pipeline.core.registry import suggestion
+from flexclear.commands.__main__ import INTERRUPTED
+from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.progress import Monitor, duration
 from flexclear.pipeline.post.plotting.table import pipe_table
-from flexclear.stages.__main__ import INTERRUPTED
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -16,13 +16,13 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from flexclear.pipeline.core import threads as threads  # before NumPy is loaded
+from flexclear.pipeline.core.system import threads  # before NumPy is loaded
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.pipeline.core.errors import FlexclearError, InputError, ResourceError, SolverError
     from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.errors import FlexclearError, InputError, ResourceError, SolverError
 
 __all__ = [
     "FlexclearError",
@@ -53,11 +53,11 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     """`Scene` and the errors, imported on demand, and the version."""
     if name.endswith("Error") and name in __all__:
-        return getattr(import_module("flexclear.pipeline.core.errors"), name)
+        return getattr(import_module("flexclear.pipeline.core.system.errors"), name)
     if name == "Scene":
         return import_module("flexclear.pipeline.core.scene.schema").Scene
     if name == "__version__":
-        from flexclear.pipeline.core.version import version
+        from flexclear.pipeline.core.system.version import version
 
         return version()
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
@@ -181,7 +181,7 @@ def quantity(run: xr.Dataset, name: str) -> xr.DataArray:
     Vectors have the dimension `axis`, x y z of the world.  Quantities that contacts have per event (`peak_force`,
     `impact_times`, `impulse`) have no time.  Raises InputError for what the run lacks, with the nearest name.
     """
-    from flexclear.pipeline.core.quantities import evaluate
+    from flexclear.pipeline.core.artifacts.quantities import evaluate
 
     return evaluate(run, name)
 
@@ -253,9 +253,9 @@ def compare(
 def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
     """What each effect of a scene does to each quantity, taken away and put in, alone and in pairs.
 
-    Variables and meanings: `pipeline.post.effect_sizes`.  The quantities are those of `[view] watch`, else of
+    Variables and meanings: `pipeline.post.answers.effect_sizes`.  The quantities are those of `[view] watch`, else of
     `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is taken away alone, the most
-    important ones first, with as many members as decide the change (`pipeline.post.matters`); a notebook shows the
+    important ones first, with as many members as decide the change (`pipeline.post.answers.matters`); a notebook shows the
     answer first.  Raises FlexclearError.
     """
     if budget is not None:
@@ -270,7 +270,7 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
 def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
     """Which of a scene's effects the accuracy that it wants calls for: the planned scene, and the evidence.
 
-    The dataset (`pipeline.post.plan.dataset`) holds the estimated influence of each effect on each quantity of
+    The dataset (`pipeline.post.answers.plan.dataset`) holds the estimated influence of each effect on each quantity of
     `[accuracy]`, what was decided, and why.  Raises FlexclearError.
     """
     planned = _stages("plan").bring(_loaded(scene), _stages("run").open_workplace())

@@ -10,10 +10,10 @@ import pytest
 from scipy.special import beta
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.laws import Expression, Harmonic, Step
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, jump, pieces_of
 from flexclear.pipeline.dynamics.model.mechanism import build

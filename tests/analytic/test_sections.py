@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from flexclear import pipeline
+from flexclear.commands.__main__ import main
+from flexclear.commands.sections import write_page
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.post.verdict import derive
-from flexclear.stages.__main__ import main
-from flexclear.stages.sections import write_page
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.post.sections.verdict import derive
 
 #: of the driven pendulum in scenes/checks, from its tangent equations by SciPy's DOP853 over 2000 periods
 CHAOTIC = 0.112

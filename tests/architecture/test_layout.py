@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.stages.__main__ import COMMANDS
+from flexclear.commands.__main__ import COMMANDS
 
 TOP = {"pyproject.toml", "pipeline", "meshes", "stages", "tests", "Makefile"}
 BESIDES = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "constraints.txt", "docs", "scenes", "benchmarks"}
@@ -58,13 +58,13 @@ def test_import_rules_hold(root: Path):
 @pytest.mark.parametrize(
     "module, line, broken",
     [
-        ("pipeline/post/errors.py", "import flexclear.pipeline.dynamics.memory", "three towers"),
-        ("pipeline/core/units.py", "import flexclear.pipeline.post.errors", "three towers"),
+        ("papers/wang_wang_2019/deviations.py", "import flexclear.pipeline.dynamics.memory", "three towers"),
+        ("pipeline/core/scene/units.py", "import flexclear.papers.wang_wang_2019.deviations", "three towers"),
         ("pipeline/dynamics/memory.py", "import flexclear.stages.graph", "three towers"),
-        ("pipeline/post/errors.py", "import meshio", "finite elements"),
+        ("papers/wang_wang_2019/deviations.py", "import meshio", "finite elements"),
         ("stages/graph.py", "import skfem", "finite elements"),
         ("pipeline/dynamics/memory.py", "import matplotlib", "plots"),
-        ("pipeline/post/errors.py", "import pyvista", "shapes"),
+        ("papers/wang_wang_2019/deviations.py", "import pyvista", "shapes"),
         ("pipeline/dynamics/model/tree.py", "import flexclear.pipeline.dynamics.integrate.method", "dynamics follows"),
         ("pipeline/dynamics/joints/free.py", "import flexclear.pipeline.dynamics.contact.forces", "dynamics follows"),
         ("pipeline/structure/fe/model.py", "import flexclear.pipeline.structure.modes.eigen", "no circles"),

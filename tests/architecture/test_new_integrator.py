@@ -16,7 +16,7 @@ MODULE = '''"""Heun's method of order 2, with Euler's as its error estimate."""
 
 import numpy as np
 
-from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics.integrate import hermite
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
@@ -52,7 +52,7 @@ METHOD = Method(
 '''
 LINE = '"heun": Traits("heun_euler", 2, hands_over_to=STIFF, tolerances=TO_1E_9, steps=STEPS),'
 ABOVE = '"dopri5": Traits('
-LIST, FOLDER = Path("pipeline/core/integrators.py"), Path("pipeline/dynamics/integrate")
+LIST, FOLDER = Path("pipeline/core/scene/integrators.py"), Path("pipeline/dynamics/integrate")
 #: a quarter of the pendulum's period, IFToMM benchmark A01 [s]
 QUARTER = 2.367841947576237 / 4.0
 
@@ -173,7 +173,7 @@ sources = Sources(Path.cwd())
 found = {}
 for name in ("new", "own"):
     modules = s4_simulate.modules(load_scene(f"{name}.toml"))
-    found[name] = sorted(sources.closure(["flexclear.stages.s4_simulate", *modules]))
+    found[name] = sorted(sources.closure(["flexclear.stages.simulation", *modules]))
 print(json.dumps(found))
 """
 

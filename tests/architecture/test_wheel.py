@@ -49,4 +49,4 @@ def test_a_wheel_brings_scenes_meshes_and_templates(root: Path, project: dict[st
 
 
 def test_there_is_one_script_and_it_is_the_command(project: dict[str, Any]) -> None:
-    assert project["project"]["scripts"] == {"flexclear": "flexclear.stages.__main__:main"}
+    assert project["project"]["scripts"] == {"flexclear": "flexclear.commands.__main__:main"}

@@ -17,19 +17,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flexclear.commands import cost_peers, run
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import checked, read_checked, sha256
 from flexclear.pipeline.core.artifacts.seal import sealed
 from flexclear.pipeline.core.artifacts.store import Store, read_record
-from flexclear.pipeline.core.errors import FlexclearError, InputError
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.journal import Journal, State
 from flexclear.pipeline.post.render import shape_files
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.solid import imported
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
-from flexclear.stages import cost_peers, run
 from tests.properties.test_hostile_scenes import BASE
 
 #: processor time [s] after which work counts as endless: refusals take 0.3 s, and what they refuse takes hours

@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core import quantities
+from flexclear.commands import cost, cost_design, cost_peers, run
+from flexclear.commands.__main__ import main
+from flexclear.commands.cost_design import Setting
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.pipeline.post.cost.answer import sentences
-from flexclear.stages import cost, cost_design, cost_peers, run
-from flexclear.stages.__main__ import main
-from flexclear.stages.cost_design import Setting
 from flexclear.stages.workplace import Workplace
 
 OWN = Setting("dop853", 1e-6)

@@ -11,12 +11,12 @@ import pytest
 import xarray as xr
 
 from flexclear import pipeline
-from flexclear.pipeline.core.errors import FlexclearError, InputError
+from flexclear.commands.__main__ import main
+from flexclear.commands.frequencies import text
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
-from flexclear.stages.__main__ import main
-from flexclear.stages.frequencies import text
 from flexclear.stages.graph import Graph
 
 #: makes one equilibrium in a fresh process and prints the own modules that it loaded

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.commands import run
+from flexclear.commands.__main__ import main
+from flexclear.commands.as_json import as_json
+from flexclear.commands.check import examined
+from flexclear.commands.new import KINDS, TEMPLATES, write
 from flexclear.pipeline.core.artifacts.paths import results_root
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.json_schema import scene_schema
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.plausibility import implausible
-from flexclear.stages import run
-from flexclear.stages.__main__ import main
-from flexclear.stages.as_json import as_json
-from flexclear.stages.check import examined
-from flexclear.stages.new import KINDS, TEMPLATES, write
+from flexclear.pipeline.core.system.errors import InputError
 from tests.stages.typical_mistakes import MISTAKES, WARNED
 
 REPORTED = dict(

@@ -15,20 +15,21 @@ import xarray as xr
 from scipy.special import ellipk
 
 from flexclear import pipeline
+from flexclear.commands import sweep
+from flexclear.commands.__main__ import main
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError, ResourceError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.design import design
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
-from flexclear.pipeline.core.units import udunits
+from flexclear.pipeline.core.scene.units import udunits
+from flexclear.pipeline.core.system.errors import InputError, ResourceError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
 from flexclear.pipeline.dynamics.run import engine
-from flexclear.pipeline.post.sweep import figures
-from flexclear.stages import sweep, sweep_plan
-from flexclear.stages.__main__ import main
-from flexclear.stages.s4_simulate import modules
+from flexclear.pipeline.post.overview.sweep_figures import figures
+from flexclear.stages.simulation import modules
+from flexclear.stages.sweeps import sweep_plan
 
 GRAVITY = 9.81
 
@@ -359,7 +360,7 @@ for name in list(before):
     if name.startswith("flexclear.pipeline.dynamics"):
         del sys.modules[name]
 before = set(sys.modules)
-from flexclear.stages.sweep_points import work
+from flexclear.stages.sweeps.sweep_points import work
 (point,), _ = work(family.key, pickle.dumps(family.work), [job.point], True)
 assert not point.refused, point.refused
 print(*sorted(name for name in set(sys.modules) - before if name.split(".")[0] == "flexclear"))
@@ -372,7 +373,7 @@ def test_every_module_that_a_point_runs_is_in_its_key(root: Path, fresh: Path):
         [sys.executable, "-c", LOADED, str(path)], cwd=root, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    known = Sources(root).closure(["flexclear.stages.sweep_points", STORE, *modules(load_scene(path))]).keys()
+    known = Sources(root).closure(["flexclear.stages.sweeps.sweep_points", STORE, *modules(load_scene(path))]).keys()
     loaded = set(done.stdout.split())
     assert len(loaded) > 20
     assert loaded <= known

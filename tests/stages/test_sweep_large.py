@@ -8,9 +8,9 @@ import pytest
 import xarray as xr
 
 from flexclear import pipeline
-from flexclear.pipeline.core.errors import ResourceError
-from flexclear.stages import sweep_large
-from flexclear.stages.__main__ import main
+from flexclear.commands.__main__ import main
+from flexclear.pipeline.core.system.errors import ResourceError
+from flexclear.stages.sweeps import sweep_large
 
 SWEEP = """
 scene = "checks/pendulum"

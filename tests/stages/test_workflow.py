@@ -63,7 +63,7 @@ def test_equal_results_stop_the_chain(project: Project):
     project.run("run", "tiny/ideal")
     project.calls()
     first = "from __future__ import annotations\n"
-    project.edit("stages/s4_simulate.py", first, first + "\nEDITED = 1\n")
+    project.edit("stages/simulation.py", first, first + "\nEDITED = 1\n")
     project.run("run", "tiny/ideal", "--to", "simulate")
     assert project.calls() == ["simulate tiny/ideal"]
     assert "post             fresh" in project.run("why", "tiny/ideal").stdout
@@ -130,7 +130,7 @@ def test_a_solver_that_gives_up_stops_only_what_depends_on_it(project: Project, 
 
 def test_a_full_disk_ends_with_4_and_leaves_nothing(project: Project):
     code = (
-        "import resource, sys; from flexclear.stages.__main__ import main;"
+        "import resource, sys; from flexclear.commands.__main__ import main;"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY)); sys.exit(main(['run', 'tiny/ideal']))"
     )
     import subprocess

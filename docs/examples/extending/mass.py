@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from flexclear.stages import run
+from flexclear.commands import run
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

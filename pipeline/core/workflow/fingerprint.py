@@ -43,13 +43,13 @@ KNOWN: Known = {}
 #: modules that only word messages, citations and validation errors: no result depends on them
 _SCENE = "flexclear.pipeline.core.scene"
 WORDING = {
-    "flexclear.pipeline.core.citations",
+    "flexclear.pipeline.core.scene.citations",
     f"{_SCENE}.key_descriptions",
     f"{_SCENE}.validation_errors",
     f"{_SCENE}.plausibility",
 }
 #: packages whose modules' docstrings are titles on pages
-TITLED = ("flexclear.pipeline.post.figures.",)
+TITLED = ("flexclear.papers.wang_wang_2019.figures.",)
 #: how often a source is parsed at most, where threads of libraries come between
 ATTEMPTS = 10
 _PARSING = Lock()
