@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 # first of all: it pins BLAS to one thread, which NumPy reads when it is imported
-from flexclear import pipeline  # noqa: F401  isort: skip
-
 import argparse
 import os
 import sys

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.timing import once
-from flexclear.commands.run import bundles, find_scene
+from flexclear.commands.scenes import bundles, find_scene
 from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
 from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.load import edited, load_scene

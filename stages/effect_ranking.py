@@ -26,7 +26,8 @@ def task(
     """The task of the answer.
 
     words: of the effects.  variants: the scene without each effect, by its name (the full one by the empty name), and
-    its tasks by the number of members (`stages.watched_quantities`).  pairs: members with which each effect is compared.
+    its tasks by the number of members (`stages.watched_quantities`).  pairs: members with which each effect is
+    compared.
     """
     used = {("", members) for members in pairs.values()} | set(pairs.items())
     return Task(

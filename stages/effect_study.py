@@ -55,7 +55,8 @@ def _variant(scene: Scene, effects: Sequence[Effect], gone: Names) -> Scene:
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
-    """``effects.nc``, its table and its chart.  params: see `task`.  inputs: ``variant<k>``, as of `s4_watched`."""
+    """``effects.nc``, its table and its chart.  params: see `task`.  inputs: ``variant<k>``, as of
+    `watched_quantities`."""
     from flexclear.pipeline.core.artifacts import effect_size
     from flexclear.pipeline.core.artifacts.points import unpacked
     from flexclear.pipeline.core.scene.quantity import Quantity

@@ -171,7 +171,7 @@ class Graph:
         return {f"{what} {kind}": self.picture(what, kind) for what, kind in pairs}
 
     def picture(self, what: str, kind: str, time: float | None = None) -> Task:
-        """One of what `s6_render.FORMATS` lists; `time`: of vibrations, as of `linear`."""
+        """One of what `rendering.FORMATS` lists; `time`: of vibrations, as of `linear`."""
         params = rendering.params(self.scene, what, kind)
         bundles = {f"bundle/{body}": task for body, task in self.bundle.items()}
         source = (

@@ -14,7 +14,7 @@ from benchmarks import log
 from benchmarks.families import exudyn
 from benchmarks.family import Case, Family, Measured, Record
 from flexclear.commands import cost
-from flexclear.commands.run import find_scene, open_workplace
+from flexclear.commands.scenes import find_scene, open_workplace
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.post.cost.page import Studied, sections

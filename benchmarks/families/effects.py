@@ -63,10 +63,10 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _influences() -> list[Record]:
-    from flexclear.commands import effects, run
+    from flexclear.commands import effects, scenes
     from flexclear.stages.workplace import open_workplace
 
-    scene = edited(load_scene(run.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
+    scene = edited(load_scene(scenes.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
     found = effects.dataset(scene, open_workplace())
     records = []
     for quantity in WATCHED:
@@ -93,10 +93,10 @@ def _endless(value: Any) -> bool:
 
 
 def _started(name: str, **changes: Any) -> tuple[Any, Any, np.ndarray]:
-    from flexclear.commands import run
+    from flexclear.commands import scenes
 
-    scene = edited(load_scene(run.find_scene(name)), {"ensemble": None, **changes})
-    reduced = run.bundles(scene) if scene.flexible() else {}
+    scene = edited(load_scene(scenes.find_scene(name)), {"ensemble": None, **changes})
+    reduced = scenes.bundles(scene) if scene.flexible() else {}
     engine, other = engines(scene, reduced, silent)
     return engine, other, consistent_start(engine)
 

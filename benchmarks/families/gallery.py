@@ -12,7 +12,7 @@ import xarray as xr
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import DOCS
-from flexclear.commands.run import bundles, find_scene
+from flexclear.commands.scenes import bundles, find_scene
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene

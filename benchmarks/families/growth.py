@@ -17,7 +17,7 @@ from benchmarks.family import REFUSED, Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
 from benchmarks.page import Columns, percent, short, spread, table
 from benchmarks.timing import interleaved, once, slope
-from flexclear.commands.run import bundles
+from flexclear.commands.scenes import bundles
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene

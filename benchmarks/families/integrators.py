@@ -13,7 +13,7 @@ import xarray as xr
 
 from benchmarks.family import REFUSED, Case, Family, Measured, Record
 from benchmarks.page import Columns, table
-from flexclear.commands.run import find_scene
+from flexclear.commands.scenes import find_scene
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts.quantities import IMPACT
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS

@@ -14,7 +14,7 @@ import numpy as np
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import percent, table
-from flexclear.commands.run import bundles
+from flexclear.commands.scenes import bundles
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
 from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.workflow.fingerprint import TREE

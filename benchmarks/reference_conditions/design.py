@@ -12,7 +12,7 @@ import xarray as xr
 from benchmarks.geometry import identify
 from benchmarks.geometry.kinematics import Layout
 from benchmarks.geometry.scenes import edits
-from flexclear.commands.run import find_scene
+from flexclear.commands.scenes import find_scene
 from flexclear.pipeline.core.scene.load import load_scene, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError

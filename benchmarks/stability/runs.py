@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks import crew
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Measured, Record
 from benchmarks.stability.scenes import Parameters, scene, sweep
-from flexclear.commands.run import Workplace, bundles, open_workplace
+from flexclear.commands.scenes import Workplace, bundles, open_workplace
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import parse

@@ -140,7 +140,7 @@ def parser(arguments: list[str]) -> argparse.ArgumentParser:
         text = COMMANDS[verb]
         below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")
         if asked:
-            module = import_module(f"flexclear.stages.{verb}")
+            module = import_module(f"flexclear.commands.{verb}")
             module.arguments(below)
             below.set_defaults(command=module.command)
             top.options = [option for action in below._actions for option in action.option_strings]

@@ -184,7 +184,8 @@ class Answers:
 
     @cached_property
     def matters(self) -> Answer | None:
-        """Which effects matter (`stages.effect_ranking`); None for a scene without effects, or which watches nothing."""
+        """Which effects matter (`stages.effect_ranking`); None for a scene without effects, or which watches
+        nothing."""
         effects, chosen = variants.effects(self.scene), self.scene.watched()
         if not effects or not chosen:
             return None

@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import examination, run
+from flexclear.commands import examination, scenes
 from flexclear.commands.examination import MISTAKES
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.file_kinds import RECIPE, SCENE, SWEEP, kind_of_file
@@ -53,7 +53,7 @@ def command(options: argparse.Namespace) -> int:
         errors |= {str(mistake): mistake for mistake in mistakes}
         warnings |= {str(warning): warning for warning in seen.warnings}
         if not mistakes and not options.json and not options.quiet:
-            print(f"{run.find_scene(name)}: {seen.summary}; no error")
+            print(f"{scenes.find_scene(name)}: {seen.summary}; no error")
     if options.json:
         records = [_record(mistake, "error") for mistake in errors.values()]
         print(json.dumps([*records, *(_record(warning, "warning") for warning in warnings.values())], indent=2))
@@ -73,9 +73,9 @@ def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | No
     from flexclear.commands import show
 
     try:
-        if kind_of_file(read_toml(run.find_scene(name))) == SCENE:
-            scene = run.loaded(name, settings)
-            run.require_names(scene)
+        if kind_of_file(read_toml(scenes.find_scene(name))) == SCENE:
+            scene = scenes.loaded(name, settings)
+            scenes.require_names(scene)
             return show.shown(scene, quiet=quiet)[1]
     except MISTAKES:  # told with all others
         pass
@@ -96,7 +96,7 @@ def examined(name: str, settings: Sequence[str] = ()) -> tuple[list[FlexclearErr
     settings: as `--set` has them; a scene is examined with these changes.
     """
     try:
-        path = run.find_scene(name)
+        path = scenes.find_scene(name)
         kind = kind_of_file(read_toml(path))
         return _of_scene(path, settings) if kind == SCENE else OTHERS[kind](path)
     except MISTAKES as error:
@@ -104,10 +104,10 @@ def examined(name: str, settings: Sequence[str] = ()) -> tuple[list[FlexclearErr
 
 
 def _of_scene(path: Path, settings: Sequence[str] = ()) -> tuple[list[FlexclearError], Seen]:
-    errors = list[FlexclearError](dangling(compose(path), run.recipe_frames, str(path)))
+    errors = list[FlexclearError](dangling(compose(path), scenes.recipe_frames, str(path)))
     scene = None
     try:
-        scene = run.loaded(str(path), settings)
+        scene = scenes.loaded(str(path), settings)
     except MISTAKES as error:
         errors += _each(error)
     recipes = _collect(_recipes(path))
@@ -116,7 +116,7 @@ def _of_scene(path: Path, settings: Sequence[str] = ()) -> tuple[list[FlexclearE
         return _once(errors), Seen()
     errors += _collect([lambda: Graph(scene).up_to("post")], path)
     errors += _collect(_laws(scene), path)
-    warnings, summary = run.implausibilities(scene, settings), scene.summary()
+    warnings, summary = scenes.implausibilities(scene, settings), scene.summary()
     if not errors:
         found = examination.scene(scene)
         errors, warnings = found.errors, [*warnings, *found.warnings]
@@ -200,7 +200,7 @@ def _collect(checks: Iterable[Callable[[], Any]], path: Path | None = None) -> l
     errors: list[FlexclearError] = []
     for check in checks:
         try:
-            with run.in_file(path):
+            with scenes.in_file(path):
                 check()
         except MISTAKES as error:
             errors += _each(error)

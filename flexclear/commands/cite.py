@@ -11,7 +11,7 @@ import ast
 from collections.abc import Collection, Iterator
 from importlib import import_module
 
-from flexclear.commands import run
+from flexclear.commands import scenes
 from flexclear.pipeline.core.scene.citations import cited
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.registry import module_name
@@ -31,7 +31,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print them."""
-    (graph,) = run.graphs([options.scene], options.set)
+    (graph,) = scenes.graphs([options.scene], options.set)
     print(text(graph, open_workplace().sources), end="")
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.commands import as_json, run
+from flexclear.commands import as_json
+from flexclear.commands.scenes import graphs, joined, print_files, scene_arguments
 from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.scene.ideal import EFFECTS, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError
@@ -34,7 +35,7 @@ TABLES = ("differences.md", "costs.md")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser, "json")
+    scene_arguments(parser, "json")
     parser.add_argument(
         "--ideal",
         nargs="?",
@@ -49,15 +50,13 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> None:
     """Bring the comparison up to date, print its tables and say where it is."""
     workplace = open_workplace(options)
-    scenes = [graph.scene for graph in run.graphs(options.scenes, options.set)]
+    scenes = [graph.scene for graph in graphs(options.scenes, options.set)]
     comparison = bring(scenes, workplace, options.ideal)
     if options.json:
         print(as_json.as_json(comparison.dataset()))
         return
     print(*(comparison.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")
-    run.print_files(
-        comparison.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"}
-    )
+    print_files(comparison.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"})
 
 
 @dataclass(frozen=True)
@@ -169,6 +168,6 @@ def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
         run="flexclear.stages.run_comparison:run",
         params={"labels": labels, "quantities": list(quantities.values())},
         inputs=inputs,
-        folder=f"compare/{run.joined(labels)}",
+        folder=f"compare/{joined(labels)}",
         names={"nc": "compare.nc"},
     )

@@ -13,7 +13,7 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from flexclear.commands import new
-from flexclear.commands.run import Workplace, check, graphs
+from flexclear.commands.scenes import Workplace, check, graphs
 from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.stages import simulation
 

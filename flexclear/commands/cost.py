@@ -11,9 +11,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.commands import as_json, cost_design, cost_peers, run
+from flexclear.commands import as_json, cost_design, cost_peers, scenes
 from flexclear.commands.cost_peers import Track
-from flexclear.commands.run import Workplace, bundles, check
+from flexclear.commands.scenes import Workplace, bundles, check
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.solver import of_run
@@ -49,7 +49,7 @@ FIGURES = {
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
+    scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
     parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
     parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn next to ours")
     parser.add_argument(
@@ -61,7 +61,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> None:
     """Bring the studies up to date and print their tables."""
     if options.page is not None:
-        run.check_target(options.page, "--page")
+        scenes.check_target(options.page, "--page")
     peers = {} if options.peer is None else cost_peers.read(options.peer)
     workplace, studies = open_workplace(options), {}
     seconds = limit.seconds(options.budget, "--budget")
@@ -71,7 +71,7 @@ def command(options: argparse.Namespace) -> None:
             text = (folder / PRINTED[0]).read_text(encoding="utf-8")
             print(text, f"{relative(folder)}: first answer; going on\n", sep="\n", flush=True)
 
-    for graph in run.graphs(options.scenes, options.set):
+    for graph in scenes.graphs(options.scenes, options.set):
         scene, others = graph.scene, peers.get(graph.scene.name, ())
         studies[scene.name] = _, folder = bring(
             scene, workplace, others, options.integrators, seconds=seconds, models=options.models, answered=first
@@ -268,8 +268,8 @@ def bring(
 ) -> tuple[xr.Dataset, Path]:
     """The study's dataset, brought up to date as far as the budget goes, and the folder with its tables and figures.
 
-    peers: runs of other programs, see `flexclear.commands.cost_peers`.  integrators: see `cost_design.wide`.  seconds, models: of
-    the `Study`.  answered: called with the folder when the first answer is there.
+    peers: runs of other programs, see `flexclear.commands.cost_peers`.  integrators: see `cost_design.wide`.  seconds,
+    models: of the `Study`.  answered: called with the folder when the first answer is there.
     Raises InputError when the scene has nothing to measure.  Work that is interrupted leaves the answer so far.
     """
     study = Study(scene, workplace, seconds, integrators, models, peers)

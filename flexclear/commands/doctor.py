@@ -57,10 +57,10 @@ pose = {{}}
 """
 #: run apart, where nothing is compiled: that would take longer than all else
 RUN = """import sys
-from flexclear import pipeline
+import flexclear as fc
 from flexclear.pipeline.core.system.errors import FlexclearError
 try:
-    result = pipeline.run(sys.argv[1])
+    result = fc.run(sys.argv[1])
 except FlexclearError as error:
     sys.exit(str(error))
 print(float(result.position.sel(body="ball", axis="z")[-1]))

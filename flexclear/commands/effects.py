@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from flexclear.commands import as_json, run
+from flexclear.commands import as_json
+from flexclear.commands.scenes import graphs, print_files, scene_arguments
 from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.system.errors import InputError
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser, "json")
+    scene_arguments(parser, "json")
     parser.add_argument(
         "--members",
         type=int,
@@ -35,14 +36,14 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> None:
     """Bring the tables up to date, print them and say where they are."""
     workplace, tables = open_workplace(options), dict[str, xr.Dataset]()
-    for graph in run.graphs(options.scenes, options.set):
+    for graph in graphs(options.scenes, options.set):
         done, record = bring(graph.scene, workplace, options.members)
         if options.json:
             tables[graph.scene.name] = workplace.store.load(record)
             continue
         folder = workplace.store.root / done.folder
         print(workplace.store.path(done.stage, record.key, "effects.md").read_text(encoding="utf-8"))
-        run.print_files(folder, {"index.html": "the page", "effects.nc": "all influences", "effects.png": "the chart"})
+        print_files(folder, {"index.html": "the page", "effects.nc": "all influences", "effects.png": "the chart"})
     if options.json:
         print(as_json.as_json(tables))
 

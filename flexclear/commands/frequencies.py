@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.commands import as_json, export, run
+from flexclear.commands import as_json, export, scenes
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
@@ -55,7 +55,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print the table."""
-    (graph,) = run.graphs([options.scene], options.set)
+    (graph,) = scenes.graphs([options.scene], options.set)
     try:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
@@ -68,7 +68,7 @@ def command(options: argparse.Namespace) -> None:
     if any(target.suffix in PICTURES for target in options.out or ()):
         raise InputError("--out", "pictures are of Campbell diagrams", "add --speeds, e.g. 0:500rpm:50")
     targets = _targets(options, ())
-    modes = run.linear(graph.scene, time, moving=options.moving, workplace=open_workplace(options))
+    modes = scenes.linear(graph.scene, time, moving=options.moving, workplace=open_workplace(options))
     print(as_json.as_json(modes) if options.json else text(modes).rstrip("\n"))
     for target in targets:
         with disk_limits(target.parent):
@@ -80,7 +80,7 @@ def _targets(options: argparse.Namespace, pictures: Sequence[str]) -> list[Path]
     targets: list[Path] = options.out or []
     for target in targets:
         export.check_format(target, (*export.NEEDS, *pictures))
-        run.check_target(target)
+        scenes.check_target(target)
     return targets
 
 
@@ -88,7 +88,7 @@ def diagram(scene: Scene, time: float | None, options: argparse.Namespace) -> No
     """Print the table of a Campbell diagram, and write its dataset and its picture."""
     given = speeds(options.speeds)
     targets = _targets(options, PICTURES)
-    made = run.linear(scene, time, speeds=given, drive=options.drive, workplace=open_workplace(options))
+    made = scenes.linear(scene, time, speeds=given, drive=options.drive, workplace=open_workplace(options))
     from flexclear.pipeline.post.plotting import campbell
 
     print(as_json.as_json(made) if options.json else campbell.text(made))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from flexclear.pipeline.core.artifacts.paths import DATA
 from flexclear.pipeline.core.system.errors import InputError, ResourceError
 
-TEMPLATES = Path(__file__).with_name("templates")
+TEMPLATES = DATA / "stages" / "templates"
 #: kinds of mechanisms -> what they are
 KINDS = {
     "four-bar": "planar linkage of rigid bodies with one loose pin",

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import as_json, export, run
+from flexclear.commands import as_json, export, scenes
 from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.coupling import lessened
@@ -35,7 +35,7 @@ LEVELS = ("10 %", "1 %", "0.1 %")
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
+    scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
     parser.add_argument("--out", type=Path, metavar="FILE.toml", help="write the planned scene here, too (one scene)")
     parser.add_argument(
         "--verify", action="store_true", help="run the full scene and say what the plan's true error is"
@@ -48,11 +48,11 @@ def command(options: argparse.Namespace) -> None:
         if len(options.scenes) > 1:
             raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "plan the scenes one by one")
         export.check_format(options.out, (".toml",))
-        run.check_target(options.out)
+        scenes.check_target(options.out)
     workplace = open_workplace(options)
     missed, plans = list[str](), dict[str, object]()
     budget = limit.seconds(options.budget, "--budget")
-    for graph in run.graphs(options.scenes, options.set):
+    for graph in scenes.graphs(options.scenes, options.set):
         if graph.scene.accuracy is None and not options.verify and options.out is None:
             plans[graph.scene.name] = table = levels(graph.scene, workplace)
             if not options.json:
@@ -71,7 +71,7 @@ def command(options: argparse.Namespace) -> None:
     if options.json:
         print(as_json.as_json(plans))
     if missed:
-        raise run.MissedAccuracyError("\n".join(missed))
+        raise scenes.MissedAccuracyError("\n".join(missed))
 
 
 def levels(scene: Scene, workplace: Workplace) -> str:
@@ -159,7 +159,7 @@ class Planned:
     def tell(self) -> None:
         """One line on what was written where."""
         files = {"index.html": "the page", self.target.name: "the planned scene", "plan.nc": "all influences"}
-        run.print_files(self.folder, files)
+        scenes.print_files(self.folder, files)
 
 
 def _example(scene: Scene) -> str:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.commands import as_json, run
+from flexclear.commands import as_json, scenes
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
@@ -23,7 +23,7 @@ USUAL = (("motion", "png"), ("motion", "mp4"), ("motion", "html"), ("modes", "ht
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser, "json")
+    scenes.scene_arguments(parser, "json")
     parser.add_argument(
         "--what",
         choices=FORMATS,
@@ -49,7 +49,7 @@ def command(options: argparse.Namespace) -> None:
         time = None if options.at is None else quantity(options.at, "time")
     except ValueError as error:
         raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
-    graphs, workplace = run.graphs(options.scenes, options.set), open_workplace(options)
+    graphs, workplace = scenes.graphs(options.scenes, options.set), open_workplace(options)
     tasks = {graph.scene.name: _tasks(graph, requested, options.what is not None, time) for graph in graphs}
     made = [task for group in tasks.values() for task in group]
     if len(graphs) > 1 and requested == [("modes", "html")]:
@@ -86,7 +86,7 @@ def _requested(what: str | None, kind: str | None) -> list[tuple[str, str]]:
 def _tasks(graph: Graph, requested: list[tuple[str, str]], asked: bool, time: float | None) -> list:
     """One task for each; of what is usual, modes only where there are some."""
     there = [pair for pair in requested if asked or pair[0] != "modes" or graph.scene.flexible()]
-    with run.in_file(graph.scene.path):
+    with scenes.in_file(graph.scene.path):
         return [graph.picture(what, kind, time) for what, kind in there]
 
 
@@ -100,7 +100,7 @@ def _beside(graphs: list[Graph]) -> Task:
         run="flexclear.stages.rendering:run",
         params={"what": "modes", "format": "html", "title": "Mode sets next to each other"},
         inputs=bundles,
-        folder=f"compare/{run.joined([graph.scene.name for graph in graphs])}",
+        folder=f"compare/{scenes.joined([graph.scene.name for graph in graphs])}",
     )
 
 
@@ -113,6 +113,6 @@ def _tell(workplace: Workplace, folder: str, files: list[str]) -> None:
 def rendered(scene: Scene, workplace: Workplace | None = None) -> Path:
     """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
     workplace, requested = workplace or open_workplace(), Graph(scene)
-    run.require_names(scene)
+    scenes.require_names(scene)
     check(workplace.bring(list(requested.render.values()), jobs=1))
     return workplace.store.root / requested.simulate.folder

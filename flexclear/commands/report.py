@@ -1,7 +1,8 @@
-"""``flexclear report``: every figure and table of the paper, and the page that shows them (`papers.wang_wang_2019.tasks`).
+"""``flexclear report``: every figure and table of the paper, and the page that shows them
+(`papers.wang_wang_2019.tasks`).
 
-With scenes it is the report of these (`flexclear.commands.scene_report`). What brings either up to date is imported when something
-may have changed.
+With scenes it is the report of these (`flexclear.commands.scene_report`). What brings either up to date is imported
+when something may have changed.
 """
 
 from __future__ import annotations
@@ -41,11 +42,11 @@ def command(options: argparse.Namespace) -> None:
     if not options.scenes:
         made("paper", make(workplace, folder=options.folder))
     else:
-        from flexclear.commands import run, scene_report
+        from flexclear.commands import scene_report, scenes
         from flexclear.stages import limit
 
         seconds = None if options.budget is None else limit.seconds(options.budget, "--budget")
-        for graph in run.graphs(options.scenes, options.set):
+        for graph in scenes.graphs(options.scenes, options.set):
             answers = options.answers != "none"
             page = scene_report.make(graph, workplace, folder=options.folder, seconds=seconds, answers=answers)
             made(graph.scene.name, page)

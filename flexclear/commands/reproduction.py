@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
-from flexclear.commands import run
+from flexclear.commands import scenes
 from flexclear.pipeline.core.artifacts.disk import digest_of, disk_limits, publish
 from flexclear.pipeline.core.artifacts.paths import TREE, kernel_root, results_root
 from flexclear.pipeline.core.scene.load import compose, is_file
@@ -45,7 +45,7 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
     No path of this machine is in it: files are called by their paths relative to each other, folders in what was said
     by words.  Raises InputError for a scene that is not there.
     """
-    scene = run.find_scene(name).resolve()
+    scene = scenes.find_scene(name).resolve()
     if not scene.is_file():
         raise InputError(name, "there is no such file")
     files = _opened(scene, settings)
@@ -112,7 +112,7 @@ def _opened(scene: Path, settings: Sequence[str]) -> list[Path]:
     with file_dependencies.watched(scene.parent) as read:
         # what is wrong is what the file is made for: each is taken as far as it goes
         with contextlib.suppress(FlexclearError):
-            run.loaded(str(scene), settings)
+            scenes.loaded(str(scene), settings)
         for recipe in _recipes(scene):
             with contextlib.suppress(FlexclearError):
                 meshing.run({**meshing.params(recipe), "folder": str(recipe.parent)}, {}, silent)

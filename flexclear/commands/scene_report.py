@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import compare
 from flexclear.commands.answers import Answer, Answers, said
-from flexclear.commands.run import Workplace, check, in_file
+from flexclear.commands.scenes import Workplace, check, in_file
 from flexclear.pipeline.core.artifacts.store import Record, publish
 from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.provenance import assumed
@@ -72,8 +72,8 @@ def make(
     """Bring everything that the report of a scene shows up to date; returns the page.
 
     One file with all inside; or with `folder` a folder with the page and its pictures as files.  Without GL libraries
-    it has no film.  seconds, answers: budget of the three answers (`flexclear.commands.answers`), and whether they are there.
-    Raises FailedTasksError when the run itself cannot be made.
+    it has no film.  seconds, answers: budget of the three answers (`flexclear.commands.answers`), and whether they are
+    there. Raises FailedTasksError when the run itself cannot be made.
     """
     scene = graph.scene
     compared = None

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.commands import as_json, run
+from flexclear.commands import as_json
+from flexclear.commands.scenes import as_in_its_file, check_target, graphs, scene_arguments
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.stages.graph import Graph
@@ -24,7 +25,7 @@ COUNTS = {"periods": "recorded periods", "transient": "periods before them that 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser, "json")
+    scene_arguments(parser, "json")
     for name, text in COUNTS.items():
         parser.add_argument(f"--{name}", type=int, metavar="N", help=text)
     parser.add_argument("--period", metavar="TIME", help="period of the laws, e.g. '0.18 s'; else the whole run")
@@ -35,9 +36,9 @@ def command(options: argparse.Namespace) -> None:
     """Print the verdict on each scene."""
     asked = {name: getattr(options, name) for name in (*COUNTS, "period") if getattr(options, name) is not None}
     if options.page is not None:
-        run.check_target(options.page, "--page")
+        check_target(options.page, "--page")
     workplace = open_workplace(options)
-    scenes = [with_sections(graph.scene, asked) for graph in run.graphs(options.scenes, options.set)]
+    scenes = [with_sections(graph.scene, asked) for graph in graphs(options.scenes, options.set)]
     tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
     outcome = workplace.bring([graph.verdict for graph in tasks.values()])
     check(outcome)
@@ -79,7 +80,7 @@ def write_page(
 def judge(scene: Scene, workplace: Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:
     """Sections (schema SECTIONS) and verdict (schema VERDICT) of a scene, brought up to date as `run` is."""
     workplace = workplace or open_workplace()
-    graph = Graph(scene, shown=run.as_in_its_file(scene))
+    graph = Graph(scene, shown=as_in_its_file(scene))
     outcome = workplace.bring([graph.sections, graph.verdict], jobs=1)
     check(outcome)
     made = [workplace.store.load(outcome.records[id(task)]) for task in (graph.sections, graph.verdict)]

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import as_json, run
+from flexclear.commands import as_json, scenes
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.system.errors import InputError, ResourceError
 from flexclear.stages import meshing, rendering, rigid_body
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser, "json")
+    scenes.scene_arguments(parser, "json")
 
 
 def command(options: argparse.Namespace) -> int:
@@ -34,8 +34,8 @@ def command(options: argparse.Namespace) -> int:
     """
     result, made = 0, dict[str, list[str]]()
     for name in options.scenes:
-        scene = run.loaded(name, options.set)
-        run.examine(scene, options.set)
+        scene = scenes.loaded(name, options.set)
+        scenes.examine(scene, options.set)
         files, refused = shown(scene, quiet=options.quiet or options.json)
         made[scene.name] = [str(file) for file in files]
         if refused is not None:
@@ -48,7 +48,7 @@ def command(options: argparse.Namespace) -> int:
 
 def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> tuple[list[Path], InputError | None]:
     """Write picture and page, and print where they are; returns the files, and why the start is refused if it is."""
-    with run.in_file(scene.path):
+    with scenes.in_file(scene.path):
         seen, refused = viewed(scene)
     files = files_of(scene, seen, Path.cwd() if folder is None else folder, quiet=quiet)
     if not quiet:
@@ -81,8 +81,8 @@ class Start:
 
 def start(scene: Scene, folder: Path | None = None) -> Start:
     """The start pose of a scene; picture and page are written where a folder is given.  Raises InputError."""
-    run.require_names(scene)
-    with run.in_file(scene.path):
+    scenes.require_names(scene)
+    with scenes.in_file(scene.path):
         seen, refused = viewed(scene)
     if folder is not None:
         files_of(scene, seen, folder)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import as_json, export, run
+from flexclear.commands import as_json, export, scenes
 from flexclear.pipeline.core.artifacts.store import disk_limits, write_dataset
 from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
 from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
@@ -54,9 +54,9 @@ def command(options: argparse.Namespace) -> None:
             sweep_large.require_zarr(f"--out {options.out}")
         else:
             export.check_format(options.out, (*export.NEEDS, sweep_large.SUFFIX))
-            run.check_target(options.out)
+            scenes.check_target(options.out)
     workplace = open_workplace(options)
-    paths = [run.find_scene(name) for name in options.sweeps]
+    paths = [scenes.find_scene(name) for name in options.sweeps]
     requested = [
         sweep_plan.plan(sweep, scene, str(path)) for path in paths for sweep, scene in [read(path, options.set)]
     ]
@@ -65,7 +65,7 @@ def command(options: argparse.Namespace) -> None:
     made = {}
     with engine(width(options.jobs), options.scheduler) as workers, workplace.limited():
         for path, plan in zip(paths, requested, strict=True):
-            name = run.with_edits(scene_name(path).removeprefix("sweeps/"), options.set)
+            name = scenes.with_edits(scene_name(path).removeprefix("sweeps/"), options.set)
             made[name] = bring(plan, workers, workplace, folder := workplace.store.root / "sweeps" / name)
             _show(plan, made[name], folder, options.out, quiet=options.json)
     if options.json:
@@ -87,18 +87,18 @@ def read(path: Path, settings: Sequence[str] = ()) -> tuple[Sweep, Scene]:
     sweep = load_sweep(path)
     own_path = path.parent / sweep.scene
     try:
-        scene_path = own_path if is_file(own_path) else run.find_scene(sweep.scene)
+        scene_path = own_path if is_file(own_path) else scenes.find_scene(sweep.scene)
     except InputError as error:
         raise InputError(f"{path} [scene]", f"'{sweep.scene}' {error.problem}", error.remedy) from None
-    scene = load_scene(scene_path, run.overrides(settings))
-    run.examine(scene, settings)
+    scene = load_scene(scene_path, scenes.overrides(settings))
+    scenes.examine(scene, settings)
     return sweep, scene
 
 
 def of_scene(
     scene: Scene, table: Mapping[str, Any], workers: int | None = None, scheduler: str | None = None
 ) -> xr.Dataset:
-    """The dataset of a sweep that a table describes as a file does, but for its scene; see `pipeline.sweep`."""
+    """The dataset of a sweep that a table describes as a file does, but for its scene; see `fc.sweep`."""
     from flexclear.pipeline.core.scene.sweep import read_sweep
 
     plan = sweep_plan.plan(read_sweep({"scene": scene.name, **table}, UNNAMED), scene, UNNAMED)

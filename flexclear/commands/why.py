@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 
-from flexclear.commands import as_json, run
+from flexclear.commands import as_json, scenes
 from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.system.errors import shown
 from flexclear.pipeline.core.system.machine import instruction_set
@@ -16,14 +16,14 @@ from flexclear.stages.workplace import open_workplace
 
 def arguments(parser: argparse.ArgumentParser) -> None:
     """What the command takes."""
-    run.scene_arguments(parser, "json")
+    scenes.scene_arguments(parser, "json")
     parser.add_argument("--to", choices=STAGES, default="post", metavar="STAGE", help="last stage")
 
 
 def command(options: argparse.Namespace) -> None:
     """Print the state of every stage."""
     workplace, reasons, others = open_workplace(options), dict[str, dict[str, list[str]]](), dict[str, list[str]]()
-    for graph in run.graphs(options.scenes, options.set):
+    for graph in scenes.graphs(options.scenes, options.set):
         stages = states(graph.up_to(options.to), workplace.store, workplace.sources)
         reasons[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
         others[graph.scene.name] = [text for state in stages for text in elsewhere(state.task.label, state.record)]

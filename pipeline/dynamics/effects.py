@@ -1,7 +1,8 @@
 """What each effect of a scene brings: the parts that its machine code is composed of, and the modules that hold them.
 
 Nothing is compiled here, nor is anything imported that compiles: generated files (`compile.sources`), lazy imports
-(`core.scene.registry`) and the keys of results (`compile.sources.modules`) read the same tables, those of the family folders.
+(`core.scene.registry`) and the keys of results (`compile.sources.modules`) read the same tables, those of the family
+folders.
 """
 
 from __future__ import annotations

@@ -71,8 +71,8 @@ class Engine:
     def run(self, jobs: Sequence[Job], families: dict[str, bytes], done: Done) -> None:
         """Run points; `done` receives finished ones and their processor time [s], in any order of the batches.
 
-        families: what `stages.sweeps.sweep_points.work` is given of each.  Raises ResourceError when workers keep dying,
-        StoppedError when all is to stop.
+        families: what `stages.sweeps.sweep_points.work` is given of each.  Raises ResourceError when workers keep
+        dying, StoppedError when all is to stop.
         """
         waiting, running, pace, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
         evaluations, abreast = 0.0, False  # of the points that were finished last; whether code is made for several

@@ -139,7 +139,7 @@ def source_digest() -> str:
     from flexclear.pipeline.core.workflow.fingerprint import TREE
 
     digest = hashlib.sha256()
-    for folder in ("pipeline", "stages"):
+    for folder in ("commands", "papers", "pipeline", "stages"):
         # by the one import name, under which a checkout and an installed flexclear have the same files
         for path in sorted((TREE / "flexclear" / folder).rglob("*.py")):
             digest.update(path.relative_to(TREE).as_posix().encode() + path.read_bytes())

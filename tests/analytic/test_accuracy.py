@@ -6,7 +6,8 @@ import json
 
 import pytest
 
-from flexclear.pipeline import dynamics, load_scene
+from flexclear import load_scene
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.system.errors import InputError

@@ -7,7 +7,8 @@ from functools import cache
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline import dynamics, load_scene
+from flexclear import load_scene
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles, impacts

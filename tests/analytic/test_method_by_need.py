@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics, load_scene
+from flexclear import load_scene
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.effect_size import recorded as recorded_quantities
 from flexclear.pipeline.core.scene.load import edited, with_numbers

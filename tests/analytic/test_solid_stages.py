@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 from pydantic import ValidationError
 
-from flexclear import pipeline
+import flexclear as fc
 from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.artifacts.store import write_dataset
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Modes
@@ -84,7 +84,7 @@ def test_a_solid_swings_as_the_beam_does(monkeypatch: pytest.MonkeyPatch, tmp_pa
     scene = MESHES.parent / "scenes" / "checks" / "swinging_rod.toml"
     ends = []
     for name in ("actuated_rod.toml", "checks/solid_rod.toml"):
-        run = pipeline.run(pipeline.load_scene(scene, override={"body.rod.mesh": str(MESHES / name)}))
+        run = fc.run(fc.load_scene(scene, override={"body.rod.mesh": str(MESHES / name)}))
         assert float(np.abs(run["energy_error"]).max()) < 1e-10
         ends.append(run["position"].values[-1, 0])
     # a uniform pendulum swings alike whatever its mass (the solid's eight sides lack 8e-4 of it); the two differ by

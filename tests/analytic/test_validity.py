@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics, load_scene
+from flexclear import load_scene
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent

@@ -63,7 +63,7 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The project with the module and the line, and two scenes of a pendulum."""
     folder = tmp_path_factory.mktemp("project")
-    for name in ("flexclear", "pipeline", "stages"):
+    for name in ("flexclear", "papers", "pipeline", "stages"):
         shutil.copytree(root / name, folder / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     (folder / FOLDER / "heun_euler.py").write_text(MODULE)
     before, above, after = (folder / LIST).read_text().partition(ABOVE)
@@ -145,7 +145,7 @@ def test_a_cost_study_compares_it(python: Command) -> None:
         python,
         """
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.stages import cost_design
+from flexclear.commands import cost_design
 designs = cost_design.wide(load_scene("own.toml"), ("heun",))
 print(json.dumps([[d.group, d.scene.solver.integrator, d.scene.solver.rtol, d.scene.solver.step] for d in designs]))
 """,
@@ -168,11 +168,11 @@ KEYS = """
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from pathlib import Path
-from flexclear.stages import s4_simulate
+from flexclear.stages import simulation
 sources = Sources(Path.cwd())
 found = {}
 for name in ("new", "own"):
-    modules = s4_simulate.modules(load_scene(f"{name}.toml"))
+    modules = simulation.modules(load_scene(f"{name}.toml"))
     found[name] = sorted(sources.closure(["flexclear.stages.simulation", *modules]))
 print(json.dumps(found))
 """

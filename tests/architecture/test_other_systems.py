@@ -63,7 +63,7 @@ def windows(without_links: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
 def without_links(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A checkout as git makes it where it must not make links: they are small files that hold a path."""
     folder = tmp_path_factory.mktemp("checkout")
-    for name in ("pipeline", "stages", "scenes", "meshes"):
+    for name in ("papers", "pipeline", "stages", "scenes", "meshes"):
         shutil.copytree(root / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     (folder / "flexclear").mkdir()
     for path in (root / "flexclear").iterdir():
@@ -71,17 +71,16 @@ def without_links(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
             (folder / "flexclear" / path.name).write_text(os.readlink(path))
         elif path.is_file():
             shutil.copy(path, folder / "flexclear")
+    shutil.copytree(root / "flexclear/commands", folder / "flexclear/commands")
     shutil.copy(root / "pyproject.toml", folder)
     return folder
 
 
 def test_one_module_asks_for_what_only_some_systems_have(root: Path) -> None:
     found = []
-    for path in (
-        p for name in ("pipeline", "stages", "flexclear", "benchmarks") for p in sorted((root / name).rglob("*.py"))
-    ):
+    for path in _sources(root, "benchmarks"):
         place = path.relative_to(root).as_posix()
-        if place in ONES or place.startswith(("flexclear/pipeline", "flexclear/stages")):
+        if place in ONES:
             continue
         for node in ast.walk(ast.parse(path.read_bytes())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -96,10 +95,15 @@ def test_one_module_asks_for_what_only_some_systems_have(root: Path) -> None:
     assert found == []
 
 
+def _sources(root: Path, *more: str) -> list[Path]:
+    folders = ("flexclear/commands", "papers", "pipeline", "stages", *more)
+    return [path for name in folders for path in sorted((root / name).rglob("*.py"))]
+
+
 def test_all_text_is_read_and_written_as_utf_8(root: Path) -> None:
     """Windows takes the console's code page for it otherwise, and ends lines with two characters."""
     found = []
-    for path in (p for name in ("pipeline", "stages", "benchmarks") for p in sorted((root / name).rglob("*.py"))):
+    for path in _sources(root, "benchmarks"):
         for node in ast.walk(ast.parse(path.read_bytes())):
             requested = _asked(node)
             if requested:
@@ -130,7 +134,7 @@ def _asked(node: ast.AST) -> set[str]:
 def test_workers_are_made_without_fork(root: Path) -> None:
     """Windows has none, and on macOS what the system's libraries hold does not outlive it."""
     found = []
-    for path in (p for name in ("pipeline", "stages") for p in sorted((root / name).rglob("*.py"))):
+    for path in _sources(root):
         text = path.read_text(encoding="utf-8")
         pools = re.findall(r"ProcessPoolExecutor\(.+|multiprocessing\.(?:Pool|Process|Manager|Queue|set_start)", text)
         found += [f"{path.name}: {call}" for call in pools if "mp_context" not in call]
@@ -160,7 +164,7 @@ def test_a_flexible_body_is_made_without_links(without_links: Path) -> None:
 def test_a_checkout_without_links_has_the_keys_of_one_with_links(root: Path, without_links: Path) -> None:
     """Nothing is run again because of where a source lies."""
     text = (
-        "from flexclear.commands.run import graphs, open_workplace\n"
+        "from flexclear.commands.scenes import graphs, open_workplace\n"
         "place = open_workplace()\n"
         "(graph,) = graphs(['checks/pendulum'])\n"
         "from flexclear.pipeline.core.workflow.execute import key_of\n"

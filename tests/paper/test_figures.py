@@ -10,13 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear import pipeline
 from flexclear.papers.wang_wang_2019 import figures
 from flexclear.papers.wang_wang_2019.figures import fig06
 from flexclear.pipeline.core.scene.registry import lookup
 from tests.paper.material import everything
 
-TREE = Path(pipeline.__file__).parent.parent
+TREE = Path(__file__).resolve().parents[2]
 ARTIFACTS = {"run", "mesh", "tight", "post", "ensemble", "modes", "fine-modes", "bundle", "timing"}
 
 

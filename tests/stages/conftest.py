@@ -171,7 +171,7 @@ def project(tmp_path: Path, root: Path) -> Iterator[Project]:
     """A fresh copy with small engines and two scenes: tiny/ideal and tiny/contact."""
     folder = tmp_path / "project"
     folder.mkdir()
-    for name in ("flexclear", "pipeline", "stages"):
+    for name in ("flexclear", "papers", "pipeline", "stages"):
         shutil.copytree(root / name, folder / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(root / "pyproject.toml", folder)
     (folder / "pipeline" / "dynamics" / "__init__.py").write_text(ENGINE)

@@ -68,7 +68,7 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path, roo
     environment = {**os.environ, "FLEXCLEAR_RESULTS": str(tmp_path / "results"), "FLEXCLEAR_KERNELS": str(kernels)}
 
     def command(*words: str) -> None:
-        subprocess.run([sys.executable, "-m", "flexclear.stages", *words], cwd=root, env=environment, check=True)
+        subprocess.run([sys.executable, "-m", "flexclear.commands", *words], cwd=root, env=environment, check=True)
 
     def code() -> dict[Path, int]:
         return {path: path.stat().st_mtime_ns for path in kernels.rglob(f"*{files.CODE}")}

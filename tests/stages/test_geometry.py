@@ -11,7 +11,7 @@ import pytest
 from benchmarks.geometry import identify, kinematics, scenes
 from benchmarks.geometry.identify import DANGLE, DZ
 from benchmarks.geometry.kinematics import Layout, answer, jacobians, poses
-from flexclear.commands.run import find_scene
+from flexclear.commands.scenes import find_scene
 from flexclear.papers.wang_wang_2019.published import TABLE8
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene

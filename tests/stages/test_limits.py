@@ -183,7 +183,7 @@ def test_a_page_that_the_disk_has_no_room_for_is_told_by_its_place(
 
 #: a figure of a run, in this process
 DRAWN = """
-from flexclear.commands.run import graphs, open_workplace
+from flexclear.commands.scenes import graphs, open_workplace
 (graph,) = graphs(["checks/pendulum"])
 print([failure.message for failure in open_workplace().bring([graph.overview], jobs=1).failures])
 """

@@ -9,7 +9,7 @@ from pathlib import Path
 
 FIRST = """
 import numpy, scipy.linalg
-from flexclear.commands.run import graphs, open_workplace
+from flexclear.commands.scenes import graphs, open_workplace
 (graph,) = graphs(["checks/clamped_rod"])
 done = open_workplace().bring(list(graph.bundle.values()), jobs=1)
 print(*(done.records[id(task)].digest for task in graph.bundle.values()))

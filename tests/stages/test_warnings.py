@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flexclear.pipeline import load_scene
+from flexclear import load_scene
 from flexclear.stages.simulation import missing_compliance
 from tests.analytic.mechanism_runs import bundles
 

@@ -183,9 +183,9 @@ def test_an_edited_scene_does_not_take_the_place_of_its_file(project: Project):
     shown = project.results / "runs" / "tiny" / "contact" / "run.nc"
     before = shown.read_bytes()
     code = (
-        "from flexclear import pipeline\n"
-        "scene = pipeline.load_scene('scenes/tiny/contact.toml', override={'output.interval': '1 ms'})\n"
-        "run = pipeline.run(scene)\n"
+        "import flexclear as fc\n"
+        "scene = fc.load_scene('scenes/tiny/contact.toml', override={'output.interval': '1 ms'})\n"
+        "run = fc.run(scene)\n"
         "print(float(run.time[1]), run.attrs['title'])"
     )
     command = [sys.executable, "-c", code]

@@ -1,8 +1,8 @@
 """The paper's figures and tables. To add one: a module here with NEEDS and make, and a line below.
 
 ``NEEDS``: references of the artifacts it reads, ``<scene>:<artifact>[/<body>]``; a literal.
-They are listed in an index (`papers.wang_wang_2019.figure_stage`), since asking the modules takes the import of the plotting libraries.
-``make(data)``: artifacts by reference -> file contents by file name.
+They are listed in an index (`papers.wang_wang_2019.figure_stage`), since asking the modules takes the import of the
+plotting libraries. ``make(data)``: artifacts by reference -> file contents by file name.
 """
 
 from __future__ import annotations

@@ -6,8 +6,8 @@ and ``kinetic`` belongs to the whole mechanism. The words are the names of the r
 means the first of `OWNERS` that has such a part. ``force(A1)`` is another way to write ``A1.force``.
 Expressions combine quantities and numbers with units (`pipeline.core.scene.expression`): ``force(A1) - force(A2)``,
 ``max(0, slider.position.x - 10 mm)``; ``t`` is the time, ``norm(...)`` the magnitude.
-How runs hold quantities is known to `pipeline.core.artifacts.quantities`, which needs NumPy; a command that finds everything
-fresh does not.
+How runs hold quantities is known to `pipeline.core.artifacts.quantities`, which needs NumPy; a command that finds
+everything fresh does not.
 """
 
 from __future__ import annotations

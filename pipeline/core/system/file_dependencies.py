@@ -1,7 +1,7 @@
 """Which files a task reads: what they hold decides its result, so it is among the facts of its key.
 
-Whoever reads a file notes it (`note`): readers of scenes, recipes and tables, `core.system.external_files` for what others
-made, with the companions of its format, and what assembles pages.
+Whoever reads a file notes it (`note`): readers of scenes, recipes and tables, `core.system.external_files` for what
+others made, with the companions of its format, and what assembles pages.
 """
 
 from __future__ import annotations
