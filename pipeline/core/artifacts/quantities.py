@@ -73,7 +73,7 @@ _OPERATORS: dict[str, Callable[..., np.ndarray]] = {
     "max": np.maximum,
     "min": np.minimum,
     "step": lambda a: np.heaviside(a, 1.0),
-    **{name: getattr(np, name) for name in ("abs", "sqrt", "sin", "cos", "tan", "exp", "log", "sign")},
+    **{name: getattr(np, name) for name in ("abs", "sqrt", "sin", "cos", "tan", "exp", "log", "tanh", "sign")},
 }
 
 

@@ -267,8 +267,30 @@ class Repeated(Part):
         return self
 
 
+class Expression(Part):
+    """An expression of the time `t` that makes polynomials and sines, as ``h * sin(w * t)^2``.
+
+    `max`, `min`, `abs`, `sign` and `step` part it into pieces between start and end.
+    value: the expression.  values: named constants, each a number or text with its unit.  start, end: between which it
+    is used, where it has such kinks.
+    """
+
+    type: Literal["expression"]
+    value: str
+    values: dict[str, Value] = Field(default_factory=dict)
+    start: Time = 0.0
+    end: Time | None = None
+
+    @model_validator(mode="after")
+    def _lasts(self) -> Self:
+        if self.end is not None and not self.start < self.end:
+            raise ValueError(f"it must end after it starts; start = {self.start:g} s, end = {self.end:g} s")
+        return self
+
+
 Law = Annotated[
-    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated, Field(discriminator="type")
+    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated | Expression,
+    Field(discriminator="type"),
 ]
 #: all of them
 KINDS: tuple[Any, ...] = get_args(get_args(Law)[0])

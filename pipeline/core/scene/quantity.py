@@ -196,15 +196,36 @@ def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     owners: names of the scene's parts by `OWNERS`; of a mapping, whether each is about an axis (`owners.owners`).
     Raises ValueError that names what could have been meant.
     """
-    plain = _CALL.sub(r"\2.\1", text.strip())
+    plain = _as_owned(text)
     if _PLAIN.fullmatch(plain):
         quantity = _term(plain, owners)
     else:
-        quantity = Quantity("", EXPRESSION, steps=tuple(Reader(plain, lambda name: _term(name, owners)).whole()))
+        quantity = Quantity("", EXPRESSION, steps=tuple(read(plain, owners)))
         if not quantity.terms():
             raise ValueError(f"'{text}' is a number, and no quantity")
         _ = quantity.dim
     return quantity if quantity.name == text else replace(quantity, text=text)
+
+
+def read(
+    text: str,
+    owners: Mapping[str, Collection[str]],
+    constants: Mapping[str, tuple[float, str]] | None = None,
+    local: Mapping[str, Any] | None = None,
+) -> list[Any]:
+    """An expression in postfix order (`pipeline.core.scene.expression`); ValueError as of `parse`.
+
+    constants: value and SI unit of each.  local: what further names mean.
+    """
+    known = local or {}
+    return Reader(
+        _as_owned(text), lambda name: known[name] if name in known else _term(name, owners), constants
+    ).whole()
+
+
+def _as_owned(text: str) -> str:
+    """The text with ``force(A1)`` written as ``A1.force``."""
+    return _CALL.sub(r"\2.\1", text.strip())
 
 
 def _term(name: str, owners: Mapping[str, Collection[str]]) -> Quantity:

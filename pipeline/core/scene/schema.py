@@ -15,6 +15,7 @@ from flexclear.pipeline.core.scene.clearance import (
 )
 from flexclear.pipeline.core.scene.drives import Drive
 from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
+from flexclear.pipeline.core.scene.formulas import check_formulas
 from flexclear.pipeline.core.scene.gears import Gear
 from flexclear.pipeline.core.scene.limits import Limits, check_members, check_rows
 from flexclear.pipeline.core.scene.loads import Gravity, Load, SampledPid
@@ -300,6 +301,7 @@ class Scene(Part):
         self._amounts_are_allowed()
         self._samples_can_be_made()
         self._quantities_are_there()
+        check_formulas(self)
         self._stressed_bodies_are_flexible()
         self._bodies_have_files_of_their_own()
 

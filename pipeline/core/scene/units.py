@@ -184,6 +184,8 @@ def _product(text: str) -> tuple[float, Exponents] | None:
     for k, side in enumerate(text.split("/")):
         for part in side.split() or [""]:
             match = _FACTOR.fullmatch(part)
+            if part == "1" and text.startswith("1/"):
+                continue
             if match is None or match[1] not in UNITS:
                 return None
             power = float(match[2] or 1.0) * (-1.0 if k else 1.0)
@@ -214,6 +216,11 @@ def measured(text: str) -> Exponents:
     if product is None:
         raise ValueError(f"'{text}' is no unit")
     return product[1]
+
+
+def exponents(dimension: str) -> Exponents:
+    """Exponents of kg, m, s and rad of a dimension."""
+    return _EXPONENTS[dimension]
 
 
 def si(exponents: Exponents) -> str:
@@ -318,11 +325,12 @@ def any_quantity(value: object) -> float | str:
     written = match[2] if match is not None else None
     if written is None or written == "%":
         return quantity(value, "number")
-    known = unit(written)
-    if known is None:
+    known, product = unit(written), _product(_plain(written))
+    if known is not None:
+        return f"{quantity(value, known[1])!r} {_example(known[1], factor=1.0)}"
+    if match is None or product is None:
         raise ValueError(unknown(written, str(value)))
-    dimension = known[1]
-    return f"{quantity(value, dimension)!r} {_example(dimension, factor=1.0)}"
+    return f"{_computable(float(match[1]) * product[0], value)!r} {si(product[1])}"
 
 
 def unknown(written: str, value: str = "") -> str:

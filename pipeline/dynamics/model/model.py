@@ -131,6 +131,7 @@ def filled(
             m.N_DRIVES: numbering.known,
             m.N_INTERNAL: gauges.internal,
             m.N_COUPLINGS: len(coupled),
+            m.N_LOAD_BENDS: len(loaded.bends),
             m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
             m.LOAD_SLOT: contact_ledger,
             m.RUBBING_SLOT: contact_ledger + ledger,
