@@ -209,7 +209,7 @@ def _symmetric(J: np.ndarray) -> list[float]:
 
 #: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted, up to
 #: which the mass matrix is factored as a matrix: beyond it, articulated inertias take less time (docs/engine.md)
-DEEP = 9.0
+DEEP = 8.0
 #: tables that follow from links, joints, frames and flexible bodies alone
 WIRED = (
     *(
