@@ -12,13 +12,13 @@ import xarray as xr
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import DOCS
+from flexclear.commands.scenes import bundles, find_scene
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.post import derive
-from flexclear.stages import s6_render
-from flexclear.stages.run import bundles, find_scene
+from flexclear.stages import rendering
 
 PICTURES = DOCS / "gallery"
 #: of the pictures: pixels, and colours that are kept, so that a page of them stays small
@@ -301,7 +301,7 @@ def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None
 
     from flexclear.pipeline.post.render import film, mechanism
 
-    told = s6_render.params(scene, "motion", "html")
+    told = rendering.params(scene, "motion", "html")
     looks = mechanism.Looks(bodies=told["bodies"], **told.get("view", {}))
     drawn = mechanism.mechanism(run, reduced, looks)
     row = round(entry.at * (run.sizes["time"] - 1))

@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.artifacts.labelled import Labelled, LabelledArrays
-    from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
     from flexclear.pipeline.dynamics.record.cost import Cost
     from flexclear.pipeline.dynamics.run.method_selection import Suit
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
@@ -20,7 +20,7 @@ __all__ = ["campbell", "cost", "ensemble", "equilibrium", "frequencies", "sectio
 
 def simulate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     """What `simulated` gives, as a dataset; so is what there is of a run that is asked to stop."""
-    from flexclear.pipeline.core.errors import StoppedError
+    from flexclear.pipeline.core.system.errors import StoppedError
 
     try:
         return simulated(scene, bundles, progress).to_xarray()
@@ -42,7 +42,7 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     """
     from flexclear.pipeline.core.artifacts.labelled import of
     from flexclear.pipeline.core.artifacts.schema import incomplete
-    from flexclear.pipeline.core.errors import StoppedError
+    from flexclear.pipeline.core.system.errors import StoppedError
     from flexclear.pipeline.dynamics.record.dataset import recorded, warnings
     from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable
     from flexclear.pipeline.dynamics.run.run import Run, integrate

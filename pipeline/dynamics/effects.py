@@ -1,7 +1,8 @@
 """What each effect of a scene brings: the parts that its machine code is composed of, and the modules that hold them.
 
 Nothing is compiled here, nor is anything imported that compiles: generated files (`compile.sources`), lazy imports
-(`core.registry`) and the keys of results (`compile.sources.modules`) read the same tables, those of the family folders.
+(`core.scene.registry`) and the keys of results (`compile.sources.modules`) read the same tables, those of the family
+folders.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core import integrators
-from flexclear.pipeline.core.registry import module_of
+from flexclear.pipeline.core.scene import integrators
 from flexclear.pipeline.core.scene.ideal import WITHOUT_CLEARANCE, loose
+from flexclear.pipeline.core.scene.registry import module_of
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene

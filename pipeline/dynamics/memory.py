@@ -36,11 +36,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.core.event_kinds import CLOSING as CLOSING
-from flexclear.pipeline.core.event_kinds import COMPRESSION as COMPRESSION
-from flexclear.pipeline.core.event_kinds import OPENING as OPENING
-from flexclear.pipeline.core.event_kinds import SLIPPING as SLIPPING
-from flexclear.pipeline.core.event_kinds import STICKING as STICKING
+from flexclear.pipeline.core.scene.event_kinds import CLOSING as CLOSING
+from flexclear.pipeline.core.scene.event_kinds import COMPRESSION as COMPRESSION
+from flexclear.pipeline.core.scene.event_kinds import OPENING as OPENING
+from flexclear.pipeline.core.scene.event_kinds import SLIPPING as SLIPPING
+from flexclear.pipeline.core.scene.event_kinds import STICKING as STICKING
 from flexclear.pipeline.dynamics.kernels import kernel
 
 _place = count()

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 from benchmarks.families.gallery import ENTRIES, scene_of, solved
-from flexclear.stages.run import bundles
+from flexclear.commands.scenes import bundles
 
 #: kinds of mechanisms that whoever looks for a beginning expects to find
 EXPECTED = {"four_bar", "clearance_slider_crank", "scott_russell", "stewart", "robot_arm", "universal_shaft"}

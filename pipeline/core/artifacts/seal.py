@@ -12,7 +12,7 @@ from functools import cache
 
 from flexclear.pipeline.core.artifacts.disk import temporary
 from flexclear.pipeline.core.artifacts.paths import kernel_root
-from flexclear.pipeline.core.system import replace
+from flexclear.pipeline.core.system.platforms import replace
 
 NAME, BYTES = "seal", 32
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, TypeVar
 
-from flexclear.pipeline.core import units
+from flexclear.pipeline.core.scene import units
 
 T = TypeVar("T")
 #: functions of one argument, and those of two or more

@@ -12,9 +12,9 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
-from flexclear.pipeline.core.file_dependencies import note
 from flexclear.pipeline.core.scene.fields import Angle, Part, Rate, Time
-from flexclear.pipeline.core.units import any_quantity, quantity, unit, unknown
+from flexclear.pipeline.core.scene.units import any_quantity, quantity, unit, unknown
+from flexclear.pipeline.core.system.file_dependencies import note
 
 _TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits the quantity"}
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]

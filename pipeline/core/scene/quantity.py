@@ -6,8 +6,8 @@ and ``kinetic`` belongs to the whole mechanism. The words are the names of the r
 means the first of `OWNERS` that has such a part. ``force(A1)`` is another way to write ``A1.force``.
 Expressions combine quantities and numbers with units (`pipeline.core.scene.expression`): ``force(A1) - force(A2)``,
 ``max(0, slider.position.x - 10 mm)``; ``t`` is the time, ``norm(...)`` the magnitude.
-How runs hold quantities is known to `pipeline.core.quantities`, which needs NumPy; a command that finds everything
-fresh does not.
+How runs hold quantities is known to `pipeline.core.artifacts.quantities`, which needs NumPy; a command that finds
+everything fresh does not.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from flexclear.pipeline.core import units
-from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene import units
 from flexclear.pipeline.core.scene.expression import FUNCTIONS, SEVERAL, Reader, measure
+from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.run_schema import RUN
 
 #: dimension of a run -> what its entries are; a word that several have means the first. Sections are named by bodies

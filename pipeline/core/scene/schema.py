@@ -5,7 +5,6 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from flexclear.pipeline.core import portable
 from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.clearance import (
     CONTACTS,
@@ -34,7 +33,8 @@ from flexclear.pipeline.core.scene.quantity import Quantity, parse, usual
 from flexclear.pipeline.core.scene.solver import NAMING, PlainIntegrator, Solver
 from flexclear.pipeline.core.scene.start import Start
 from flexclear.pipeline.core.scene.stops import Stop
-from flexclear.pipeline.core.units import any_quantity, measured, quantity
+from flexclear.pipeline.core.scene.units import any_quantity, measured, quantity
+from flexclear.pipeline.core.system import file_names
 
 Positive = Field(gt=0.0)
 #: types of joints with one freedom: driving it determines the whole relative motion
@@ -262,11 +262,11 @@ class Scene(Part):
         """Results are sent from one system to another: meshes and modes of bodies are files called by their names."""
         names: dict[str, str] = {}
         for name in self.recipes():
-            if portable.is_device(name):
+            if file_names.is_device(name):
                 raise ValueError(
                     f"body.{name}: '{name}' is a device on Windows, and files are called by this name: give it another"
                 )
-            other = names.setdefault(portable.folded(name), name)
+            other = names.setdefault(file_names.folded(name), name)
             if other != name:
                 raise ValueError(
                     f"body.{name}: is called as '{other}' but for capitals or accents, which names of files on Windows "

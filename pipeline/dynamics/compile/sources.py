@@ -12,8 +12,8 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
-from flexclear.pipeline.core import integrators
-from flexclear.pipeline.core.registry import listed
+from flexclear.pipeline.core.scene import integrators
+from flexclear.pipeline.core.scene.registry import listed
 from flexclear.pipeline.core.workflow.fingerprint import TREE, source_file
 from flexclear.pipeline.dynamics.effects import (
     FORMS,

@@ -7,7 +7,7 @@ regularised coefficient.
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import JointFriction as Declared
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.contact.friction.modified_coulomb import coefficient
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel

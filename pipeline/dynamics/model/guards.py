@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import FRICTION_LAWS
 from flexclear.pipeline.dynamics.joints.bearings import BEARINGS
