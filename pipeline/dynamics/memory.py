@@ -224,7 +224,9 @@ BOOKS = wiring("work loss load")  # of each independent mechanism: places in the
 DRIVES = wiring("book")  # place in the ledger of each drive's work
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
-LINK_NUMBERS = numbers("mass com:3 inertia:6")  # inertia about the centre of mass (xx yy zz xy xz yz), link axes
+#: inertia about the centre of mass (xx yy zz xy xz yz), link axes; borne, reaching: mass of the link and all beyond,
+#: and a bound of their polar moment about its origin
+LINK_NUMBERS = numbers("mass com:3 inertia:6 borne reaching")
 SITE_NUMBERS = numbers("origin:3 axes:3x3")  # in the link
 FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3")
 FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness (n), damping (n)
@@ -269,12 +271,9 @@ OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")
 COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
 #: of each link, about its origin, which arm leads to from its parent's: what it offers to its parent, inertia as
-#: (turning mixed; mixed^T moving) of twists to wrenches; a wrench; an acceleration; mass, first and polar moment of
-#: all beyond; the wrench that its own accelerations need (`equations.articulated`)
-ARTICULATED = work(
-    "turning:6 mixed:3x3 moving:6 moment:3 force:3 angular:3 linear:3 arm:3 mass centre:3 polar own_moment:3 "
-    "own_force:3"
-)
+#: (turning mixed; mixed^T moving) of twists to wrenches; a wrench; an acceleration; the wrench that its own
+#: accelerations need (`equations.articulated`)
+ARTICULATED = work("turning:6 mixed:3x3 moving:6 moment:3 force:3 angular:3 linear:3 arm:3 own_moment:3 own_force:3")
 #: of three closure rows at once: what a link transmits to its parent, a column each
 TRANSMITTED = work("moments:3x3 forces:3x3")
 #: of each coordinate: its column about its link's origin, and the factor's K
