@@ -280,17 +280,22 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
     return dataset
 
 
-def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
-    """Which of a scene's effects the accuracy that it wants calls for: the planned scene, and the evidence.
+def plan(
+    scene: Scene | str | Path, budget: str | float | None = None, *, accuracy: str = "1 %"
+) -> tuple[Scene, xr.Dataset]:
+    """Which of a scene's effects the requested accuracy calls for: the planned scene, and the evidence.
 
     The dataset (`pipeline.post.answers.plan.dataset`) holds the estimated influence of each effect on each quantity of
-    `[accuracy]`, what was decided, and why.  Raises FlexclearError.
+    `[accuracy]`, what was decided, and why.  accuracy: of all watched quantities, as a fraction of their sizes, for a
+    scene without `[accuracy]`.  budget: time in which members of the full and the planned scene are compared [s], or
+    text such as "1min"; the dataset then has the plan's true `error`, its `chance` and the `scatter` of single runs.
+    In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     from flexclear.commands import plan as plan_command
     from flexclear.stages.workplace import open_workplace
 
-    planned = plan_command.bring(_loaded(scene), open_workplace())
-    return planned.planned, planned.dataset()
+    planned: tuple[Scene, xr.Dataset] = plan_command.dataset(_loaded(scene), open_workplace(), accuracy, budget)
+    return planned
 
 
 def render(scene: Scene | str | Path) -> Path:

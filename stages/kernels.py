@@ -45,13 +45,13 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """
     import xarray as xr
 
-    begun = _processor_time()
+    begun = processor_time()
     warm(simulation.rebuild(params["simulate"], inputs), simulation.bundles(inputs), progress)
-    return {"nc": xr.Dataset(attrs={"compile_seconds": _processor_time() - begun})}
+    return {"nc": xr.Dataset(attrs={"compile_seconds": processor_time() - begun})}
 
 
-def _processor_time() -> float:
-    """Of this process and of those that it started and that have ended [s]: some code may be compiled by one."""
+def processor_time() -> float:
+    """Return the processor time of this process and of the ended ones that it started [s], which may compile, too."""
     import os
 
     return sum(os.times()[:4])

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """``stability.nc`` (value, limit, verdict, remedy over `check`; the answer as an attribute) and a figure.
 
+    params: `by_need`, whether the program chose the integrator.
     inputs: ``run``, ``study`` where there is one, and ``post`` where the scene has an ensemble.
     """
     import xarray as xr
@@ -21,7 +22,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from flexclear.pipeline.post.answers import stability
 
     members = float(inputs["post"]["ensemble_horizon"]) if "post" in inputs else None
-    result = stability.checks(inputs["run"], inputs.get("study"), members)
+    result = stability.checks(inputs["run"], inputs.get("study"), members, by_need=params["by_need"])
     columns = {name: ("check", [str(getattr(c, name)) for c in result]) for name in ("value", "limit", "verdict")}
     columns["remedy"] = ("check", [c.advice for c in result])
     attributes = {"Conventions": "CF-1.11", "answer": stability.answer(inputs["run"], result, members)}

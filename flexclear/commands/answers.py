@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from flexclear.commands import cost
 from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.ideal import loose
+from flexclear.pipeline.core.scene.ideal import ideal, loose
 from flexclear.pipeline.core.scene.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect
@@ -96,7 +96,7 @@ def said(name: str, answer: Answer, scene: Scene) -> Said:
     asked = scene.accuracy.quantities if scene.accuracy is not None else {}
     requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
     table = as_html(from_markdown(answer.text("matters.md")))
-    caption = "Change of each quantity without the effect"
+    caption = "Change of each quantity without the effect; thin lines: what of it may be chance"
     return Said("Which effects matter", matters.sentence(data, requested), "matters.png", caption, table)
 
 
@@ -175,7 +175,7 @@ class Answers:
             stage="stability",
             scene=self.scene.name,
             run="flexclear.stages.stability_checks:run",
-            params={},
+            params={"by_need": self.scene.by_need()},
             inputs={"run": graph.simulate, **study, **members},
             folder=f"stability/{self.scene.name.replace('/', '_')}",
             names={"nc": "stability.nc"},
@@ -203,6 +203,10 @@ class _Comparison:
     study: cost.Study
     tasks: dict[str, dict[int, Task]] = field(default_factory=dict)
     spent: float = 0.0
+    #: whether members are run at the scene's own tolerance, since the one for means was refused
+    tight: bool = False
+    #: what a run of each variant took [s]
+    took: dict[str, float] = field(default_factory=dict)
 
     def task(self) -> Task:
         """The task of the answer, its points made."""
@@ -212,14 +216,17 @@ class _Comparison:
         pairs = dict.fromkeys(names, 0)
         waiting, levels = names, MEMBERS if self._touching("") else (0,)
         for members in levels:
-            if members != levels[0] and not self._affords(waiting, members):
+            if members != levels[0]:
+                waiting = self._fitting(waiting, members)
+            if not waiting:
                 break
             self._bring(["", *waiting], members)
+            if not self.tight and any(self._point(name, members).refused for name in ("", *waiting)):
+                self.tight = True
+                self._bring(["", *waiting], members)
             pairs |= dict.fromkeys(waiting, members)
             full = self._point("", members)
             waiting = [n for n in waiting if undecided(Pair(full, self._point(n, members), members), self.chosen)]
-            if not waiting:
-                break
         words = {effect.name: effect.words for effect in self.effects} | {IDEAL: IDEAL}
         made = {name: (self._variant(name), self.tasks[name]) for name in ("", *names)}
         left = [words[name] for name in undone]
@@ -228,14 +235,21 @@ class _Comparison:
     def _affordable(self) -> tuple[list[str], list[str]]:
         """Effects in the order in which they are examined, and those that the budget does not reach."""
         names = list(self._gone)
-        most, cost_of_one = self.study.seconds, self._seconds("", MEMBERS[0])
-        taken, total = list[str](), cost_of_one
+        taken, total, known = list[str](), self._seconds("", MEMBERS[0]), self._compiled
         for name in names:
-            total += cost_of_one + self._compiling(name)
-            if taken and total > most:
-                break
-            taken.append(name)
-        return taken, names[len(taken) :]
+            kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
+            one = self._seconds(name, MEMBERS[0]) + (0.0 if kinds in known else cost.COMPILING / AT_ONCE)
+            if not taken or total + one <= self.study.seconds:
+                taken.append(name)
+                total, known = total + one, known | {kinds}
+        return taken, [name for name in names if name not in taken]
+
+    @property
+    def _compiled(self) -> set[tuple[str, ...]]:
+        """Kinds of kernels that are there: those of the costs of accuracy, and of the run of the ideal scene."""
+        scenes = [design.scene for design in self.study.points]
+        scenes += [watched_quantities.plain(ideal(self.scene))] if loose(self.scene) or self.scene.flexible() else []
+        return {kernels.shared(scene) for scene in scenes}
 
     @cached_property
     def _gone(self) -> Mapping[str, frozenset[str]]:
@@ -257,7 +271,8 @@ class _Comparison:
         if setting.step is not None:
             return variant
         rigid = setting.integrator == VIBRATING and not variant.flexible()
-        rtol = max(setting.rtol, MEANS) if variant.contacts() or variant.stop else setting.rtol
+        means = (variant.contacts() or variant.stop) and not self.tight
+        rtol = max(setting.rtol, MEANS) if means else setting.rtol
         return edited(variant, {"solver.integrator": DEFAULT if rigid else setting.integrator, "solver.rtol": rtol})
 
     def _touching(self, name: str) -> bool:
@@ -265,24 +280,29 @@ class _Comparison:
         return bool(scene.contacts() or scene.stop)
 
     def _seconds(self, name: str, members: int) -> float:
+        """Of wall time that so many members are predicted to take: as in the last round, else as the scene's run."""
         runs = members if self._touching(name) else 1
-        return (runs * self.study.own * self.study.pace + cost.POINT) / AT_ONCE
+        return (runs * self.took.get(name, self.study.own * self.study.pace) + cost.POINT) / AT_ONCE
 
-    def _compiling(self, name: str) -> float:
-        known = {kernels.shared(design.scene) for design in self.study.points}
-        return (
-            0.0 if kernels.shared(watched_quantities.plain(self._variant(name))) in known else cost.COMPILING / AT_ONCE
-        )
-
-    def _affords(self, names: Sequence[str], members: int) -> bool:
-        return self.spent + sum(self._seconds(name, members) for name in ("", *names)) <= self.study.seconds
+    def _fitting(self, names: Sequence[str], members: int) -> list[str]:
+        """Those that the rest of the budget holds, the first ones first: what the summary says before the others."""
+        fitting, total = list[str](), self.spent + self._seconds("", members)
+        for name in names:
+            seconds = self._seconds(name, members)
+            if total + seconds <= self.study.seconds:
+                fitting.append(name)
+                total += seconds
+        return fitting
 
     def _bring(self, names: Sequence[str], members: int) -> None:
         made = {name: watched_quantities.task(self._variant(name), self.chosen, members) for name in names}
-        check(self.workplace.bring(list(made.values())))
+        outcome = self.workplace.bring(list(made.values()))
+        check(outcome)
         for name, task in made.items():
             self.tasks.setdefault(name, {})[members] = task
-            self.spent += self._seconds(name, members)
+            seconds = self.workplace.store.load(outcome.records[id(task)]).attrs
+            self.took[name] = float(seconds["cpu_seconds"]) / (members if self._touching(name) else 1)
+            self.spent += self._seconds(name, members) + float(seconds["compile_seconds"]) / AT_ONCE
 
     def _point(self, name: str, members: int) -> Point:
         task = self.tasks[name][members]

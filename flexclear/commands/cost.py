@@ -26,6 +26,7 @@ from flexclear.stages.workplace import open_workplace, relative
 if TYPE_CHECKING:
     import xarray as xr
 
+    from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.post.cost.page import Studied
 
@@ -145,6 +146,11 @@ class Study:
         self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
         self._complete = True
 
+    @property
+    def _chosen(self) -> list[Quantity]:
+        """The quantities that the scene asks an accuracy for, else those that it watches."""
+        return self.scene.requested() if self.scene.accuracy is not None else self.scene.watched()
+
     @cached_property
     def _near(self) -> list[cost_design.Design]:
         return cost_design.neighbours(self.scene, self.setting)
@@ -160,7 +166,6 @@ class Study:
 
     def task(self) -> Task:
         """The task of the study of all points that there are."""
-        chosen = self.scene.requested()
         listed = [
             {"key": d.key, "group": d.group, "factors": dict(d.factors), "input": f"point{k}"}
             for k, d in enumerate(self.points)
@@ -172,7 +177,7 @@ class Study:
             run="flexclear.stages.cost_study:run",
             params={
                 "points": listed,
-                "quantities": [q.written() for q in chosen],
+                "quantities": [q.written() for q in self._chosen],
                 "title": self.scene.title,
                 "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
                 "complete": self._complete and not self.undone,
@@ -193,7 +198,7 @@ class Study:
 
     def ensembles(self) -> None:
         """Ensembles at several tolerances, of a scene that has one, as far as the budget goes."""
-        names, ensemble = [q.name for q in self.scene.requested()], self.scene.ensemble
+        names, ensemble = [q.name for q in self._chosen], self.scene.ensemble
         for rtol in ENSEMBLES if ensemble is not None else ():
             change = edited(self.scene, {"solver.rtol": rtol, "accuracy": None})
             design = cost_design.Design(f"ensemble, rtol {rtol:g}", "ensemble", {}, change)
@@ -224,7 +229,7 @@ class Study:
         if self.own:
             limit = min(self.scene.solver.evaluations, self._most())
             design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
-        names, first = [q.name for q in self.scene.requested()], kernels.shared(design.scene) not in self._compiled
+        names, first = [q.name for q in self._chosen], kernels.shared(design.scene) not in self._compiled
         compiled = self._kernels(design)
         task = _measured(design, "run", {"quantities": names, "brief": bool(self.points)}, compiled)
         outcome = self.workplace.bring([task, compiled] if first else [task])

@@ -103,6 +103,27 @@ def asking(scene: Scene, level: str) -> Scene:
     return asked
 
 
+def dataset(scene: Scene, workplace: Workplace, level: str, budget: str | float | None) -> tuple[Scene, xr.Dataset]:
+    """The planned scene, and the plan as a dataset that shows its answer in a notebook.
+
+    level: accuracy of all watched quantities, where the scene requests none.  budget: of `errors_of` [s], or text; None
+    leaves them out.
+    """
+    from flexclear.pipeline.post.answers.answered import answered
+    from flexclear.pipeline.post.answers.plan import verified, words
+    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
+
+    planned = bring(scene if scene.accuracy is not None else asking(scene, level), workplace)
+    result, table = planned.dataset(), as_html(from_markdown(planned.text()))
+    if budget is not None:
+        seconds = limit.seconds(budget, "budget") if isinstance(budget, str) else budget
+        compared = errors_of(planned, workplace, seconds)
+        result = result.assign({name: compared[name] for name in ("wanted", "error", "chance", "scatter")})
+        table = as_html(verified(compared)) + table
+    picture = planned.stored("plan.png").read_bytes()
+    return planned.planned, answered(result, words(result), picture, table)
+
+
 def planned_scenes(requested: list[Graph], workplace: Workplace) -> list[Planned]:
     """The plans of scenes, brought up to date and printed."""
     plans = [bring(graph.scene, workplace) for graph in requested]
@@ -281,7 +302,7 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
 
 
 def _columns(result: xr.Dataset) -> list[tuple[float, float, float]]:
-    """Error, chance and what is requested, by quantity."""
+    """Error, chance and requested accuracy, by quantity."""
     columns = (result[key].values for key in ("error", "chance", "wanted"))
     return [(float(e), float(c), float(w)) for e, c, w in zip(*columns, strict=True)]
 
@@ -315,4 +336,5 @@ def _compared(results: Planned, workplace: Workplace, members: int) -> xr.Datase
             result["wanted"][k] = want.relative * effect_size.size(one, q)
     result["error"] = (("quantity",), [i.difference for i in difference])
     result["chance"] = (("quantity",), [i.uncertainty for i in difference])
+    result["scatter"] = (("quantity",), [effect_size.scatter(one, q) for q in chosen])
     return result.assign_attrs(full_evaluations=one.evaluations, planned_evaluations=two.evaluations, members=members)

@@ -70,9 +70,19 @@ def test_the_summary_says_what_changes_by_how_much_and_how_sure_it_is():
     assert "3 % of its size" in changed
     (same,) = ideal_sentences(study(ideal=Pair(point(0.0), point(0.0), 0)))
     assert "does not change" in same
-    (open_,) = ideal_sentences(study(ideal=Pair(point(0.0, 0.5), point(0.0, 0.5), 4)))
+    (open_,) = ideal_sentences(study(ideal=Pair(point(0.0, 5e-3), point(0.0), 4)))
     assert "at most" in open_
     assert "would decide it" in open_
+
+
+def test_runs_that_scatter_about_an_undecided_mean_are_not_predictable():
+    (said,) = ideal_sentences(study(ideal=Pair(point(0.0, 0.5), point(0.0), 4)))
+    assert "4 runs scatter by <b class='n'>500 mm/s</b> (50 % of its size)" in said
+
+
+def test_effects_that_the_budget_did_not_reach_come_before_what_is_said_of_the_others():
+    found = study(strong=Pair(point(0.0), point(0.2), 0)).assign_attrs(undone="gravity")
+    assert sentence(found, {}).startswith("The budget did not reach gravity. Of the other effects: An accuracy")
 
 
 def test_the_answer_says_which_accuracy_calls_for_which_effect():
@@ -85,7 +95,7 @@ def test_the_answer_says_which_accuracy_calls_for_which_effect():
 
 def test_a_requested_accuracy_decides_instead_of_levels():
     found = study(strong=Pair(point(0.0), point(0.2), 0), weak=Pair(point(0.0), point(5e-3), 0))
-    assert sentence(found, {"slider.velocity": 0.1}) == "The accuracy that the scene asks for calls for strong."
+    assert sentence(found, {"slider.velocity": 0.1}) == "The requested accuracy calls for strong."
 
 
 def test_what_chance_may_hide_is_not_called_absent():

@@ -33,6 +33,7 @@ from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.search import summed
 from flexclear.pipeline.dynamics.plan.tolerance import no_dearer
 from flexclear.pipeline.dynamics.run.run import Run, integrate
+from flexclear.pipeline.post.answers.plan import _verdict
 from flexclear.pipeline.post.answers.plan import verdict as judged
 from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.graph import Graph
@@ -304,6 +305,14 @@ def test_met_and_missed_are_said_only_where_error_and_chance_agree(error, chance
     assert judged(error, chance, wanted) == verdict
 
 
+def test_an_undecided_verdict_says_how_far_single_runs_scatter():
+    one = xr.Dataset({"error": 0.5, "chance": 5.0, "wanted": 1.0, "scatter": 2.0, "unit": "m"}, attrs={"members": 4})
+    said = _verdict(one)
+    assert said == "not decided: single runs of the full scene scatter by 2 m; means of 400 members would decide"
+    assert _verdict(one.assign(scatter=0.5)) == "not decided: 400 members would"
+    assert _verdict(one.assign(error=8.0)) == "missed, 8 times"  # the means differ by more than chance and request
+
+
 def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Path, results: Path):
     scene = edited(
         _tight(_standing_leg(tmp_path)), {"accuracy": {"quantities": {"platform.position": {"absolute": 1.0}}}}
@@ -398,3 +407,16 @@ def test_a_scene_that_cannot_be_run_as_it_stands_has_no_plan(tmp_path: Path, res
         plan.bring(wild, open_workplace())
     assert refused.value.exit_code == 3
     assert not [*(results / "plan").rglob("*.toml"), *(results / "plan").rglob("*.nc")]
+
+
+def test_from_python_a_scene_without_a_requested_accuracy_is_planned_for_a_fraction_of_each_size(tmp_path: Path):
+    """Without gravity the template's pendulum hangs still: the plan keeps it, and so its run is the scene's."""
+    planned, found = fc.plan(write("pendulum", tmp_path)[0], budget=30.0, accuracy="1 %")
+    assert "gravity" in planned.load
+    # the planned run has another tolerance: its error is within the accuracy that it was chosen for
+    assert (found["error"] <= found["wanted"]).all()
+    assert (found["scatter"] == 0.0).all()
+    shown = found._repr_html_()
+    assert "must stay" in shown
+    assert "<img src='data:image/png" in shown
+    assert "met" in shown

@@ -118,6 +118,19 @@ def _apart(a: Point, b: Point, name: str, members: int, *, turning: bool) -> Inf
     return Influence(float(distances.max(initial=0.0)), float(error.max(initial=0.0)))
 
 
+def scatter(point: Point, quantity: Quantity) -> float:
+    """How far one member is off the mean of all, as a standard deviation in SI; the largest over the series.
+
+    The quantity of one run beyond the horizon is known no better.
+    """
+    if quantity.kind == "impact_times":
+        return 0.0
+    names = [f"{quantity.name}.{reduction}" for reduction in _reductions(quantity)]
+    spreads = [_pooled(np.linalg.norm(_rows(point.deviation[n]), axis=1)) for n in names if n in point.deviation]
+    turning = 2.0 if quantity.kind == "orientation" else 1.0
+    return turning * max((float(spread.max(initial=0.0)) for spread in spreads), default=0.0)
+
+
 def _pooled(error: np.ndarray) -> np.ndarray:
     """Errors of a series, none below the root mean square of its neighbours."""
     width = max(1, round(POOLED * len(error)))

@@ -26,7 +26,7 @@ LEAST_SEEN = 0.5
 QUICK, QUICK_RTOL = "dopri5", 1e-4
 #: of the largest energy error of a run, what one over a part of the time may have, as a fraction of that part
 OF_LEDGER = 0.25
-#: energy error that the planned run may have then: what it does to what is asked for has been tested
+#: energy error that the planned run may have then: what it does to the requested quantities has been tested
 LEDGER = 5e-3
 #: levels of modes that leave more than this fraction of the variables save too little to be tried
 WORTH = 0.85

@@ -21,7 +21,7 @@ def requested_in(
     rigid bodies, half of it where bodies are flexible.
 
     rigid: runs the scene with clearance and rigid bodies.
-    Raises InputError where a quantity never changes, or everything asked for is above what the quantities do;
+    Raises InputError where a quantity never changes, or everything requested is above what the quantities do;
     SolverError where the mechanism with rigid bodies cannot be run.
     """
     accuracies, sizes = {}, {}
@@ -50,7 +50,7 @@ def requested_in(
         raise InputError(
             f"{where} {q.name}",
             f"{accuracies[q.name]:.3g} {q.unit} is more than it changes ({sizes[q.name]:.3g} {q.unit}), "
-            "and so are all other accuracies that are asked for: the plan would leave out everything, even the motion",
+            "and so are all other requested accuracies: the plan would leave out everything, even the motion",
             "ask for an accuracy below what the quantity does",
         )
     return accuracies

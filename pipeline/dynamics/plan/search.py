@@ -42,8 +42,8 @@ BY_BOUND = 0.9
 OF_RESPONSE = 2.0
 #: effects that cost nothing to keep are dropped below this fraction of the requested accuracy
 FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
-#: why parts go that the motion asked for never feels
-UNCOUPLED = "nothing couples it to what is asked for"
+#: why parts go that the requested motion never feels
+UNCOUPLED = "nothing couples it to the requested quantities"
 
 
 def plan(
@@ -100,11 +100,11 @@ def _rigid(search: Search, gone: Sequence[Effect]) -> Run:
 
 
 def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect], rigid: Run | None) -> None:
-    """Which joints stay loose: by bounds where only the pose is asked for, else by runs of rigid bodies."""
+    """Which joints stay loose: by bounds where only the pose is requested, else by runs of rigid bodies."""
     asked = {t.owner for q in search.pilots.chosen for t in q.terms() if KINDS[t.kind].owner in OF_CLEARANCE}
     for effect in loose:
         if effect.owner in asked:
-            search.decide(effect, True, NONE, "a quantity of this contact is asked for")
+            search.decide(effect, True, NONE, "a quantity of this contact is requested")
     free = [effect for effect in loose if effect.owner not in asked]
     if not free:
         return
@@ -116,7 +116,9 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
     if search.fits(total, BY_BOUND):
         search.spend(total)
         for effect in free:
-            search.decide(effect, False, BOUND, "its play cannot move what is asked for by more", reach[effect.name])
+            search.decide(
+                effect, False, BOUND, "its clearance cannot move the requested quantities by more", reach[effect.name]
+            )
         return
     there = search.pilots.point([e for e in soft if e.kind == FLEXIBILITY or e.within.startswith("body.")])
     dropped: list[Effect] = []
@@ -128,7 +130,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
         for name, bound in summed([reach[e.name] for e in trial], search.requested).items():
             most[name] = min(most[name], bound)
         small = search.fits(most)
-        search.judge(effect, small, "its impacts change what is asked for by less", most, effect_sizes)
+        search.judge(effect, small, "its impacts change the requested quantities by less", most, effect_sizes)
         if small:
             dropped = trial
             left = most
@@ -206,7 +208,7 @@ def _flexibilities(
         effect_sizes = with_doubt(search, search.pilots.between(variant, there), False)
         most = {name: i.most for name, i in effect_sizes.items()}
         small = search.fits(most)
-        search.judge(effect, small, "its deformation changes what is asked for by less", most, effect_sizes)
+        search.judge(effect, small, "its deformation changes the requested quantities by less", most, effect_sizes)
         if small:
             dropped, left = trial, most
     if dropped:

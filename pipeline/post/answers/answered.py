@@ -20,6 +20,10 @@ def answered(data: xr.Dataset, text: str, picture: bytes | None = None, table: s
     import html
 
     result = Answered(data.data_vars, coords=data.coords, attrs=data.attrs)
-    image = "" if picture is None else f"<img src='data:image/png;base64,{base64.b64encode(picture).decode()}' alt=''>"
+    image = (
+        ""
+        if picture is None
+        else f"<img src='data:image/png;base64,{base64.b64encode(picture).decode()}' alt='' style='max-width:100%'>"
+    )
     result._answer = f"<p>{html.escape(text)}</p>{image}{table}"
     return result

@@ -25,6 +25,8 @@ UNKNOWN = Point({}, {}, {}, 0, "not run")
 FEW = 30.0
 #: how the chart calls its bars
 LEGEND = {"dropped": "taken away", "added": "put in alone"}
+#: the line of what may be chance goes back over at most this fraction of a bar, since its axis is logarithmic
+WHISKER = 0.9
 #: variables of the dataset, and what they say
 MEANINGS = {
     "dropped": "what the quantity loses when the effect, or both, are taken from the full scene",
@@ -202,6 +204,14 @@ def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, fl
                 place = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
                 shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
                 panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
+                if f"{kind}_uncertainty" in dataset and dataset[kind].ndim == 2:
+                    doubt = np.nan_to_num(dataset[f"{kind}_uncertainty"].values[:, k])
+                    below = np.minimum(doubt, WHISKER * shown)
+                    drawn = np.isfinite(shown) & (doubt > 0.0)
+                    ends = [below[drawn], doubt[drawn]]
+                    panel.errorbar(
+                        shown[drawn], place[drawn], xerr=ends, fmt="none", ecolor="#222222", elinewidth=0.9, capsize=2
+                    )
                 for y, value in zip(place, values, strict=True):
                     text = "none" if value == 0.0 else "not examined" if np.isnan(value) else "not comparable"
                     text = "" if np.isfinite(value) and value > 0.0 else text

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts.effect_size import Influence, chance, influence, size
+from flexclear.pipeline.core.artifacts.effect_size import Influence, chance, influence, scatter, size
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.answers.effect_sizes import written
@@ -89,6 +89,11 @@ def assemble(
         ),
         "decided": (dims, np.array([[decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
         "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
+        "scatter": (
+            ("quantity",),
+            np.array([0.0 if full.refused else scatter(full, q) for q in chosen]),
+            {"long_name": "standard deviation of one run of the scene about the mean of all"},
+        ),
         "members": (("effect",), np.array([pairs[name].members for name in names])),
     }
     coordinates = {
@@ -110,17 +115,22 @@ def ideal_sentences(result: xr.Dataset) -> list[str]:
     for k, name in enumerate(str(q) for q in result["quantity"].values):
         change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
         if np.isfinite(change.difference):
-            text = _change(change, float(result["size"][k]), str(result["unit"].values[k]), int(one["members"]))
+            unit, members = str(result["unit"].values[k]), int(one["members"])
+            text = _change(change, float(result["size"][k]), unit, members, float(result["scatter"][k]))
             said.append(f"<b>{html.escape(name)}</b>: {text}.")
     return said
 
 
-def _change(change: Influence, scale: float, unit: str, members: int) -> str:
+def _change(change: Influence, scale: float, unit: str, members: int, spread: float) -> str:
+    """What is different from the ideal mechanism, whose runs do not scatter. spread: standard deviation of a run."""
     means = f", as means of {members} runs" if members and change.uncertainty > 1e-3 * change.difference else ""
     bound = f"<b class='n'>{measured(change.most, np.nan, unit)}</b>"
     if change.most <= NOTHING * scale:
         return f"does not change: the runs agree to {bound}"
     part = _percent(change.difference, scale) if scale > 0.0 else ""
+    if not decided(change, scale) and spread > SLIGHT * scale:
+        value = f"<b class='n'>{measured(spread, np.nan, unit)}</b>{part and _percent(spread, scale)}"
+        return f"is not predictable: {members} runs scatter by {value} about a mean that changes by {bound} at most"
     if not decided(change, scale):
         more = needed(change, scale, members)
         return f"changes by {bound} at most{part and _percent(change.most, scale)}{means}; about {more} would decide it"
@@ -149,7 +159,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
     if not single.sizes["effect"]:
         return "The scene has no effect that could be taken away."
-    levels = [("The accuracy that the scene asks for", _limits(result, requested))] if requested else [
+    levels = [("The requested accuracy", _limits(result, requested))] if requested else [
         (f"An accuracy of {100.0 * level:g} %", level * result["size"].values) for level in LEVELS
     ]  # fmt: skip
     said, before, calm = list[str](), list[str](), list[str]()
@@ -159,7 +169,8 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
         unsure = [effect for effect in perhaps if effect not in now]
         open_ = f" (not decided: {_enumerated(unsure)})" if unsure else ""
         if new or unsure:
-            said.append(f"{name} calls {'also ' if before and new else ''}for {_enumerated(new) or 'no more'}{open_}.")
+            none = "no more for certain" if before else "none for certain"
+            said.append(f"{name} calls {'also ' if before and new else ''}for {_enumerated(new) or none}{open_}.")
         else:
             calm.append(name)
         before += new
@@ -167,7 +178,7 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
     said += [f"{name} calls for {more}." for name in calm[:1]]
     said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
     if result.attrs["undone"]:
-        said.append(f"Not examined within the budget: {result.attrs['undone']}.")
+        said.insert(0, f"The budget did not reach {result.attrs['undone']}. Of the other effects:")
     return " ".join(said)
 
 

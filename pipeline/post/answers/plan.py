@@ -75,7 +75,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         "kept": "1: the planned scene has the effect",
         "evidence": "what the decision rests on",
         "reason": "the decision in words",
-        "wanted": "accuracy that the scene asks for",
+        "wanted": "requested accuracy",
         "integration": "estimated error of the planned run's integration, and of the modes that it leaves out",
         "elements": "finite elements of the body",
         "elements_called_for": "finite elements that the requested accuracy calls for",
@@ -110,7 +110,7 @@ def table(planned: xr.Dataset) -> Table:
         decision = "keep" if int(part["kept"]) else "drop"
         rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
     requested = [written(float(value), 0.0, unit) for value, unit in zip(planned["wanted"].values, units, strict=True)]
-    rows.append(("wanted", "", *requested, "", ""))
+    rows.append(("requested", "", *requested, "", ""))
     decided = json.loads(planned.attrs["planned"])
     notes = [words(planned)]
     notes += [
@@ -118,7 +118,9 @@ def table(planned: xr.Dataset) -> Table:
     ]
     notes += [_of_mesh(planned.sel(body=body), units) for body in planned["body"].values]
     if decided["uncoupled"]:
-        notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(decided['uncoupled'])}.")
+        notes.append(
+            f"Not integrated, since nothing couples it to the requested quantities: {listed(decided['uncoupled'])}."
+        )
     if planned.attrs["dearer"]:
         notes.append(f"{planned.attrs['dearer']}.")
     notes.append(
@@ -147,7 +149,7 @@ def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
         f"{compliance:.2g} % in compliance"
     )
     if not errors:
-        return f"{head}; what that does to what is asked for cannot be determined."
+        return f"{head}; what that does to the requested quantities cannot be determined."
     text = f"{head}, and so change {listed(errors)}"
     if called > given:
         return f"{text}: the requested accuracy calls for {called}."
@@ -188,7 +190,7 @@ def verified(planned: xr.Dataset) -> Table:
         "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
     return Table(
-        "The plan next to the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)
+        "The plan next to the full scene", ("quantity", "requested", "true error", "verdict"), tuple(rows), tuple(notes)
     )
 
 
@@ -196,7 +198,7 @@ MET, MISSED, UNDECIDED = "met", "missed", "not decided"
 
 
 def verdict(error: float, chance: float, requested: float) -> str:
-    """Met where error and chance together are below what is requested, missed where both are above, else not
+    """Met where error and chance together are below what is requested, missed where they are above, else not
     decided."""
     if error + chance <= requested:
         return MET
@@ -204,15 +206,20 @@ def verdict(error: float, chance: float, requested: float) -> str:
 
 
 def _verdict(one: xr.Dataset) -> str:
-    """The verdict on one quantity, with what it would take where it is not decided."""
-    error, chance, requested = (float(one[name]) for name in ("error", "chance", "wanted"))
+    """The verdict on one quantity; where it is not decided, what it would take, and how far single runs scatter."""
+    error, chance, requested, scatter = (float(one[name]) for name in ("error", "chance", "wanted", "scatter"))
     said = verdict(error, chance, requested)
     if said == MISSED:
         return f"missed, {error / requested:.2g} times"
-    if said == UNDECIDED and error < requested:
-        members = int(one.attrs["members"])
-        return f"not decided: {int(np.ceil(members * (chance / (requested - error)) ** 2))} members would"
-    return said
+    if said == MET:
+        return said
+    reasons = []
+    if scatter > requested:
+        reasons.append(f"single runs of the full scene scatter by {written(scatter, 0.0, str(one['unit'].item()))}")
+    if error < requested:
+        enough = int(np.ceil(int(one.attrs["members"]) * (chance / (requested - error)) ** 2))
+        reasons.append(f"means of {enough} members would decide" if reasons else f"{enough} members would")
+    return f"{said}: {'; '.join(reasons)}" if reasons else said
 
 
 def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:

@@ -46,12 +46,16 @@ class Check:
         return "–" if self.good else self.remedy
 
 
-def checks(run: xr.Dataset, study: xr.Dataset | None, members: float | None = None) -> list[Check]:
+def checks(
+    run: xr.Dataset, study: xr.Dataset | None, members: float | None = None, *, by_need: bool = False
+) -> list[Check]:
     """All that a run and its cost study say of its stability.  study: None where there is none.
 
-    members: horizon of the scene's ensemble [s], None where there is none.
+    members: horizon of the scene's ensemble [s], None where there is none.  by_need: whether the program chose the
+    integrator.
     """
-    result = [_energy(run), *_loops(run), *([] if study is None else _agreement(study)), _rejected(run), _stiff(run)]
+    agreement = [] if study is None else _agreement(study)
+    result = [_energy(run), *_loops(run), *agreement, _rejected(run), _stiff(run, by_need)]
     return [*result, *_condition(run), *_predictable(run, members)]
 
 
@@ -112,8 +116,8 @@ def _rejected(run: xr.Dataset) -> Check:
     return Check("rejected steps", f"{100.0 * fraction:.2g} %", f"{100.0 * REJECTED:g} %", fraction < REJECTED, remedy)
 
 
-def _stiff(run: xr.Dataset) -> Check:
-    fraction, chosen = float(run.attrs.get("stiff_share", 0.0)), "method_reason" in run.attrs
+def _stiff(run: xr.Dataset, by_need: bool) -> Check:
+    fraction, chosen = float(run.attrs.get("stiff_share", 0.0)), by_need or "method_reason" in run.attrs
     limit = "none: the integrator was chosen by its cost" if chosen else f"{100.0 * STIFF:g} %"
     remedy = "leave [solver] integrator out, or name an implicit one"
     name = "steps that stability shortens"

@@ -102,7 +102,7 @@ def figure(name: str, study: xr.Dataset, title: str) -> dict[str, bytes]:
         unsure = float(study["reference_uncertainty"].max())
         if np.isfinite(unsure) and unsure > 0.0:
             panel.axhline(unsure, color="#6b6b6b", lw=0.9, ls=":", label="uncertainty of the tightest run")
-        panel.set(xscale="log", yscale="log", xlabel="processor time of the integration (s)")
+        panel.set(xscale="log", yscale=style.scale_of(panel), xlabel="processor time of the integration (s)")
         panel.set_ylabel("largest relative error")
         style.plain(panel.xaxis)
         panel.legend(fontsize=8)

@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.post.cost.study import GROUPS, MARGIN, recording, resolved
-from flexclear.pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, style
+from flexclear.pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, scale_of, style
 
 COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#000000")
 MARKS = ("o", "s", "D", "P", "v", "^", "X", "<", ">")
@@ -129,7 +129,7 @@ def _panel(
             ax.annotate(
                 m.name, (m.seconds, m.error[name]), xytext=(shift, 4), textcoords="offset points", fontsize=6.8, ha=side
             )
-    ax.set(xscale="log", yscale="log", title=name)
+    ax.set(xscale="log", yscale=scale_of(ax), title=name)
     plain(ax.xaxis)
     if np.isinf(bound):
         text = "cannot be determined: reference and\nconfirmation have other impacts"

@@ -85,6 +85,12 @@ def grid(rows: int, columns: int, size: tuple[float, float], **options: Any) -> 
     return plt.subplots(rows, columns, figsize=size, squeeze=False, **options)
 
 
+def scale_of(axes: Axes) -> str:
+    """The scale of errors: logarithmic where a line of the axes has a positive value, else linear."""
+    values = [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]
+    return "log" if any((value > 0.0).any() for value in values) else "linear"
+
+
 def plain(axis: Axis) -> None:
     """Plain numbers at 1, 2 and 5 of a logarithmic axis: a range of less than a decade has hardly any power of ten.
 
