@@ -39,7 +39,7 @@ class JointFriction:
         viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
         if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
             raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")
-        dry, kinks = (0.0, 0.0, 1.0, 2.0), ()
+        dry, kinks = (0.0, 0.0, 1.0, 2.0), (0.0, 0.0)
         if load.coulomb is not None:
             speed, c = "angular velocity" if coordinate.turning else "velocity", load.coulomb
             forces = (quantity(c.static, coordinate.force), quantity(c.dynamic, coordinate.force))
@@ -55,4 +55,4 @@ class JointFriction:
                     "coulomb: v_static must be positive and below v_dynamic; "
                     f"v_static = {dry[2]:.6g}, v_dynamic = {dry[3]:.6g}"
                 )
-        return Row(joint=load.joint, numbers=(viscous, *dry), bends=(kinks,))
+        return Row(joint=load.joint, numbers=(viscous, *dry), bends=(kinks if load.coulomb else (),))
