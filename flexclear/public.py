@@ -42,6 +42,7 @@ __all__ = [
     "report",
     "run",
     "sections",
+    "sensitivities",
     "show",
     "stability",
     "sweep",
@@ -180,6 +181,27 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
 
     datasets: tuple[xr.Dataset, xr.Dataset] = sections_command.judge(_loaded(scene))
     return datasets
+
+
+def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str]) -> xr.Dataset:
+    """Derivatives of quantities by numbers of a scene, through its impacts; from the cache when fresh.
+
+    of: quantities over time, ``slider.position``, or reduced as a sweep keeps them, ``pin.peak_force``,
+    ``slider.velocity.largest``.  to: dotted paths of numbers, ``joint.pin.clearance``, of lists by index, ``com.0``.
+    Each variable has the dimension `parameter`; its unit is that of the quantity per SI unit of the parameter.
+    Values are NaN beyond the predictability horizon.  Raises FlexclearError: InputError for what is no number or
+    changes how the mechanism is built, SolverError where the motion has no derivative.
+
+    >>> import flexclear as fc
+    >>> short = fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"})
+    >>> found = fc.sensitivities(short, ["bob.velocity.final"], ["load.gravity.acceleration.1"])
+    >>> found["bob.velocity.final"].sel(parameter="load.gravity.acceleration.1").values.shape
+    (3,)
+    """
+    from flexclear.commands import scenes
+
+    result: xr.Dataset = scenes.sensitivities(_loaded(scene), of, to)
+    return result
 
 
 def quantity(run: xr.Dataset, name: str) -> xr.DataArray:

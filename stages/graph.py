@@ -146,6 +146,13 @@ class Graph:
             modules=modules,
         )
 
+    def sensitivities(self, of: Sequence[str], to: Sequence[str]) -> Task:
+        """Derivatives of quantities by numbers of the scene, up to the horizon of its run."""
+        params = {**simulation.params(self.scene), "of": list(of), "to": list(to)}
+        modules, function = simulation.modules(self.scene), "flexclear.stages.sensitivities:run"
+        inputs = {**self.bodies(), **({"run": self.simulate} if self.scene.contacts() or self.scene.stop else {})}
+        return replace(self._scene_task("sensitivities", function, params, inputs, modules=modules), folder="")
+
     @cached_property
     def verdict(self) -> Task:
         """Whether that motion is periodic, quasi-periodic or chaotic; shown as ``verdict.nc`` and a figure."""

@@ -208,6 +208,16 @@ def linear(
     return workplace.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
 
 
+def sensitivities(scene: Scene, of: Sequence[str], to: Sequence[str], workplace: Workplace | None = None) -> xr.Dataset:
+    """Derivatives of quantities by numbers of a scene, brought up to date as `run` is."""
+    examine(scene)
+    workplace = workplace or open_workplace()
+    task = Graph(scene, shown=False).sensitivities(of, to)
+    outcome = workplace.bring([task], jobs=1)
+    check(outcome)
+    return workplace.store.load(outcome.records[id(task)])
+
+
 def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
     """Tell what the scenes' runs are to be doubted for, as the last thing that a command says.
 

@@ -15,7 +15,17 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.method_selection import Suit
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
-__all__ = ["campbell", "cost", "ensemble", "equilibrium", "frequencies", "sections", "simulate", "simulated"]
+__all__ = [
+    "campbell",
+    "cost",
+    "ensemble",
+    "equilibrium",
+    "frequencies",
+    "sections",
+    "sensitivities",
+    "simulate",
+    "simulated",
+]
 
 
 def simulate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
@@ -104,6 +114,20 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     from flexclear.pipeline.dynamics.record.sections import sections as run
 
     return run(scene, bundles, progress)
+
+
+def sensitivities(
+    scene: Scene,
+    bundles: Mapping[str, Labelled],
+    progress: Progress,
+    of: Sequence[str],
+    to: Sequence[str],
+    horizon: float,
+) -> xr.Dataset:
+    """Derivatives of quantities by numbers of a scene (`pipeline.dynamics.sensitivity.dataset`)."""
+    from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities as derivatives
+
+    return derivatives(scene, bundles, progress, of, to, horizon)
 
 
 def equilibrium(

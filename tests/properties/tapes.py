@@ -10,7 +10,7 @@ import numpy as np
 
 from flexclear.pipeline.dynamics.specialise.code import Program
 from flexclear.pipeline.dynamics.specialise.tape import Branch, Symbol
-from flexclear.pipeline.dynamics.specialise.wiring import RATES, STATE, split
+from flexclear.pipeline.dynamics.specialise.wiring import RATES, RATES_CHANGE, STATE, STATE_CHANGE, split
 
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,
@@ -38,12 +38,47 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
 }
 
 
-def run(program: Program, h: np.ndarray, arrays: dict[str, np.ndarray], y: int, dy: int) -> None:
-    """Do in the arrays f, w and n what the program says; y, dy: places of state and rates in w."""
+def _arctan2(a: complex, b: complex) -> complex:
+    turned = (b.real * a.imag - a.real * b.imag) / (a.real**2 + b.real**2)
+    return complex(math.atan2(a.real, b.real), turned)
+
+
+def _compared(by: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda a, b: by(a.real, b.real)
+
+
+#: the same of complex numbers whose imaginary part is a small change
+COMPLEX = {
+    **OPERATIONS,
+    **{name: _compared(OPERATIONS[name]) for name in ("<", "<=", ">", ">=", "==", "!=")},
+    "reciprocal": lambda a: 1.0 / np.complex128(a),
+    "sqrt": lambda a: np.sqrt(np.complex128(a)) if a.real else 0.0,
+    "pow": lambda a, b: np.complex128(a) ** b if a.real else 0.0,
+    "fabs": lambda a: -a if a.real < 0.0 else a,
+    "copysign": lambda a, b: math.copysign(1.0, a.real) * math.copysign(1.0, b.real) * a,
+    "round": lambda a: float(np.round(a.real)),
+    "arctan2": lambda a, b: _arctan2(complex(a), complex(b)),
+}
+
+
+def run(
+    program: Program,
+    h: np.ndarray,
+    arrays: dict[str, np.ndarray],
+    y: int,
+    dy: int,
+    changes: tuple[int, int] = (0, 0),
+    operations: dict[str, Callable[..., Any]] = OPERATIONS,
+) -> None:
+    """Do in the arrays f, w and n what the program says; y, dy: places of state and rates in w.
+
+    changes: places of the changes of both.
+    """
+    places = {STATE: y, RATES: dy, STATE_CHANGE: changes[0], RATES_CHANGE: changes[1], -1: 0}
 
     def where(place: int) -> int:
         stretch, inside = split(place)
-        return inside + {STATE: y, RATES: dy, -1: 0}.get(stretch, int(h[stretch]) if 0 <= stretch < len(h) else 0)
+        return inside + places.get(stretch, int(h[stretch]) if 0 <= stretch < len(h) else 0)
 
     values: dict[Symbol, Any] = {}
 
@@ -61,7 +96,7 @@ def run(program: Program, h: np.ndarray, arrays: dict[str, np.ndarray], y: int, 
                 place = values[place] if isinstance(place, Symbol) else where(place)
                 values[item] = arrays[array][place]
             else:
-                values[item] = OPERATIONS[item.operation](*(known(a) for a in item.arguments))
+                values[item] = operations[item.operation](*(known(a) for a in item.arguments))
 
     go(program.block)
     for array, place, value in program.stores:

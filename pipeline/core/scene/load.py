@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 import re
 import stat
@@ -20,6 +21,7 @@ from flexclear.pipeline.core.scene.not_toml import not_toml
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import NAMING
+from flexclear.pipeline.core.scene.units import any_quantity
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 from flexclear.pipeline.core.system import file_names
 from flexclear.pipeline.core.system.errors import InputError, ResourceError, shown
@@ -140,6 +142,19 @@ def with_numbers(scene: Scene, override: Mapping[str, object]) -> Scene:
         except (ValidationError, InputError, ResourceError, ValueError):
             return edited(scene, override)  # which reports what is wrong, and where
     return result
+
+
+def number_at(scene: Scene, path: str) -> tuple[float, str]:
+    """The number of a scene at a dotted path, in SI, and its unit if it is written with one.
+
+    Raises InputError where there is none.
+    """
+    parent, key = _find(scene.model_dump(mode="json", exclude_none=True), path, path)
+    if isinstance(parent[key], (int, float, str)) and not isinstance(parent[key], bool):
+        with contextlib.suppress(ValueError):
+            number, _, unit = str(any_quantity(parent[key])).partition(" ")
+            return float(number), unit
+    raise InputError(path, f"is no number but {parent[key]!r}", "name one number, of a list by its index: com.0")
 
 
 @cache

@@ -194,13 +194,16 @@ def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
     return Entry({name: loaded[path.stem].address for name, path in files.items() if path != late}, left)
 
 
-def specialised(parts: Parts, wiring: Wiring, tell: Callable[[str], None], lanes: int = 0) -> int:
+def specialised(
+    parts: Parts, wiring: Wiring, tell: Callable[[str], None], lanes: int = 0, *, changes: bool = False
+) -> int:
     """Address of the right-hand side for one wiring; UnsuitedError when there is none.
 
-    lanes: see `sources.specialised`; of several that of what lets as many steppers run (`compile.lanes`).
+    lanes, changes: see `sources.specialised`; of several lanes that of what lets as many steppers run
+    (`compile.lanes`).
     """
     folder, began = writable(kernel_root(), tell), time.monotonic()
-    path = _file(folder, SPECIALISED, sources.specialised(parts, wiring, lanes))
+    path = _file(folder, SPECIALISED, sources.specialised(parts, wiring, lanes, changes=changes))
     with ExitStack() as helpers:
         _bring(folder, {SPECIALISED: path}, tell, began, helpers)
     return loaded[path.stem].address

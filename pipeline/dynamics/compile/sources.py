@@ -63,6 +63,7 @@ def modules(scene: Scene) -> tuple[str, ...]:
 def _composed(parts: Parts, scheme: Scheme) -> frozenset[str]:
     """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
     texts = [*sources(parts, scheme).values(), specialised(parts, ()), specialised(parts, (), lanes=2)]
+    texts.append(specialised(parts, (), changes=True))
     return frozenset().union(*map(_reached, texts))
 
 
@@ -78,10 +79,11 @@ def imported(source: str) -> set[str]:
     return {name for module, part in lines for name in (module, f"{module}.{part}")}
 
 
-def specialised(parts: Parts, wiring: Wiring, lanes: int = 0) -> str:
+def specialised(parts: Parts, wiring: Wiring, lanes: int = 0, *, changes: bool = False) -> str:
     """Source of the right-hand side for one wiring.
 
     lanes: 0 for runs; of members of ensembles how many are evaluated at once, with equal bits whatever their number.
+    changes: with its tangent, of one state.
     """
     given, imports = _forces(parts)
     given["tree"] = _tree(imports, parts)
@@ -89,17 +91,24 @@ def specialised(parts: Parts, wiring: Wiring, lanes: int = 0) -> str:
         given["closures"] = _closures(imports, parts)
     maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_rates")
     _import(imports, f"{DYNAMICS}.equations.prescribed_motion", "make_laws")
-    for name in (["exactly"] if lanes else []) + ["abreast" if lanes > 1 else "straight"]:
+    function = LANES if lanes > 1 else SPECIALISED
+    for name in (["exactly"] if lanes else []) + ["abreast" if lanes > 1 else "along" if changes else "straight"]:
         _import(imports, f"{DYNAMICS}.specialise.straight", name)
     if lanes > 1:
         _import(imports, f"{DYNAMICS}.compile.lanes", "make_lanes")
     harmonics = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate") if parts.harmonics else ""
     laws = f"exactly(make_laws({harmonics}))" if lanes else f"make_laws({harmonics})"
     what = f"right-hand side of {', '.join(parts.joints)}, for one wiring"
-    function = LANES if lanes > 1 else SPECIALISED
+    law_changes = ""
+    if changes:
+        function = CHANGES
+        _import(imports, f"{DYNAMICS}.equations.prescribed_motion", "make_law_changes")
+        _import(imports, f"{DYNAMICS}.fields", "data")
+        change = _import(imports, f"{DYNAMICS}.drives.oscillation", "change_oscillation") if parts.harmonics else ""
+        law_changes = f"make_law_changes({change})"
     wired = "".join(f"    {row},\n" for row in wiring)
-    text = function.format(laws=laws, wiring=wired, lanes=lanes, exact=bool(lanes))
-    return _file(what, imports, "rates", maker, given, text, _formulas(parts))
+    values = {"laws": laws, "wiring": wired, "lanes": lanes, "exact": bool(lanes), "law_changes": law_changes}
+    return _file(what, imports, "rates", maker, given, function.format(**values), _formulas(parts))
 
 
 def _evaluate(parts: Parts) -> str:
@@ -309,6 +318,21 @@ laws, along = {laws}, straight(rates, WIRING, exact={exact})
 def specialised(h, f, w, n, t, y, dy):
     laws(h, f, w, n, t)
     along(h, f, w, n, y, dy)
+    return 0
+"""
+CHANGES = """WIRING = (
+{wiring})
+laws, law_changes, differentiated = {laws}, {law_changes}, along(rates, WIRING)
+
+
+@calls.exported("evaluate")
+def specialised(h, f, w, n, t, y, dy):
+    laws(h, f, w, n, t)
+    d = data(h, f, w, n)
+    size = d.nq + d.nv + d.n_ledger
+    for k in range(1, d.n_changes + 1):
+        law_changes(d, t, k)
+        differentiated(h, f, w, n, y, dy, k * d.f_change, k * d.w_change, y + k * size, dy + k * size)
     return 0
 """
 LANES = """WIRING = (

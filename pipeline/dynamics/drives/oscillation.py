@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
@@ -19,3 +20,21 @@ def oscillate(d, k, piece, s):
         law.value += sine
         law.rate += amplitude * omega * np.cos(phase)
         law.second_rate -= omega * omega * sine
+
+
+@kernel
+def change_oscillation(d, k, piece, s, numbers, out):
+    """Add what the harmonics of a piece change in law k along a direction (`equations.prescribed_motion`)."""
+    its, size = d.piece_harmonics[piece], m.HARMONICS.size
+    later = -d.f[numbers + d.at_pieces + m.PIECES.size * piece + m.PIECES.start]
+    for i in range(its.harmonic0, its.harmonic0 + its.n_harmonics):
+        harmonic, changes = d.harmonics[i], numbers + d.at_harmonics + size * i
+        amplitude, omega = harmonic.amplitude, harmonic.frequency
+        more, faster = d.f[changes + m.HARMONICS.amplitude], d.f[changes + m.HARMONICS.frequency]
+        phase, ahead = omega * s + harmonic.phase, faster * s + d.f[changes + m.HARMONICS.phase]
+        sine, cosine = np.sin(phase), np.cos(phase)
+        d.w[out + m.LAW.value] += more * sine + amplitude * cosine * ahead
+        d.w[out + m.LAW.rate] += (more * omega + amplitude * faster) * cosine - amplitude * omega * sine * ahead
+        d.w[out + m.LAW.second_rate] -= omega * (
+            more * omega + 2.0 * amplitude * faster
+        ) * sine + amplitude * omega * omega * cosine * (ahead + omega * later)

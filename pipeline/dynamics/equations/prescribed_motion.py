@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -47,3 +48,39 @@ def make_laws(harmonics: Callable | None = None) -> Callable:
             add_harmonics(d, k, active, s)
 
     return laws
+
+
+@kernel
+def no_harmonic_changes(d, k, piece, s, numbers, out):
+    """Polynomials only."""
+
+
+def make_law_changes(harmonics: Callable | None = None) -> Callable:
+    """The kernel law_changes(d, t, k): changes of all laws along direction k, counted from 1, after `laws`.
+
+    harmonics(d, law, piece, s, numbers, out) adds those of a piece; numbers: where the direction's begin in f, out:
+    where the law's changes are in w.
+    """
+    add_harmonics = no_harmonic_changes if harmonics is None else harmonics
+
+    @kernel
+    def law_changes(d, t, k):
+        numbers = k * d.f_change
+        for i in range(d.n_laws):
+            active = d.active[i]
+            piece, law = d.pieces[active], d.law[i]
+            begin, out = numbers + d.at_pieces + m.PIECES.size * active, k * d.w_change + d.at_law + m.LAW.size * i
+            s, later = t - piece.start, -d.f[begin + m.PIECES.start]
+            x, v, a, jerk = d.f[begin + m.PIECES.coefficients + DEGREE], 0.0, 0.0, 0.0
+            for c in range(DEGREE - 1, -1, -1):
+                a = a * s + 2.0 * v
+                v = v * s + x
+                x = x * s + d.f[begin + m.PIECES.coefficients + c]
+            for c in range(DEGREE, 2, -1):
+                jerk = jerk * s + c * (c - 1) * (c - 2) * piece.coefficients[c]
+            d.w[out + m.LAW.value] = x + law.rate * later
+            d.w[out + m.LAW.rate] = v + law.second_rate * later
+            d.w[out + m.LAW.second_rate] = a + jerk * later
+            add_harmonics(d, i, active, s, numbers, out)
+
+    return law_changes

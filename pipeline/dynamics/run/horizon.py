@@ -72,7 +72,7 @@ class Pair:
         self.outputs = np.union1d(requested, self.added)
         self.times = np.union1d(self.outputs[:: max(1, len(self.outputs) // SAMPLES)], self.outputs[-1])
         self._engine, self._looking = another(engine), another(engine)
-        self._metric = _Metric(engine)
+        self._metric = Metric(engine)
         self._run, self._news = self._unseen(), Condition()
         self._complete, self._ended = False, False
 
@@ -215,7 +215,7 @@ class Pair:
         return self._metric.norms(self._run.motion).max(axis=0, initial=0.0)
 
 
-class _Metric:
+class Metric:
     """The motion of all bodies as entries whose squares add up to twice their kinetic energies.
 
     Of a body: its centre of mass's velocity times the root of its mass, its angular velocity in its own axes times the

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -50,6 +50,32 @@ class Tape:
     passes: list[Pass] = field(default_factory=list)
     doubted: set[str] = field(default_factory=set)
     looks: list[Look] = field(default_factory=list)
+
+    def full(self, engine: Engine) -> bool:
+        """Return whether another step might find no room for its rows or events."""
+        n, room = engine.n, m.ROOM + m.EVENTS_OF_A_CONTACT * len(engine.model.contacts)
+        waiting = len(self.outputs) - n[m.NEXT_OUTPUT]
+        return bool(n[m.N_RECORDED] + waiting + room > len(self.rows) or n[m.N_EVENTS] + room > len(self.events))
+
+
+class Jumps(Protocol):
+    """What changes the state where the equations change: given the engine, which is there, and the tape."""
+
+    def at_events(self, engine: Engine, tape: Tape) -> None:
+        """Contacts have begun or ended at the end of the last step."""
+
+    def at_break(self, engine: Engine, before: np.ndarray, after: np.ndarray) -> None:
+        """Pieces of the laws give way to others."""
+
+
+def in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
+    """The rows by time: those of a step's inner events were written before its outputs.
+
+    An event on an output time is one row, the later.
+    """
+    time = m.record(rows, contacts).time
+    order = np.argsort(time, kind="stable")
+    return rows[order[np.append(np.diff(time[order]) > 0.0, True)]]
 
 
 @dataclass(frozen=True)

@@ -37,7 +37,7 @@ SELECTIONS = 4
 FEW, LANES = 2, (4, 8)
 _making = Lock()
 #: addresses by parts, wiring and lanes: many engines of a process use them
-_known: dict[tuple[Parts, Wiring, int], int] = {}
+_known: dict[tuple[Parts, Wiring, int, bool], int] = {}
 
 
 def settle(engine: Engine, progress: Progress) -> None:
@@ -94,7 +94,7 @@ def _make(engine: Engine, progress: Progress) -> None:
         return
     if straight.place is not None and straight.group is None:
         straight.group = _group(engine, rows_of_engine, straight.place, progress)
-    if rows_of_engine not in straight.rows and len(straight.rows) < SELECTIONS:
+    if rows_of_engine not in straight.rows and (len(straight.rows) < SELECTIONS or engine.h[m.N_CHANGES]):
         straight.rows.append(rows_of_engine)
     for rows in straight.rows:
         if rows not in straight.addresses and not (straight.group and straight.group.rows == rows):
@@ -112,15 +112,17 @@ def _group(engine: Engine, rows: bytes, lane: Place, progress: Progress) -> Lane
 
 def _code(engine: Engine, rows: bytes, progress: Progress, lanes: int) -> int:
     """Address of the code for closure rows; 0 where there is none."""
-    h, parts = engine.h.copy(), engine.model.parts
+    h, parts, changes = engine.h.copy(), engine.model.parts, bool(engine.h[m.N_CHANGES])
     selection.write(engine.model, h, np.frombuffer(rows, dtype=bool))
     with _making:  # engines may run side by side
         wired = wiring(engine.model.arrays, h)
-        known = _known.get((parts, wired, lanes))
+        known = _known.get((parts, wired, lanes, changes))
         if known is None:
             try:
-                known = functions.specialised(parts, wired, lambda text: progress(None, text), lanes)
+                known = functions.specialised(parts, wired, lambda text: progress(None, text), lanes, changes=changes)
             except UnsuitedError:
+                if changes:
+                    raise
                 known = 0
-            _known[parts, wired, lanes] = known
+            _known[parts, wired, lanes, changes] = known
         return known

@@ -16,7 +16,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.run import refusal, singular
 from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.pieces import Handover, Piece, Selections, Tape, piece
+from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Piece, Selections, Tape, in_order, piece
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, crawls, look
 from flexclear.pipeline.dynamics.run.reach import require_shallow
 from flexclear.pipeline.dynamics.run.specialised import settle
@@ -124,6 +124,7 @@ def integrate(
     left: Handover | None = None,
     outputs: np.ndarray | None = None,
     judge: Judge | None = None,
+    jumps: Jumps | None = None,
 ) -> Trajectory:
     """The trajectory from a consistent start; SolverError when the stepper gives up.
 
@@ -132,6 +133,7 @@ def integrate(
     left: what another method left of this run; it is continued from there.
     outputs: times of output [s], the start first; the scene's where there are none.
     judge: whether another method continues; by default where this one is explicit and would take far too long.
+    jumps: changes the state at events and breaks.
     Where the task keeps a journal, what an earlier attempt left there is continued.  Raises StoppedError, with the
     engine and the trajectory so far as `partial` if there is any, when the work is asked to stop.
     """
@@ -147,11 +149,11 @@ def integrate(
     with stopping.heeded():
         if mine is None or mine.tape is None:
             tape = _begun(engine, y, left, outputs)
-            _advance(engine, tape, progress, stop, left, mine, judge, resumed=False)
+            _advance(engine, tape, progress, stop, left, mine, judge, jumps, resumed=False)
         else:
             tape = mine.tape
             if not mine.done:
-                _advance(engine, tape, progress, stop, left, mine, judge, resumed=True)
+                _advance(engine, tape, progress, stop, left, mine, judge, jumps, resumed=True)
     if mine is not None:
         mine.finish(tape)
     return _collect(engine, tape)
@@ -176,6 +178,7 @@ def _advance(
     left: Handover | None,
     mine: Piece | None,
     judge: Judge,
+    jumps: Jumps | None,
     *,
     resumed: bool,
 ) -> None:
@@ -192,10 +195,12 @@ def _advance(
         if not resumed:
             if a > (engine.start if left is None else left.time):
                 engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
+                if jumps is not None:
+                    jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
             engine.select_pieces_after(0.5 * (a + b))
             control[m.END], engine.n[m.FRESH] = b, 1
         resumed = False
-        if _segment(engine, tape, progress, stop, mine, judge):
+        if _segment(engine, tape, progress, stop, mine, judge, jumps):
             break
 
 
@@ -294,21 +299,35 @@ def _begin_closed(engine: Engine, y: np.ndarray, events: np.ndarray) -> None:
         n[m.N_EVENTS] += 1
 
 
-def _segment(engine: Engine, tape: Tape, progress: Progress, stop: Stop, mine: Piece | None, judge: Judge) -> bool:
+def _segment(
+    engine: Engine,
+    tape: Tape,
+    progress: Progress,
+    stop: Stop,
+    mine: Piece | None,
+    judge: Judge,
+    jumps: Jumps | None = None,
+) -> bool:
     """To the end of the segment; True when it was stopped before."""
     n, control = engine.n, engine.control
+    few = m.ROOM + m.EVENTS_OF_A_CONTACT * len(engine.model.contacts)
     while True:
         if n[m.EVALUATIONS] >= n[m.BUDGET]:  # segments may be so short that no pause falls into one
             n[m.BUDGET] = n[m.EVALUATIONS] + (judge.every or SLICE)
-        engine.advance(tape.outputs, tape.rows, tape.events)
+        known = n[m.N_EVENTS]  # with no more room than one step needs, the stepper returns after each event
+        engine.advance(tape.outputs, tape.rows, tape.events if jumps is None else tape.events[: known + few])
+        if jumps is not None and n[m.N_EVENTS] > known:
+            jumps.at_events(engine, tape)
         t = float(control[m.TIME])
         progress((t - engine.start) / control[m.SPAN], f"t = {t:.5f} s, {n[m.EVALUATIONS]} evaluations")
         status = n[m.STATUS]
         if status == m.SEGMENT_END:
             return False
-        if status == m.FULL:
+        if status == m.FULL and (jumps is None or tape.full(engine)):
             tape.rows = np.concatenate([tape.rows, np.zeros_like(tape.rows)])
             tape.events = np.concatenate([tape.events, np.full_like(tape.events, np.nan)])
+        elif status == m.FULL:
+            continue
         elif status == m.SINGULAR_AHEAD:
             _pass_over(engine, tape)
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
@@ -406,17 +425,7 @@ def _hand_over(engine: Engine, tape: Tape) -> Handover:
 
 def _so_far(engine: Engine, tape: Tape) -> np.ndarray:
     """The rows that have been recorded, by time."""
-    return _in_order(tape.rows[: engine.n[m.N_RECORDED]], len(engine.model.contacts))
-
-
-def _in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
-    """The rows by time: those of a step's inner events were written before its outputs.
-
-    An event on an output time is one row, the later.
-    """
-    time = m.record(rows, contacts).time
-    order = np.argsort(time, kind="stable")
-    return rows[order[np.append(np.diff(time[order]) > 0.0, True)]]
+    return in_order(tape.rows[: engine.n[m.N_RECORDED]], len(engine.model.contacts))
 
 
 def _collect(engine: Engine, tape: Tape) -> Trajectory:

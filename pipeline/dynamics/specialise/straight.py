@@ -19,6 +19,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import Kernel
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
+from flexclear.pipeline.dynamics.specialise.derivative import tangent
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, UnsuitedError
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
@@ -71,6 +72,28 @@ def straight(rates: Callable, wiring: wired.Wiring, *, exact: bool = False) -> A
 
         return types.void(h, f, w, n, y, dy), generate
 
+    return run
+
+
+def along(rates: Callable, wiring: wired.Wiring) -> Any:
+    """Return along(h, f, w, n, y, dy, f0, w0, change, rates_change) of compiled code: `straight`, with its tangent.
+
+    f0, w0: indices where changes of the numbers, and of laws, impact rates and contacts, begin in f and w.
+    change, rates_change: places in w of changes of the state and of its rates.
+    """
+
+    @intrinsic
+    def run(
+        typingctx: Any, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any, f0: Any, w0: Any, change: Any, rates: Any
+    ) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+            tape = tangent(program(kernel, wiring), LONGEST)
+            Emitter(builder, tape, _places(builder, tape, [values])).emit()
+            return context.get_dummy_value()
+
+        return types.void(h, f, w, n, y, dy, f0, w0, change, rates), generate
+
+    kernel = rates
     return run
 
 
@@ -143,22 +166,27 @@ def _arguments(builder: ir.IRBuilder, places: Any, lane: int, lanes: int) -> lis
 def _places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
     """Where the code finds an element of an array in a lane: in a stretch whose begin it has looked up first.
 
-    given: h, f, w, n, y and dy of each lane.
+    given: h, f, w, n, y and dy of each lane; of a tangent also where its changes are, see `along`.
     """
-    begins = dict[Any, Any]()
+    begins, arrays = dict[Any, Any](), list[dict[str, Any]]()
     places = [(array, index) for array, index, _ in tape.stores] + loads(tape)
     stretches = sorted({(array, wired.split(index)[0]) for array, index in places if isinstance(index, int)})
-    for lane, (h, f, w, n, y, dy) in enumerate(given):
+    for lane, (h, f, w, n, y, dy, *changes) in enumerate(given):
         builder.store(y, builder.gep(n, [_INTEGER(m.STATE)]))
+        arrays.append({"h": h, "f": f, "w": w, "n": n})
+        reported = {wired.STATE: y, wired.RATES: dy, -1: _INTEGER(0)}
+        if changes:
+            arrays[lane] |= {"df": builder.gep(f, [changes[0]]), "dw": builder.gep(w, [changes[1]])}
+            reported |= {wired.STATE_CHANGE: changes[2], wired.RATES_CHANGE: changes[3]}
         for array, stretch in stretches:
-            begin = {wired.STATE: y, wired.RATES: dy, -1: _INTEGER(0)}.get(stretch)
+            begin = reported.get(stretch)
             if begin is None:
                 begin = builder.load(builder.gep(h, [_INTEGER(stretch)]))
-            begins[array, stretch, lane] = builder.gep({"f": f, "w": w, "n": n}[array], [begin])
+            begins[array, stretch, lane] = builder.gep(arrays[lane][array], [begin])
 
     def where(array: str, index: Any, lane: int) -> Any:
         if not isinstance(index, int):
-            return builder.gep(given[lane]["hfwn".index(array)], [index])
+            return builder.gep(arrays[lane][array], [index])
         stretch, inside = wired.split(index)
         return builder.gep(begins[array, stretch, lane], [_INTEGER(inside)])
 

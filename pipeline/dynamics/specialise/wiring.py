@@ -21,14 +21,15 @@ LEFT_OUT = (m.LAWS, m.PIECE_HARMONICS, m.GROUPS, m.BODIES, m.FRAMES)
 SIZES = m.ADDRESSES[0]
 #: an index is a stretch of an array and where in the stretch; the first stretch is the array itself
 STRETCH = 40
-#: stretches of w that are reported by an argument: the state and its rates
-STATE, RATES = m.HEADER + 1, m.HEADER + 2
+#: stretches of w that are reported by an argument: the state and its rates, and small changes of both
+STATE, RATES, STATE_CHANGE, RATES_CHANGE = range(m.HEADER + 1, m.HEADER + 5)
 
 
 def wiring(arrays: Arrays, h: np.ndarray) -> Wiring:
     """The wiring in h, with the closure rows that its selection keeps."""
     sizes = h[:SIZES].copy()
-    sizes[[m.N_LAWS, m.N_GROUPS, m.N_BODIES, m.N_FRAMES]] = 0
+    sizes[[m.N_LAWS, m.N_GROUPS, m.N_BODIES, m.N_FRAMES, m.N_CHANGES, m.F_CHANGE, m.W_CHANGE]] = 0
+    sizes[m.NY] = sizes[m.NQ] + sizes[m.NV] + sizes[m.N_LEDGER]  # without changes
     tables = []
     for table in m.TABLES["h"]:
         rows = arrays.table(table, h).view(np.int64).reshape(-1, table.size)

@@ -1,0 +1,93 @@
+"""The largest exponent of a run, and its horizon, by the tangent equations with the jumps of impacts.
+
+A change of the start grows, in the long run, by the largest exponent: the slope of the logarithm of its size in the
+norm of the kinetic energy. No second run is needed, and no distance: the change is infinitely small. As large as that
+of a perturbed run, it says when such a run would be visibly separated, as long as it is small.
+
+Source: Mueller (1995), Chaos, Solitons & Fractals 5, 1671-1681 (exponents of systems with discontinuities).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.horizon import Metric, offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.start import project
+from flexclear.pipeline.dynamics.run.tangents import Differentiated, Direction
+
+#: batches of the exponent's error, and Student's t of their number at 95 %
+BATCHES, STUDENT = 10, 2.262
+#: change of a state whose motion is compared, as a fraction of what counts as far: its square is rounding
+SMALL = 1e-6
+
+
+@dataclass(frozen=True)
+class Growth:
+    """How a change of the start grows.
+
+    time [s], separation: predicted for a perturbed run, a fraction of the largest motion; (n,).  exponent, error: the
+    mean growth of its logarithm over the run and half of the 95 % interval, from batch means [1/s].  horizon [s]: end
+    of the run where the separation is never visible.
+    """
+
+    time: np.ndarray
+    separation: np.ndarray
+    exponent: float
+    error: float
+    horizon: float
+
+
+def start_direction(engine: Engine, y: np.ndarray) -> Direction:
+    """Return the change of a consistent start by which a perturbed run begins, and none of the numbers.
+
+    Of a mechanism without contacts one along no axis, as large.
+    """
+    model, nothing = engine.model, np.zeros(len(engine.model.arrays.f))
+    if model.contacts:
+        along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
+        offsets = np.concatenate([PERTURBATION * contact.joint.clearance * along for contact in model.contacts])
+        return Direction(nothing, perturbed(engine, y, offset_jacobian(engine, y), offsets) - y)
+    end = model.speeds.stop
+    change = np.zeros(len(y))
+    change[:end] = SMALL * _far(engine)[:end] * np.sin(1.0 + np.arange(end) * 2.399963)
+    return Direction(nothing, PERTURBATION / SMALL * 0.5 * (project(engine, y + change) - project(engine, y - change)))
+
+
+def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
+    """Return how the change along direction k of a run grows."""
+    metric, trajectory = Metric(engine), run.trajectory
+    changes, end = run.changes[:, k], engine.model.speeds.stop
+    steps = SMALL / np.maximum((np.abs(changes) / _far(engine))[:, :end].max(axis=1, initial=0.0), 1e-300)
+    sides = []
+    for sign in (-1.0, 1.0):
+        rows = trajectory.rows.copy()
+        m.record(rows, trajectory.contacts).state[:] += sign * steps[:, None] * changes
+        sides.append(metric.motion(engine, rows))
+    change = (sides[1] - sides[0]) / (2.0 * steps[:, None])
+    largest = metric.norms(metric.motion(engine, trajectory.rows)).max(axis=0, initial=0.0)
+    separation = metric.distance(change, np.zeros_like(change), largest)
+    time, span = trajectory.time, engine.end - engine.start
+    first = lasting(time, separation > SEPARATED, LASTING * span)
+    mean, error = _slope(time, np.log(np.maximum(np.linalg.norm(change, axis=1), 1e-300)))
+    return Growth(time, separation, mean, error, engine.end if first is None else float(time[first]))
+
+
+def _far(engine: Engine) -> np.ndarray:
+    """Return what counts as far of each variable, (NY,)."""
+    arrays = engine.model.arrays
+    return np.asarray(arrays.table(m.FLOORS)["magnitude"][arrays.table(m.GROUPS)["group"]])
+
+
+def _slope(time: np.ndarray, logarithm: np.ndarray) -> tuple[float, float]:
+    """Return the mean slope and half of its 95 % interval.
+
+    Without a first batch, in which the change turns to what grows.
+    """
+    ends = np.linspace(time[0], time[-1], BATCHES + 2)[1:]
+    slopes = np.diff(np.interp(ends, time, logarithm)) / np.diff(ends)
+    return float(slopes.mean()), float(STUDENT * slopes.std(ddof=1) / np.sqrt(BATCHES))

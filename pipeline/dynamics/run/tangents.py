@@ -1,0 +1,242 @@
+r"""Runs with their derivatives along directions: variational equations in the same steps, with jumps at impacts.
+
+Along a direction, a change :math:`S` of the state obeys :math:`\dot S = g_yS + g_f\dot f`, with :math:`\dot f` the
+change of the numbers. It is part of the state: the same method steps it, to the same tolerance. At an event of time
+:math:`t_e`, where a function :math:`\varphi` passes zero, equations :math:`g^-` give way to :math:`g^+`, and
+
+.. math:: S^+ = R\,(S^- + g^-t_e') - g^+t_e', \qquad t_e' = -\dot\varphi / (\mathrm d\varphi/\mathrm dt),
+
+:math:`R` being what the event does to the state (bristles that begin bear nothing). The impact rate that a contact
+keeps from its closing changes by its own tangent and by that of the time. Steps that end on a kink of friction need no
+jump: forces are continuous there.
+
+Source: Hiskens & Pai (2000), IEEE Trans. Circuits Syst. I 47, 204-220; Leine & Nijmeijer (2004), *Dynamics and
+Bifurcations of Non-Smooth Mechanical Systems*, ch. 7.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from flexclear.pipeline.core.scene.loads import SampledPid
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import Progress
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
+from flexclear.pipeline.dynamics.run.engine import Engine, assemble
+from flexclear.pipeline.dynamics.run.pieces import Tape
+from flexclear.pipeline.dynamics.run.specialised import suited
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
+from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
+
+# N_CHANGES in the header: number of directions; F_CHANGE, W_CHANGE: lengths of f and w, each of which has its changes
+# along the directions behind itself, arranged as it is itself
+
+#: how many times the tolerance changes may err by, and floors of changes of what is only summed up, such as energies:
+#: their rates jump where a force has a kink, where steps would vanish else
+LOOSER, COARSER = 1e2, 1e4
+
+
+class Direction(NamedTuple):
+    """A direction of change. numbers: of the model's f, (len(f),).  start: of the start's state, (NY,)."""
+
+    numbers: np.ndarray
+    start: np.ndarray
+
+
+@dataclass(frozen=True)
+class Differentiated:
+    """A trajectory with its derivatives.
+
+    trajectory: without them.  changes: of the states, (rows, directions, NY).  impact_rates: changes of the impact
+    rates, (rows, directions, contacts).  event_times: of the times of events [s], (events, directions), NaN of those
+    that are no change of mode.
+    """
+
+    trajectory: Trajectory
+    changes: np.ndarray
+    impact_rates: np.ndarray
+    event_times: np.ndarray
+
+
+def differentiate(
+    engine: Engine,
+    y: np.ndarray,
+    directions: Sequence[Direction],
+    progress: Progress,
+    outputs: np.ndarray | None = None,
+) -> Differentiated:
+    """Run from a consistent start with derivatives along directions; SolverError where there are none.
+
+    outputs: times [s], as of `trajectory.integrate`.
+    """
+    model, count, ny = engine.model, len(directions), engine.model.ny
+    mine, jumps = differentiated_engine(engine, directions), _Jumps(ny, count)
+    start = np.concatenate([y, *(direction.start for direction in directions)])
+    try:
+        whole = integrate(mine, start, progress, outputs=outputs, jumps=jumps)
+    except UnsuitedError as error:
+        raise SolverError(f"the equations of this mechanism are not differentiated: {error}") from None
+    if whole.collocations:
+        raise SolverError("the motion passes a singular pose, across which it is not differentiated")
+    kept, contacts = whole.rows.shape[1] - count * ny, len(model.contacts)
+    trajectory = replace(whole, rows=np.ascontiguousarray(whole.rows[:, :kept]))
+    times = np.full((len(whole.events), count), np.nan)
+    rates = np.zeros((len(whole.rows), count, contacts))
+    for change in jumps.made:
+        same = (whole.events["time"] == change.time) & (whole.events["contact"] == change.contact)
+        times[same & np.isin(whole.events["kind"], (m.CLOSING, m.OPENING))] = change.times
+        rates[whole.time >= change.time, :, change.contact] = change.impact_rates
+    return Differentiated(trajectory, whole.rows[:, kept:].reshape(-1, count, ny), rates, times)
+
+
+def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> Engine:
+    """Return an engine whose state holds changes along directions behind itself.
+
+    Raises SolverError for a mechanism that is not differentiated.
+    """
+    model, count = engine.model, len(directions)
+    if not suited(engine):
+        raise SolverError("friction of ideal joints is solved for by iteration, which is not differentiated")
+    if any(isinstance(load, SampledPid) for load in model.scene.load.values()):
+        raise SolverError("a controller that samples is not differentiated: use a continuous 'pid'")
+    if engine.method.traits.implicit:
+        raise SolverError("only explicit methods carry derivatives: choose 'dop853'")
+    wide = _widened(model.arrays, model.arrays.f, count)
+    changes = [_widened(model.arrays, direction.numbers, count).f for direction in directions]
+    wide = replace(wide, f=np.concatenate([wide.f, *changes]))
+    made = assemble(
+        replace(model, arrays=wide, ny=(1 + count) * model.ny), engine.entry, engine.method, engine.mobility
+    )
+    room = len(made.w)
+    made.h[[m.N_CHANGES, m.F_CHANGE, m.W_CHANGE]] = count, len(wide.f) // (1 + count), room
+    made = replace(made, w=np.concatenate([made.w, np.zeros(count * room)]))
+    made.straight.requested = True
+    return made
+
+
+def _widened(arrays: Arrays, f: np.ndarray, count: int) -> Arrays:
+    """Return arrays with numbers f whose state has room for changes, in error groups of their own."""
+    given = Arrays(arrays.h, f, arrays.columns)
+    tables = {table: given.rows(table) for table in (*m.TABLES["h"], *m.TABLES["f"])}
+    groups, floors = tables[m.GROUPS], tables[m.FLOORS]
+    tables[m.GROUPS] = np.concatenate([groups + k * len(floors) for k in range(1 + count)])
+    coarser = floors.copy()
+    coarser[np.unique(groups[_summed_up(arrays)]), :2] *= COARSER
+    coarser[:, 2] *= LOOSER
+    tables[m.FLOORS] = np.concatenate([floors, *[coarser] * count])
+    own = (m.NY, m.N_GROUPS)
+    return pack({k: arrays.size(k) for k in range(m.ADDRESSES[0]) if k not in own}, tables, arrays.columns)
+
+
+def _summed_up(arrays: Arrays) -> np.ndarray:
+    """Return whether each variable of the state is one of the ledger that no rate depends on, (NY,)."""
+    first, end = arrays.size(m.NQ) + arrays.size(m.NV), arrays.size(m.NY) - arrays.size(m.N_INTERNAL)
+    summed = (np.arange(arrays.size(m.NY)) >= first) & (np.arange(arrays.size(m.NY)) < end)
+    for bristle in arrays.table(m.CONTACTS)["bristle"]:
+        summed[bristle : bristle + 3] &= bristle < 0
+    return summed
+
+
+class _Change(NamedTuple):
+    """A change of mode. times: of its time, impact_rates: of the impact rate that holds from then on; (directions,)."""
+
+    time: float
+    contact: int
+    times: np.ndarray
+    impact_rates: np.ndarray
+
+
+@dataclass
+class _Jumps:
+    """Jumps of the changes along `count` directions of a state with `ny` variables."""
+
+    ny: int
+    count: int
+    seen: int = 0
+    made: list[_Change] = field(default_factory=list)
+
+    def at_events(self, engine: Engine, tape: Tape) -> None:
+        events = m.named(m.EVENT, tape.events[self.seen : engine.n[m.N_EVENTS]])[:, 0]
+        self.seen = int(engine.n[m.N_EVENTS])
+        for event in events[np.isin(events["kind"], (m.CLOSING, m.OPENING)) & (events["time"] > engine.start)]:
+            self._change_mode(engine, int(event["contact"]), closes=event["kind"] == m.CLOSING)
+        last = m.record(tape.rows[: engine.n[m.N_RECORDED]][-1:], len(engine.model.contacts))
+        if last.time[0] == engine.control[m.TIME]:
+            last.state[0, self.ny :] = engine.view(m.Y)[self.ny :]
+
+    def at_break(self, engine: Engine, before: np.ndarray, after: np.ndarray) -> None:
+        moved = self._starts(engine)[:, after[before != after]]
+        if not np.any(moved):
+            return
+        if np.any(moved != moved[:, :1]):
+            raise SolverError(
+                "laws that break at one time, which parameters move differently, have no derivative there"
+            )
+        t, first = float(engine.control[m.TIME]), engine.n[m.ACTIVE]
+        rates = []
+        for pieces in (before, after):
+            engine.n[first : first + len(pieces)] = pieces
+            rates.append(self._evaluate(engine, t)[: self.ny])
+        self._state(engine)[:] += np.outer(moved[:, 0], rates[0] - rates[1])
+
+    def _change_mode(self, engine: Engine, c: int, *, closes: bool) -> None:
+        """Jump where contact c has closed or opened, at the engine's state."""
+        t, state = float(engine.control[m.TIME]), self._state(engine)
+        engine.modes[c] = not closes
+        before = self._evaluate(engine, t)[: self.ny]
+        gap, rate = (self._touch(engine, c, name) for name in (m.TOUCH.gap, m.TOUCH.rate))
+        speed = engine.table(m.TOUCH)["rate"][c]  # at which the gap falls
+        times = gap / speed
+        rates = rate + times * self._acceleration(engine, t, c, before) if closes else np.zeros(self.count)
+        state += np.outer(times, before)
+        bristle = int(engine.model.arrays.table(m.CONTACTS)["bristle"][c])
+        if closes and bristle >= 0:
+            state[:, bristle : bristle + 3] = 0.0
+        engine.modes[c] = closes
+        self._work(engine)[:, engine.h[m.LATCHED] + c] = rates
+        state -= np.outer(times, self._evaluate(engine, t)[: self.ny])
+        self.made.append(_Change(t, c, times, rates))
+
+    def _acceleration(self, engine: Engine, t: float, c: int, rates: np.ndarray) -> float:
+        """Return the second rate at which the gap of contact c falls [m/s^2]: time is a direction like others."""
+        first, numbers, work = self._state(engine)[0], self._numbers(engine)[0], self._work(engine)[0]
+        kept = first.copy(), numbers.copy(), work.copy()
+        first[:], numbers[:], work[:] = rates, 0.0, 0.0
+        self._starts(engine)[0] = -1.0
+        self._evaluate(engine, t)
+        result = float(self._touch(engine, c, m.TOUCH.rate)[0])
+        first[:], numbers[:], work[:] = kept
+        return result
+
+    def _evaluate(self, engine: Engine, t: float) -> np.ndarray:
+        """Return rates of the state with its changes, by the code that steps use."""
+        generic, engine.h[m.EVALUATE] = int(engine.h[m.EVALUATE]), engine.h[m.RATES]
+        engine.entry.evaluate(engine.h, engine.model.arrays.f, engine.w, engine.n, t)
+        engine.h[m.EVALUATE] = generic
+        return engine.slope.copy()
+
+    def _state(self, engine: Engine) -> np.ndarray:
+        """Return the changes of the state, not copied, (directions, NY)."""
+        return engine.view(m.Y)[self.ny :].reshape(self.count, self.ny)
+
+    def _numbers(self, engine: Engine) -> np.ndarray:
+        """Return those of the numbers, not copied, (directions, len(f))."""
+        return engine.model.arrays.f.reshape(1 + self.count, -1)[1:]
+
+    def _work(self, engine: Engine) -> np.ndarray:
+        """Return those of the work space, not copied, (directions, len(w))."""
+        return engine.w.reshape(1 + self.count, -1)[1:]
+
+    def _starts(self, engine: Engine) -> np.ndarray:
+        """Return those of where pieces of laws begin, not copied, (directions, pieces)."""
+        begin, pieces = engine.h[m.PIECES.place] + m.PIECES.start, len(engine.model.arrays.table(m.PIECES))
+        return self._numbers(engine)[:, begin : begin + m.PIECES.size * pieces : m.PIECES.size]
+
+    def _touch(self, engine: Engine, c: int, offset: int) -> np.ndarray:
+        """Return those of what a contact does, (directions,)."""
+        return self._work(engine)[:, engine.h[m.TOUCH.place] + m.TOUCH.size * c + offset].copy()

@@ -1,0 +1,1 @@
+"""Derivatives of recorded quantities by numbers of the scene."""

@@ -1,0 +1,83 @@
+"""Numbers of a scene as directions in which its model and its start change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexclear.pipeline.core.scene.load import number_at, with_numbers
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.dynamics.run.alike import engines_alike
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.tangents import Direction
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
+
+#: relative change of a number by which the assembly, a smooth function of it, is differentiated: the error of central
+#: differences over four points is its fourth power, 1e-12, and starts are closed to 1e-13
+STEP = 1e-3
+#: families of parts, and settings, whose numbers the motion depends on
+FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "start")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A number of a scene."""
+
+    path: str
+    value: float
+    written_in: str = ""
+
+    @property
+    def unit(self) -> float:
+        """Return the change that directions are for: its size, or 1 of a number that is zero."""
+        return abs(self.value) or 1.0
+
+    def changed(self, amount: float) -> float | str:
+        """Return the number changed by `amount` of its units, as the scene writes it."""
+        number = float(self.value + amount * self.unit)
+        return f"{number!r} {self.written_in}" if self.written_in else number
+
+
+@dataclass(frozen=True)
+class Family:
+    """Engines of a scene with one of its numbers changed."""
+
+    scene: Scene
+    bundles: Mapping[str, Labelled]
+    engine: Engine
+
+    def parameter(self, path: str) -> Parameter:
+        """Return the number at a path; InputError for what is no number, or none that the motion depends on."""
+        if path.partition(".")[0] not in FAMILIES:
+            raise InputError(path, f"is no number of a part ({', '.join(FAMILIES)})", "name one, as joint.A1.clearance")
+        return Parameter(path, *number_at(self.scene, path))
+
+    def changed(self, parameter: Parameter, amount: float) -> Engine:
+        """Return the engine with a number changed by `amount` of its units; InputError where the mechanism is another.
+
+        Its code and judgements are those of the scene itself.
+        """
+        edited = with_numbers(self.scene, {parameter.path: parameter.changed(amount)})
+        made, _ = engines_alike(self.engine, edited, self.bundles)
+        if not np.array_equal(made.model.arrays.h, self.engine.model.arrays.h):
+            raise InputError(parameter.path, "changes how the mechanism is built, not only its numbers", "leave it out")
+        return made
+
+    def direction(self, parameter: Parameter) -> Direction:
+        """Return how numbers and start change per unit of a parameter."""
+        around = {k: self.changed(parameter, k * STEP) for k in (-2, -1, 1, 2)}
+        numbers = {k: engine.model.arrays.f for k, engine in around.items()}
+        starts = {k: consistent_start(engine) for k, engine in around.items()}
+        return Direction(central(numbers, STEP), central(starts, STEP))
+
+
+def central(values: Mapping[int, np.ndarray], step: float) -> np.ndarray:
+    """Return the derivative from values at -2, -1, 1 and 2 steps, to the fourth power of the step."""
+    return np.asarray((values[-2] - 8.0 * values[-1] + 8.0 * values[1] - values[2]) / (12.0 * step))

@@ -1,0 +1,107 @@
+"""Derivatives of what is recorded of states, from those of the states.
+
+A row of the record is observed at four points along the direction of its own change, as fine as the row needs: a
+closed contact moves by a small part of its depth, which is millionths of the clearance. So every quantity that a run
+records is differentiated, by the code that records it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.record.dataset import chosen
+from flexclear.pipeline.dynamics.record.motion import Motions
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.run import observed
+from flexclear.pipeline.dynamics.run.tangents import Differentiated
+from flexclear.pipeline.dynamics.sensitivity.parameters import Family, Parameter, central
+
+#: steps along a direction, in its units: powers of ten between these; the widest also as a fraction of the size of
+#: what changes most
+WIDEST, FINEST = 1e-3, 1e-10
+#: fraction of its depth by which a closed contact moves
+OF_DEPTH = 1e-2
+#: what contacts' normal forces are called among the series
+NORMAL_FORCE = "normal force"
+
+Series = dict[str, np.ndarray]
+
+
+def read(family: Family, engine: Engine, run: Differentiated, wanted: Collection[Quantity]) -> Series:
+    """Return quantities over time, (rows, components), by name; and NORMAL_FORCE, (rows, contacts)."""
+    seen = observed(engine, run.trajectory)
+    terms = {term for quantity in wanted for term in quantity.terms()}
+    arrays = chosen(family.scene, Motions(engine.model, seen), terms, run.trajectory.time)
+    made = {quantity.name: quantities.series(arrays, quantity) for quantity in wanted}
+    return made | {NORMAL_FORCE: seen.touch["normal_force"]}
+
+
+def derivatives(
+    family: Family, run: Differentiated, k: int, parameter: Parameter, wanted: Collection[Quantity]
+) -> Series:
+    """Return the derivatives of the same along direction k of a run, per unit of the parameter."""
+    made: Series = {}
+    for rows, step in _batches(_steps(family, run, k, parameter)):
+        around = {j: _read_moved(family, run, k, parameter, rows, j * step, wanted) for j in (-2, -1, 1, 2)}
+        for name in around[1]:
+            change = central({j: there[name] for j, there in around.items()}, step)
+            made.setdefault(name, np.zeros((len(run.trajectory.rows), change.shape[1])))[rows] = change
+    return made
+
+
+def _read_moved(
+    family: Family,
+    run: Differentiated,
+    k: int,
+    parameter: Parameter,
+    rows: np.ndarray,
+    step: float,
+    wanted: Collection[Quantity],
+) -> Series:
+    return read(family, family.changed(parameter, step), moved(run, k, rows, step), wanted)
+
+
+def moved(run: Differentiated, k: int, rows: np.ndarray, step: float) -> Differentiated:
+    """Return some rows of a run, moved by a step along direction k."""
+    some = run.trajectory.rows[rows]
+    record = m.record(some, run.trajectory.contacts)
+    record.state[:] += step * run.changes[rows, k]
+    record.latched[:] += step * run.impact_rates[rows, k]
+    return replace(run, trajectory=replace(run.trajectory, rows=some))
+
+
+def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter) -> np.ndarray:
+    """Return the step for each row."""
+    model, changes = family.engine.model, np.abs(run.changes[:, k])
+    positions = slice(0, model.speeds.stop)
+    floors = model.arrays.table(m.FLOORS)["magnitude"][model.arrays.table(m.GROUPS)["group"]]
+    size = np.maximum(np.abs(run.trajectory.state), floors)[:, positions]
+    steps = WIDEST / np.maximum(1.0, (changes[:, positions] / size).max(axis=1, initial=0.0))
+    if model.contacts:
+        everything, probe = np.arange(len(steps)), float(steps.min()) * 1e-3
+        ends = [_look(family.changed(parameter, j * probe), moved(run, k, everything, j * probe)) for j in (-1, 1)]
+        gaps = [end.touch["gap"] for end in ends]
+        depth, change = -0.5 * (gaps[0] + gaps[1]), np.abs(gaps[1] - gaps[0]) / (2.0 * probe)
+        closed = (m.record(run.trajectory.rows, run.trajectory.contacts).modes == 1) & (depth > 0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            allowed = np.where(closed & (change > 0.0), OF_DEPTH * depth / change, np.inf)
+        steps = np.minimum(steps, allowed.min(axis=1))
+    return np.clip(steps, FINEST, WIDEST)
+
+
+def _look(engine: Engine, run: Differentiated) -> Observed:
+    return observed(engine, run.trajectory)
+
+
+def _batches(steps: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
+    """Yield rows with common steps, powers of ten."""
+    powers = np.floor(np.log10(steps) + 1e-9).astype(int)
+    for power in np.unique(powers):
+        yield np.flatnonzero(powers == power), 10.0**power

@@ -1,0 +1,172 @@
+r"""The exact derivative of a tape along a direction: every operation is followed by what it does to small changes.
+
+For an operation :math:`z = \varphi(x, y)` the tangent is :math:`\dot z = \varphi_x\dot x + \varphi_y\dot y`. Branches
+differentiate the way that is taken; the root of zero, which has no derivative, gives zero. A change of the state is in
+w as the state is; changes of the numbers f, of the laws of time and of impact rates are in `df` and `dw`, arranged as f
+and w are. So are, in `dw`, the changes of what is stored next to the rates.
+
+Source: Griewank & Walther, *Evaluating Derivatives*, 2nd ed. (2008), sec. 3.1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.specialise import wiring as wired
+from flexclear.pipeline.dynamics.specialise.code import Program
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
+
+#: a tangent has at most this many operations per operation of its tape
+LONGEST = 8
+#: stretches of w, but for the state, whose changes are given
+GIVEN = {m.LAW.place, m.LATCHED}
+#: stretches of w, but for the rates, whose changes are stored
+STORED = {m.TOUCH.place}
+
+
+def tangent(program: Program, longest: int) -> Program:
+    """Return the program that does what `program` does, and to changes what it does to numbers.
+
+    longest: operations of a program without tangent.  Raises UnsuitedError where the result is too long.
+    """
+    forward = _Forward(longest * LONGEST)
+    forward.block(program.block)
+    stores = [(array, forward.value(index), forward.value(value)) for array, index, value in program.stores]
+    changes = list[tuple[str, Any, Any]]()
+    for array, index, value in program.stores:
+        stretch, inside = wired.split(index) if array == "w" else (-1, 0)
+        if stretch == wired.RATES:
+            changes.append(("w", wired.start(wired.RATES_CHANGE) + inside, forward.change(value)))
+        elif stretch in STORED:
+            changes.append(("dw", index, forward.change(value)))
+    return Program(forward.tape.block, [*stores, *changes])
+
+
+def _seed(tape: Tape, array: str, index: Any) -> Any:
+    """Return the change of what is loaded from an array."""
+    if array == "f":
+        return tape.write(FLOAT, "load", "df", index)
+    if array == "w" and not isinstance(index, Symbol):
+        stretch, inside = wired.split(index)
+        if stretch == wired.STATE:
+            return tape.write(FLOAT, "load", "w", wired.start(wired.STATE_CHANGE) + inside)
+        if stretch in GIVEN:
+            return tape.write(FLOAT, "load", "dw", index)
+    return 0.0
+
+
+class _Forward:
+    """Writes a tape again, with tangents; `values` and `changes` by the symbols of the first one."""
+
+    def __init__(self, longest: int) -> None:
+        self.tape = Tape(_undecided, longest)
+        self.values, self.changes = dict[Symbol, Any](), dict[Symbol, Any]()
+
+    def value(self, a: Any) -> Any:
+        """Return what an argument is on the new tape."""
+        return self.values[a] if isinstance(a, Symbol) else a
+
+    def change(self, a: Any) -> Any:
+        """Return the change of an argument, 0.0 of numbers."""
+        return self.changes.get(a, 0.0) if isinstance(a, Symbol) else 0.0
+
+    def block(self, items: list[Any]) -> None:
+        """Write a block with its tangents."""
+        for item in items:
+            if isinstance(item, Branch):
+                self._branch(item)
+            else:
+                self._operation(item)
+
+    def _branch(self, old: Branch) -> None:
+        new = Branch(self.value(old.condition), ([], []))
+        for block, items in zip(new.blocks, old.blocks, strict=True):
+            with self.tape.inside(block):
+                self.block(items)
+        self.tape.block.append(new)
+        for joined, *ways in old.joins:
+            self.values[joined] = self.tape.join(new, *map(self.value, ways))
+            if joined.kind == FLOAT:
+                self.changes[joined] = self.tape.join(new, *map(self.change, ways))
+
+    def _operation(self, s: Symbol) -> None:
+        arguments = tuple(map(self.value, s.arguments))
+        value = self.values[s] = self.tape.write(s.kind, s.operation, *arguments)
+        if s.kind != FLOAT:
+            return
+        if s.operation == "load":
+            self.changes[s] = _seed(self.tape, *arguments)
+            return
+        changes = tuple(map(self.change, s.arguments))
+        nothing = all(not isinstance(change, Symbol) and change == 0.0 for change in changes)
+        self.changes[s] = 0.0 if nothing else RULES[s.operation](self.tape, value, arguments, changes)
+
+
+def _undecided(condition: Symbol) -> bool:
+    raise Undecided(condition)  # no rule asks
+
+
+# Rules: (tape, value of the operation, its arguments, their changes) -> its change
+
+
+def _product(tape: Tape, z: Any, x: Any, dx: Any) -> Any:
+    (a, b), (da, db) = x, dx
+    return tape.add(_times(tape, da, b), _times(tape, db, a))
+
+
+def _times(tape: Tape, change: Any, factor: Any) -> Any:
+    """Return a product in which a change that is zero is zero whatever the factor is."""
+    return tape.multiply(change, factor) if isinstance(change, Symbol) else 0.0
+
+
+def _root(tape: Tape, z: Any, x: Any, dx: Any) -> Any:
+    return tape.select(z > 0.0, tape.divide(tape.multiply(0.5, dx[0]), z), 0.0)
+
+
+def _power(tape: Tape, z: Any, x: Any, dx: Any) -> Any:
+    (a, b), (da, db) = x, dx
+    lower = tape.write(FLOAT, "pow", a, tape.subtract(b, 1.0) if isinstance(b, Symbol) else b - 1.0)
+    change = _times(tape, da, tape.multiply(b, lower))
+    if isinstance(db, Symbol):
+        change = tape.add(change, tape.multiply(db, tape.multiply(z, tape.write(FLOAT, "log", a))))
+    return tape.select(a > 0.0, change, 0.0) if isinstance(a, Symbol) else change
+
+
+def _arctan2(tape: Tape, z: Any, x: Any, dx: Any) -> Any:
+    (a, b), (da, db) = x, dx
+    square = tape.add(tape.multiply(a, a), tape.multiply(b, b))
+    return tape.divide(tape.subtract(_times(tape, da, b), _times(tape, db, a)), square)
+
+
+def _sign(tape: Tape, a: Any) -> Any:
+    return tape.write(FLOAT, "copysign", 1.0, a)
+
+
+def _copysign(tape: Tape, z: Any, x: Any, dx: Any) -> Any:
+    if not isinstance(x[0], Symbol):
+        return 0.0
+    return _times(tape, dx[0], tape.multiply(_sign(tape, x[0]), _sign(tape, x[1])))
+
+
+RULES: dict[str, Callable[[Tape, Any, Any, Any], Any]] = {
+    "add": lambda tape, z, x, dx: tape.add(*dx),
+    "sub": lambda tape, z, x, dx: tape.subtract(*dx),
+    "neg": lambda tape, z, x, dx: tape.negate(dx[0]),
+    "mul": _product,
+    "reciprocal": lambda tape, z, x, dx: tape.negate(tape.multiply(dx[0], tape.multiply(z, z))),
+    "pow": _power,
+    "sqrt": _root,
+    "fabs": lambda tape, z, x, dx: tape.multiply(_sign(tape, x[0]), dx[0]),
+    "sin": lambda tape, z, x, dx: tape.multiply(tape.write(FLOAT, "cos", x[0]), dx[0]),
+    "cos": lambda tape, z, x, dx: tape.negate(tape.multiply(tape.write(FLOAT, "sin", x[0]), dx[0])),
+    "tan": lambda tape, z, x, dx: tape.multiply(tape.add(1.0, tape.multiply(z, z)), dx[0]),
+    "log": lambda tape, z, x, dx: tape.multiply(tape.write(FLOAT, "reciprocal", x[0]), dx[0]),
+    "exp": lambda tape, z, x, dx: tape.multiply(z, dx[0]),
+    "tanh": lambda tape, z, x, dx: tape.multiply(tape.subtract(1.0, tape.multiply(z, z)), dx[0]),
+    "arctan2": _arctan2,
+    "copysign": _copysign,
+    "round": lambda tape, z, x, dx: 0.0,
+    "select": lambda tape, z, x, dx: tape.select(x[0], dx[1], dx[2]),
+}

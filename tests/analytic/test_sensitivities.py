@@ -1,0 +1,176 @@
+"""Derivatives by numbers of the scene against closed forms, and against differences of converged runs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from flexclear.pipeline.core.scene.load import edited, load_scene, number_at
+from flexclear.pipeline.core.scene.quantity import parse_recorded
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics.record.point import Runner
+from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
+from flexclear.pipeline.dynamics.sensitivity.parameters import Parameter
+from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint
+from tests.properties.mechanisms import scene as small
+
+#: peaks are located to 1e-5 of an impact's duration, in which their derivatives change by their own size
+PEAKS = 5e-4
+TIGHT = {"solver.rtol": 1e-12, "solver.integrator": "dop853"}
+
+
+def load(name: str, **changes: Any) -> Scene:
+    return load_scene(TREE / "scenes/checks" / f"{name}.toml", TIGHT | changes)
+
+
+def differences(scene: Scene, of: list[str], to: str, step: float) -> dict[str, np.ndarray]:
+    """The same derivatives by central differences of four runs; step: relative to the number."""
+    recorded = [parse_recorded(name, scene.owners()) for name in of]
+    runner, number = Runner(bundles(scene), recorded), Parameter(to, *number_at(scene, to))
+    size = step * number.unit
+    points = {k: runner.run(edited(scene, {to: number.changed(k * step)})) for k in (-2, -1, 1, 2)}
+    assert not any(point.refused for point in points.values())
+    at = {
+        name: {k: np.asarray(point.values[one.name]) for k, point in points.items()}
+        for name, one in zip(of, recorded, strict=True)
+    }
+    return {name: (v[-2] - 8.0 * v[-1] + 8.0 * v[1] - v[2]) / (12.0 * size) for name, v in at.items()}
+
+
+def agree(scene: Scene, of: list[str], to: dict[str, float], tolerance: float) -> xr.Dataset:
+    """Compare with differences; to: their relative steps, by parameter."""
+    found = sensitivities(scene, bundles(scene), silent, of, list(to))
+    for parameter, step in to.items():
+        stepped = differences(scene, of, parameter, step)
+        for name in of:
+            rough = tolerance if "peak" not in name else PEAKS
+            exact = found[name].sel(parameter=parameter).values
+            assert exact == pytest.approx(stepped[name], rel=rough, abs=rough * np.abs(stepped[name]).max())
+    return found
+
+
+def test_a_pendulum_swings_faster_with_gravity() -> None:
+    """From rest the angle is a function of t sqrt(g), whatever the mass: d angle / dg = t rate / 2 g.
+
+    Tolerance: a hundred times what the run itself is good to in ten seconds.
+    """
+    scene = load("pendulum")
+    number = "load.gravity.acceleration.1"
+    found = sensitivities(scene, {}, silent, ["hinge.position", "hinge.velocity.final"], [number, "body.bob.mass"])
+    from flexclear.pipeline import dynamics
+
+    run = dynamics.simulate(scene, {}, silent)
+    rate = run.joint_velocity.sel(coordinate="hinge").interp(time=found.time).values
+    by_gravity, by_mass = found["hinge.position"].values
+    assert by_gravity == pytest.approx(found.time.values * rate / (2.0 * -9.81), abs=4e-8)
+    assert np.abs(by_mass).max() < 4e-8
+
+
+def test_slider_crank_through_impacts() -> None:
+    """Six impacts and more, each of which magnifies what comes before it.
+
+    Tolerance: differences of peak forces and impulses are good to 1e-6.
+    """
+    scene = load("clearance_slider_crank", **{"time.end": 0.03})
+    of = ["piston.position.final", "piston.velocity.final", "pin.peak_force", "pin.impulse", "pin.impact_times.last"]
+    to = {"joint.pin.clearance": 1e-4, "body.rod.mass": 1e-5, "body.crank.angular_velocity.2": 1e-6}
+    found = agree(scene, of, to, 1e-5)
+    assert np.isfinite(found["pin.peak_force"].values).all()
+
+
+@pytest.mark.parametrize("law", ["lankarani-nikravesh", "kelvin-voigt"])
+def test_a_ball_that_falls_and_rebounds(law: str) -> None:
+    """The force of the second law jumps where the contact begins, and it has a kink before it ends.
+
+    Tolerance: steps that pass a kink err by what the tolerance leaves, and so do the differences.
+    """
+    scene = load("bounce", **{"joint.contact.normal.law": law, "time.end": 0.5, "solver.rtol": 1e-10})
+    of = ["ball.position.final", "ball.velocity.final", "contact.peak_force", "contact.impulse"]
+    agree(scene, of, {"joint.contact.normal.stiffness": 1e-2, "load.gravity.acceleration.2": 1e-3}, 1e-3)
+
+
+def test_a_four_bar_from_its_assembly_on() -> None:
+    """A length changes the start: where the loop closes, and with which speeds.
+
+    Tolerance: a thousand times the tolerance by which starts are closed, over the step.
+    """
+    scene = load("four_bars_1", **{"time.end": 0.5, "body.rod1.frames.top.position.1": 1.01})
+    of = ["beam1.position.final", "beam1.velocity.final", "foot0.force.final", "left1.force.largest"]
+    to = {"body.beam1.mass": 1e-3, "body.beam1.frames.right.position.0": 1e-3, "body.rod1.angular_velocity.2": 1e-3}
+    agree(scene, of, to, 1e-6)
+
+
+def test_a_flexible_body() -> None:
+    """Tolerance: of differences, where vibrations have turned a hundred times."""
+    scene = load("flexible_slider_crank", **{"time.end": 0.02})
+    of = ["slider.velocity.final", "crank_pin.force.final", "motor.force.final"]
+    agree(scene, of, {"body.slider.mass": 1e-4, "drive.motor.law.coefficients.1": 1e-5}, 1e-5)
+
+
+LAWS: dict[str, Any] = {
+    "step": {"type": "step", "start": [0.05], "end": [0.15], "change": [0.2]},
+    "harmonic": {"type": "harmonic", "amplitude": [0.1], "frequency": [30.0], "phase": [0.1]},
+}
+
+
+@pytest.mark.parametrize(
+    "law, number",
+    [("step", "start.0"), ("step", "change.0"), *(("harmonic", f"{n}.0") for n in LAWS["harmonic"] if n != "type")],
+)
+def test_laws_of_time(law: str, number: str) -> None:
+    """A pendulum on a cart that is driven; where its law begins the acceleration jumps, and that time is a number.
+
+    Tolerance: of differences.
+    """
+    bodies = {
+        "base": ground(rail=[0.0, 0.0, 0.0]),
+        "cart": body([0.0, 0.0, 0.0], frames={"rail": frame([0, 0, 0], [0, np.pi / 2, 0]), "pin": frame([0, 0, 0])}),
+        "bob": body([0.0, -0.3, 0.0], frames={"pin": frame([0.0, 0.3, 0.0])}),
+    }
+    bodies["base"]["frames"]["rail"]["rotation_vector"] = [0, np.pi / 2, 0]
+    joints = {"rail": joint("prismatic", "base.rail", "cart.rail"), "pin": joint("revolute", "cart.pin", "bob.pin")}
+    drive = {"rail": {"joint": "rail", "law": LAWS[law]}}
+    scene = Scene.model_validate(small(bodies, joints, drive=drive, load=GRAVITY, end=0.2))
+    agree(
+        scene,
+        ["bob.position.final", "bob.velocity.final", "rail.force.final"],
+        {f"drive.rail.law.{number}": 1e-4},
+        1e-7,
+    )
+
+
+def test_beyond_the_horizon_there_is_nothing() -> None:
+    scene = load("clearance_pendulum", **{"time.end": 0.2})
+    of = ["bar.position", "bar.position.final"]
+    found = sensitivities(scene, {}, silent, of, ["joint.hinge.clearance"], horizon=0.1)
+    assert np.isfinite(found[of[0]].sel(time=slice(None, 0.1))).all()
+    assert np.isnan(found[of[0]].sel(time=slice(0.1001, None))).all()
+    assert np.isnan(found[of[1]]).all()
+    assert "0.1 s" in found.attrs["validity"]
+
+
+@pytest.mark.parametrize(
+    "of, to, words",
+    [
+        ("bob.position", "body.bob.type", "is no number"),
+        ("bob.position", "body.bob.weight", "there is no"),
+        ("bob.position", "solver.rtol", "is no number of a part"),
+        ("bob.place", "body.bob.mass", "there is no quantity"),
+        ("bob.position.series", "body.bob.mass", "write bob.position"),
+    ],
+)
+def test_what_means_nothing_is_refused(of: str, to: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        sensitivities(load("pendulum", **{"time.end": 0.1}), {}, silent, [of], [to])
+
+
+def test_friction_of_ideal_joints_is_refused() -> None:
+    scene = load("rubbing_slider_crank", **{"time.end": 0.01})
+    with pytest.raises(SolverError, match="friction of ideal joints"):
+        sensitivities(scene, {}, silent, ["slider.position"], ["body.slider.mass"])

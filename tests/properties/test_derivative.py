@@ -1,0 +1,138 @@
+"""Tangents of tapes are the derivatives of what the tapes compute, to rounding."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model import initial
+from flexclear.pipeline.dynamics.model.mechanism import build
+from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.specialise import straight
+from flexclear.pipeline.dynamics.specialise.code import Program
+from flexclear.pipeline.dynamics.specialise.derivative import tangent
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Tape, UnsuitedError
+from flexclear.pipeline.dynamics.specialise.wiring import (
+    RATES,
+    RATES_CHANGE,
+    STATE,
+    STATE_CHANGE,
+    start,
+    wiring,
+)
+from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties import tapes
+from tests.properties.test_specialised import RIGID, keep_independent, rates_kernel
+
+#: of the largest change of a kind: products of up to a hundred factors, in another order than complex numbers take them
+ROUNDING = 1e-10
+STEP = 1e-40
+
+
+def changes(scene: Scene, reduced: dict[str, Any], closed: int, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of rates and contacts along a random direction, by the tangent and by a complex step of the tape."""
+    model = tabulate(build(scene, reduced))
+    space, random = model.arrays.work_space(lambda _: m.Room(4, 0, 0)), np.random.default_rng(seed)
+    h, y = space.h, int(space.h[m.Y])
+    dy, vy, vdy = (int(h[m.SLOPES]) + k * model.ny for k in range(3))
+    f, w, n, kernel, begin = model.arrays.f, space.w, space.n, rates_kernel(model), initial.start_state(model)
+    begin += 1e-3 * random.normal(size=model.ny)  # the distance of two points that coincide has no derivative
+    begin[model.speeds] += 0.1 * random.normal(size=model.nv)
+    w[y : y + model.ny] = begin
+    keep_independent(model, h, y, dy, w.copy(), n.copy(), kernel)
+    laws = slice(h[m.LAW.place], h[m.LAW.place] + m.LAW.size * model.arrays.size(m.N_LAWS))
+    impacts = slice(h[m.LATCHED], h[m.LATCHED] + len(model.contacts))
+    w[laws], w[impacts], n[n[m.MODE] :] = 0.1 * random.normal(size=laws.stop - laws.start), 0.1, closed
+    df, dw = f * random.normal(size=len(f)), np.zeros(len(w))
+    dw[laws], dw[impacts] = random.normal(size=laws.stop - laws.start), random.normal(size=len(model.contacts))
+    direction = random.normal(size=model.ny) * np.maximum(np.abs(begin), 1e-3)
+    made = straight.program(kernel, wiring(model.arrays, h))
+
+    exact = {"f": f, "w": w.copy(), "n": n.copy(), "df": df, "dw": dw}
+    exact["w"][vy : vy + model.ny] = direction
+    tapes.run(tangent(made, straight.LONGEST), h, exact, y, dy, (vy, vdy))
+    moved = {"f": f + 1j * STEP * df, "w": w + 1j * STEP * dw, "n": n.copy()}
+    moved["w"][y : y + model.ny] += 1j * STEP * direction
+    tapes.run(made, h, moved, y, dy, operations=tapes.COMPLEX)
+    assert np.allclose(exact["w"][dy : dy + model.ny], moved["w"][dy : dy + model.ny].real, rtol=1e-9, atol=1e-9)
+    touch = slice(h[m.TOUCH.place], h[m.TOUCH.place] + m.TOUCH.size * len(model.contacts))
+    ways = [(exact["w"][vdy : vdy + model.ny], exact["dw"][touch])]
+    ways.append((moved["w"][dy : dy + model.ny].imag / STEP, moved["w"][touch].imag / STEP))
+    nq, end = model.nq, model.speeds.stop
+    parts = [[way[0][:nq], way[0][nq:end], way[0][end:], way[1]] for way in ways]
+    sizes = [np.abs(part).max(initial=0.0) or 1.0 for part in parts[1]]
+    joined = [np.concatenate([part / size for part, size in zip(way, sizes, strict=True)]) for way in parts]
+    return joined[0], joined[1]
+
+
+@pytest.mark.parametrize("path", RIGID, ids=lambda path: path.stem)
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_every_scene_is_differentiated(path: Path) -> None:
+    """Along state, numbers, laws of time and impact rates at once; contacts open and closed."""
+    for closed in (0, 1):
+        exact, stepped = changes(load_scene(path), {}, closed)
+        assert np.abs(exact - stepped).max() < ROUNDING
+
+
+@pytest.mark.parametrize("name", ["sps4/csj", "sps4/far_csj_cb", "checks/flexible_slider_crank"])
+def test_the_papers_mechanism_and_flexible_bodies_are_differentiated(name: str) -> None:
+    scene = load_scene(TREE / "scenes" / f"{name}.toml")
+    for closed in (0, 1):
+        exact, stepped = changes(scene, bundles(scene), closed)
+        assert np.abs(exact - stepped).max() < ROUNDING
+
+
+def single(operation: str, *numbers: float) -> tuple[float, complex]:
+    """Change of one operation of numbers that change by 1, 2, ..: by its rule, and by a complex step."""
+    tape = Tape(lambda condition: False, 100)
+    given = [tape.write(FLOAT, "load", "w", start(STATE) + k) for k in range(len(numbers))]
+    made = Program(tape.block, [("w", start(RATES), tape.write(FLOAT, operation, *given))])
+    w, h, count = np.zeros(8), np.zeros(1, int), len(numbers)
+    w[:count], w[4 : 4 + count] = numbers, np.arange(1, count + 1)
+    tapes.run(tangent(made, 100), h, {"w": w}, 0, 3, (4, 7))
+    stepped = np.zeros(8, complex)
+    stepped[:count] = np.array(numbers) + 1j * STEP * np.arange(1, count + 1)
+    tapes.run(made, h, {"w": stepped}, 0, 3, operations=tapes.COMPLEX)
+    return w[7], stepped[3].imag / STEP
+
+
+@pytest.mark.parametrize(
+    "operation, numbers",
+    [
+        *(
+            (name, (x,))
+            for name in ("neg", "reciprocal", "sqrt", "sin", "cos", "tan", "exp", "log", "tanh", "round")
+            for x in (0.3, 2.0)
+        ),
+        *(("fabs", (x,)) for x in (-0.3, 0.4)),
+        *((name, xy) for name in ("add", "sub", "mul", "pow") for xy in ((0.3, 2.0), (1.7, 0.4))),
+        *(
+            (name, xy)
+            for name in ("arctan2", "copysign")
+            for xy in ((0.3, 2.0), (-1.7, 0.4), (1.7, -0.4), (-2.0, -0.3))
+        ),
+    ],
+)
+def test_each_operation_has_its_rule(operation: str, numbers: tuple[float, ...]) -> None:
+    exact, stepped = single(operation, *numbers)
+    assert exact == pytest.approx(stepped, rel=1e-13, abs=1e-300)
+
+
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+def test_the_root_of_zero_does_not_change() -> None:
+    assert single("sqrt", 0.0)[0] == 0.0
+
+
+def test_what_would_be_too_long_is_refused() -> None:
+    tape = Tape(lambda condition: False, 100)
+    x = tape.write(FLOAT, "load", "w", start(STATE))
+    made = Program([*tape.block], [("w", start(RATES), tape.write(FLOAT, "sin", x))])
+    assert STATE_CHANGE != RATES_CHANGE
+    with pytest.raises(UnsuitedError, match="too long"):
+        tangent(Program(tape.block, made.stores), 0)
