@@ -48,6 +48,12 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     from flexclear.pipeline.dynamics.run.run import Run, integrate
 
     def once(edited: Scene, judges: Judges | None = None) -> LabelledArrays:
+        if edited.event:
+            from flexclear.pipeline.core.registry import lookup
+            from flexclear.pipeline.dynamics.effects import EVENTS
+
+            phased: LabelledArrays = lookup(EVENTS, "phases", where="[event]")(edited, bundles, progress, judges)
+            return phased
         try:
             done = integrate(edited, bundles, progress, judges)
         except StoppedError as stopped:

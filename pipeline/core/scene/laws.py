@@ -267,8 +267,20 @@ class Repeated(Part):
         return self
 
 
+class Delayed(Part):
+    """A law that counts time from a later moment on.
+
+    by: that moment [s].  law: what is delayed.
+    """
+
+    type: Literal["delayed"]
+    by: Time
+    law: "Bare"
+
+
 Law = Annotated[
-    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated, Field(discriminator="type")
+    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated | Delayed,
+    Field(discriminator="type"),
 ]
 #: all of them
 KINDS: tuple[Any, ...] = get_args(get_args(Law)[0])
@@ -297,6 +309,8 @@ def _count(law: Any) -> int:
             return sum(1 + _count(section.law) for section in law.sections)
         case Repeated():
             return law.times * (1 + _count(law.law))
+        case Delayed():
+            return _count(law.law)
     return 1
 
 

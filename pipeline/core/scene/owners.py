@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.events import locked
 from flexclear.pipeline.core.scene.loads import Bushing, Pid, SampledPid
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.quantity import KINDS
@@ -87,6 +88,9 @@ def _drives(scene: Any) -> Iterator[tuple[str, bool]]:
             yield from ((f"{name}.{part}", part.startswith("rotation")) for part, _ in drive.components())
         else:
             yield name, turns(scene, drive)
+    for name, event in scene.event.items():
+        if event.kind == "lock":
+            yield from ((held, turning) for held, (_, turning) in locked(scene, event, name, COORDINATES).items())
 
 
 def turns(scene: Any, part: Any) -> bool:
