@@ -21,6 +21,7 @@ from flexclear.pipeline.dynamics.model.interface_basis import modes_of
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
 from flexclear.pipeline.dynamics.run.tree_factor import mass_factor
 
 #: singular values below this fraction of the largest are rounding
@@ -37,12 +38,15 @@ class Blow(NamedTuple):
 
 
 def rows(engine: Engine, states: np.ndarray, t: float) -> np.ndarray:
-    """Rows of the record for states at a time, contacts as the work space has them."""
+    """Rows of the record for states at a time, all with the contacts that are closed in the first where a run begins."""
     contacts = len(engine.model.contacts)
     made = m.empty_record(len(states), contacts, engine.model.ny)
     record = m.record(made, contacts)
     record.time[:], record.state[:] = t, states
-    record.modes[:], record.latched[:] = engine.modes[:contacts], engine.latched[:contacts]
+    for c in overlapping(engine, states[0]):
+        speed = engine.model.contacts[c].joint.initial_approach_speed
+        if speed is not None:
+            record.modes[:, c], record.latched[:, c] = 1.0, speed or NO_IMPACT
     return made
 
 
