@@ -95,6 +95,7 @@ def cost(
     """One run, and what its integration and its recording cost each (`pipeline.dynamics.record.cost.measure`)."""
     from flexclear.pipeline.dynamics.record.cost import measure
 
+    _require_without_events(scene, "the cost of a run")
     return measure(scene, bundles, progress, checked=checked, brief=brief)
 
 
@@ -102,6 +103,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     """All members of a scene's ensemble on its regular output times (schema ENSEMBLE)."""
     from flexclear.pipeline.dynamics.record.ensemble import ensemble as run
 
+    _require_without_events(scene, "an ensemble")
     return run(scene, bundles, progress)
 
 
@@ -109,7 +111,17 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     """A scene whose laws repeat, sampled once in each period (schema SECTIONS)."""
     from flexclear.pipeline.dynamics.record.sections import sections as run
 
+    _require_without_events(scene, "a section of the motion")
     return run(scene, bundles, progress)
+
+
+def _require_without_events(scene: Scene, what: str) -> None:
+    """InputError for a scene with events, of which there is no such result."""
+    from flexclear.pipeline.core.errors import InputError
+
+    if scene.event:
+        name = next(iter(scene.event))
+        raise InputError(f"[event.{name}]", f"{what} needs a scene without events", 'remove them: remove = ["event"]')
 
 
 def equilibrium(
