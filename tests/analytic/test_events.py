@@ -92,7 +92,7 @@ def test_the_state_before_an_event_is_a_row() -> None:
 
 
 def test_a_force_that_is_exceeded_between_two_outputs_only() -> None:
-    """The largest reaction, at the bottom, is 26.16 N: it is above 26.1599 N for some 4 ms."""
+    """The largest reaction, at the bottom, is 26.16 N: it is above 26.1599 N for half a millisecond."""
     event = {"break": {"at": "force(hinge) > 26.15999 N", "release": "joint.hinge"}}
     run = pendulum(event, end=1.0, output={"interval": 0.11})
     expected = time_to(angle_of(26.15999))
@@ -117,7 +117,7 @@ def block(event: dict[str, Any], push: dict[str, Any] | None = None, **spring: f
 
 
 def test_a_spring_that_is_unhooked() -> None:
-    """x = 0.1 cos(5 t) - 0.1 up to then; the block goes on, and the spring takes what it has stored."""
+    """Up to then x = 0.1 cos(5 t) - 0.1; the block goes on, and the spring takes what it has stored."""
     run = block({"unhook": {"at": 0.2, "release": "load.spring"}})
     v = -0.5 * np.sin(1.0)
     assert run["velocity"].values[-1, 0, 2] == pytest.approx(v, rel=1e-10)
@@ -304,8 +304,9 @@ def test_what_an_event_leaves_goes_on() -> None:
 
     Both runs are at rtol 1e-12, and 40 impacts magnify the difference: measured 2e-11.
     """
+    normal = {"law": "hertz", "exponent": 1, "stiffness": 2e3}
     parts: dict[str, Any] = {
-        "stop": {"end": {"joint": "bearing", "upper": 9.0, "normal": {"law": "hertz", "exponent": 1, "stiffness": 2e3}}},
+        "stop": {"end": {"joint": "bearing", "upper": 9.0, "normal": normal}},
         "load": {
             "pid": {"type": "pid", "joint": "clutch", "reference": 7.5, "proportional": 5.0, "integral": 9.0,
                     "derivative": 0.2},

@@ -114,6 +114,16 @@ def switched(part: Any, event: Event) -> Any:
         raise ValueError(f"{where}: {first['msg'].removeprefix('Value error, ')}".lstrip(": ")) from None
 
 
+def with_switched(scene: Any) -> Any:
+    """The scene with all parts that its events make of others next to these: what a run of it may reach by names."""
+    made: dict[str, dict[str, Any]] = {}
+    for name, event in scene.event.items():
+        if event.kind == "switch":
+            family, part = event.part
+            made.setdefault(family, {})[f"{part}.{name}"] = switched(getattr(scene, family)[part], event)
+    return scene.model_copy(update={family: {**getattr(scene, family), **parts} for family, parts in made.items()})
+
+
 def require_possible(scene: Any) -> None:
     """ValueError, opening with the path of what is wrong, for events that cannot be in a scene."""
     if not scene.event:

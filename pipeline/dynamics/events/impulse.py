@@ -38,7 +38,7 @@ class Blow(NamedTuple):
 
 
 def rows(engine: Engine, states: np.ndarray, t: float) -> np.ndarray:
-    """Rows of the record for states at a time, all with the contacts that are closed in the first where a run begins."""
+    """Rows of the record for states at the start, all with the contacts that a run from the first begins with."""
     contacts = len(engine.model.contacts)
     made = m.empty_record(len(states), contacts, engine.model.ny)
     record = m.record(made, contacts)

@@ -60,8 +60,6 @@ def simulated(
 
     Raises InputError for events that cannot happen as they are meant, SolverError when the run cannot continue.
     """
-    begun = scene.time.start
-    span = scene.time.end - begun
     plan = _Plan(scene, bundles, progress, judges.run if judges is not None else None)
     start, phases, waiting = _Start(scene.model_copy(update={"event": {}})), list[Phase](), dict(scene.event)
     while True:
@@ -71,10 +69,9 @@ def simulated(
             break
         del waiting[event]
         t = phase.end
-        made = _in_words(phases, lambda: plan.changed(event, *after, phases[-1]))  # noqa: B023
-        start, happened = made
+        start, happened = _in_words(phases, lambda: plan.changed(event, *after, phases[-1]))  # noqa: B023
         phases[-1] = replace(phases[-1], happened=happened)
-        progress((t - begun) / span, f"at t = {t:.6g} s: {event} ({scene.event[event].kind})")
+        progress(None, f"at t = {t:.6g} s: {event} ({scene.event[event].kind})")
     for name in waiting:
         progress(None, f"warning: {_not_happened(name)}")
     return joined(scene, phases, [_not_happened(name) for name in waiting])
@@ -108,7 +105,7 @@ class _Plan:
     def phase(
         self, start: _Start, waiting: Mapping[str, Event], before: list[Phase]
     ) -> tuple[Phase, str | None, tuple[Scene, Engine, np.ndarray] | None]:
-        """A phase, the event that ends it, and the scene, engine and state in which it does; of the last one nothing."""
+        """A phase, the event that ends it, and scene, engine and state where it does; of the last one nothing."""
         t, end = start.scene.time.start, self.scene.time.end
         due = {n: e for n, e in waiting.items() if not e.before & waiting.keys()}
         timed = {n: max(e.at, t) for n, e in due.items() if isinstance(e.at, float)}

@@ -23,8 +23,8 @@ from flexclear.pipeline.dynamics.run.observation import observe_blocks
 from flexclear.pipeline.dynamics.run.periods import Moment, handed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
-#: parts into which an interval is divided to look closer, and how often at most
-PARTS, PASSES = 12, 20
+#: parts into which an interval is divided to look closer, and how often: what is left is a straight line
+PARTS, PASSES = 12, 5
 #: rows are looked at when they are more by this factor than at the last look
 GROWTH = 1.05
 
@@ -66,9 +66,10 @@ class Watch:
     def look(self, rows: np.ndarray) -> None:
         """Examine the rows that are new."""
         new = rows[len(self._rows) :]
-        if self.hit is not None or not len(new):
+        if len(new):
+            self._rows, self._seen = rows.copy(), self._joined(self._seen, self._observed(new))
+        if self.hit is not None or self._seen is None or len(rows) <= self._looked:
             return
-        self._rows, self._seen = rows.copy(), self._joined(self._seen, self._observed(new))
         values = self._values(self._seen, self._time(rows))
         first = max(self._looked - 1, 0)
         found = [
@@ -93,22 +94,23 @@ class Watch:
     def _located(self, name: str, k: int, end: float) -> float | None:
         """Time at which a condition becomes true between row k and a time; None where it does not."""
         row, known = self._rows[k : k + 1], self._head(k + 1)
-        begin, there = float(self._time(row)[0]), False
+        begin, found = float(self._time(row)[0]), False
+        if begin in self._engine.breaks and self._values(self._observed(row, after=True), self._time(row))[name][0] > 0:
+            return begin
         for _ in range(PASSES):
             times = np.linspace(begin, end, PARTS + 1)
-            if not np.all(np.diff(times) > 0.0):
-                break
             inner = self._between(row, times)
-            seen = self._observed(inner)
-            values = self._values(self._joined(known, seen), np.append(self._time(self._rows[: k + 1]), times))[name]
-            values = values[-len(times) :]
+            every = self._joined(known, self._observed(inner))
+            values = self._values(every, np.append(self._time(self._rows[: k + 1]), times))[name][-len(times) :]
             after = np.flatnonzero((values[1:] > 0.0) & ~(values[:-1] > 0.0))
             if not len(after):
-                # a condition that jumps at the end of what it is located in
-                return end if there else None
-            j, there = int(after[0]), True
+                break
+            j, found = int(after[0]), True
             begin, end, row = float(times[j]), float(times[j + 1]), inner[j : j + 1]
-        return end
+            low, high = values[j], values[j + 1]
+        if not found:
+            return None
+        return begin - low / (high - low) * (end - begin) if np.isfinite(low) else end
 
     def _between(self, row: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Rows at times from that of a row on, integrated from there."""
@@ -135,7 +137,7 @@ class Watch:
         return observe_blocks(self._engine, rows, after=after)
 
     def _values(self, seen: Blocks, time: np.ndarray) -> dict[str, np.ndarray]:
-        """The conditions over rows, positive where they hold; NaN where the scene of this phase has no such quantity."""
+        """The conditions over rows, positive where they hold; NaN of what the scene of this phase does not have."""
         observed, model = by_name(seen, self._engine.model.arrays.size), self._engine.model
         owners, values = model.scene.owners(), dict[str, np.ndarray]()
         for name, one in self._conditions.items():
