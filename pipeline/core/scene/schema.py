@@ -200,10 +200,10 @@ class Scene(Part):
     title: what it is, in a line.  description: more words.  body: bodies by name.  joint: joints by name, ideal ones
     and ones with clearance.  drive: prescribed motions by name.  load: forces, springs, controllers and gravity by
     name.  stop: ends of joint coordinates by name.  gear: coupled joint coordinates by name.  event: what ceases,
-    stops or changes in the run, by name.  time: begin and end of the run.  start: how the run begins, beyond poses
-    and velocities of bodies.  solver: integrator and tolerance.  output: what is recorded.  ensemble: runs from nearby starts.  sections: repeated motion, looked at once in each
-    period.  accuracy: requested accuracy by quantity.  limits: what the work may take of the machine.  view: what
-    pictures and comparisons look at.
+    stops or changes in the run, by name. time: begin and end of the run. start: how the run begins, beyond poses
+    and velocities of bodies. solver: integrator and tolerance. output: what is recorded. ensemble: runs from nearby
+    starts. sections: repeated motion, looked at once in each period. accuracy: requested accuracy by quantity.
+    limits: what the work may take of the machine. view: what pictures and comparisons look at.
     """
 
     title: str

@@ -72,13 +72,12 @@ def simulated(
         start, happened = _in_words(phases, lambda: plan.changed(event, *after, phases[-1]))  # noqa: B023
         phases[-1] = replace(phases[-1], happened=happened)
         progress(None, f"at t = {t:.6g} s: {event} ({scene.event[event].kind})")
-    for name in waiting:
-        progress(None, f"warning: {_not_happened(name)}")
-    return joined(scene, phases, [_not_happened(name) for name in waiting])
-
-
-def _not_happened(name: str) -> str:
-    return f"event {name} did not happen in this run"
+    doubts = [f"event {name} did not happen in this run" for name in waiting]
+    if scene.contacts() or scene.stop:
+        doubts.append("a run with events has no predictability horizon: run it again from a start nearby to see one")
+    for doubt in doubts:
+        progress(None, f"warning: {doubt}")
+    return joined(scene, phases, doubts)
 
 
 def _in_words(phases: list[Phase], make: Callable[[], tuple]) -> tuple:  # type: ignore[type-arg]
