@@ -6,7 +6,6 @@ reads one may rely on this page.
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
@@ -174,14 +173,12 @@ def conform(dataset: xr.Dataset, schema: Schema, *, title: str, **attributes: st
     return conformed(of(dataset), schema, title=title, **attributes).to_xarray()
 
 
-def conformed(
-    data: LabelledArrays, schema: Schema, *, title: str, gaps: Collection[str] = (), **attributes: str | int | float
-) -> LabelledArrays:
+def conformed(data: LabelledArrays, schema: Schema, *, title: str, **attributes: str | int | float) -> LabelledArrays:
     """`data` with units, long names and coordinates of `schema`; ValueError where it differs.
 
     Every mandatory variable must be there with its dimensions; nothing undeclared may be. The attribute `units` is that
     of all entries; where some slide and others turn, the coordinate `<variable>_units` has the one of each instead.
-    title: of the dataset, in words.  gaps: variables that may be NaN besides those of the schema.
+    title: of the dataset, in words.
     """
     missing = [n for n, v in schema.items() if not v.optional and n not in data]
     unknown = [n for n in data if n not in schema]
@@ -196,7 +193,7 @@ def conformed(
         variable = schema.get(name) or COORDINATES[name]
         if array.dims != variable.dims:
             raise ValueError(f"{name} has dimensions {array.dims}, not {variable.dims}")
-        may_lack = variable.gaps or name in gaps or name.startswith(_MAY_BE_OPEN)
+        may_lack = variable.gaps or name.startswith(_MAY_BE_OPEN)
         if array.values.dtype.kind == "f" and not may_lack and not np.isfinite(array.values).all():
             raise ValueError(f"{name} holds values that are not finite")
         units, mixed = _units(data, name, variable)

@@ -13,6 +13,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import LOADS
 from flexclear.pipeline.dynamics.model.driving import coordinate_of, named_coordinate
 from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.stops import End
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.start import NO_IMPACT
 
@@ -33,16 +34,16 @@ def carry(old: Model, before: np.ndarray, new: Model, y: np.ndarray) -> np.ndarr
 
 def closed(scene: Scene, engine: Engine) -> Scene:
     """The scene whose contacts that are closed in an engine's work space go on with their impact rates."""
-    joints, stops = dict[str, Any](), dict[str, Any]()
+    joints, stops = dict[str, Any](scene.joint), dict[str, Any](scene.stop)
     for c, contact in enumerate(engine.model.contacts):
         if engine.modes[c]:
+            parts, name = (joints, contact.name)
+            if isinstance(contact.joint, End):
+                parts, name = stops, contact.joint.stop
             speed = float(engine.latched[c])
             given = {"initial_approach_speed": 0.0 if speed >= NO_IMPACT else speed}
-            parts, name = (stops, contact.joint.stop) if contact.name not in scene.joint else (joints, contact.name)
-            there = (scene.stop if parts is stops else scene.joint).get(name)
-            if there is not None and (parts is stops or hasattr(there, "initial_approach_speed")):
-                parts[name] = there.model_copy(update=given)
-    return scene.model_copy(update={"joint": scene.joint | joints, "stop": scene.stop | stops})
+            parts[name] = parts[name].model_copy(update=given)
+    return scene.model_copy(update={"joint": joints, "stop": stops})
 
 
 def _slots(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
@@ -61,15 +62,15 @@ def _slots(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
             at = first + int(row["internal0"])
             yield ("load", name, scene.load[name].type), range(at, at + _states(scene, name))
     for contact, row in zip(model.contacts, arrays.table(m.CONTACTS), strict=True):
-        if contact.name not in scene.joint:
+        if isinstance(contact.joint, End):
             yield ("stop", contact.name), turns(int(row["surfaces"]))
         elif row["bristle"] >= 0:
             yield ("contact", contact.name), range(int(row["bristle"]), int(row["bristle"]) + 3)
     joints = list(scene.rubbing())
     for row in arrays.table(m.BEARINGS):
         if row["bristle"] >= 0:
-            key = (joints[int(row["joint"])], *(str(int(row[k])) for k in ("kind", "side", "axis")))
-            yield key, range(int(row["bristle"]), int(row["bristle"]) + 3)
+            where = (str(int(row[k])) for k in ("kind", "side", "axis"))
+            yield ("joint", joints[int(row["joint"])], *where), range(int(row["bristle"]), int(row["bristle"]) + 3)
 
 
 def _states(scene: Scene, name: str) -> int:

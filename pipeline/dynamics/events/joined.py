@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -115,7 +115,8 @@ def joined(scene: Scene, phases: Sequence[Phase], doubts: Sequence[str]) -> Labe
     whole = LabelledArrays(made | table, coords | {n for n in table if n in EVENT_COORDS})
     facts = attributes(scene) | _facts(parts, doubts)
     facts["events"] = "\n".join(_sentence(one, loss) for one, loss in _events(phases))
-    return conformed(whole, RUN, title=f"Motion of {subject(scene)}", gaps=gaps, **facts)
+    schema = RUN | {name: replace(RUN[name], gaps=True) for name in gaps}
+    return conformed(whole, schema, title=f"Motion of {subject(scene)}", **facts)
 
 
 def _events(phases: Sequence[Phase]) -> list[tuple[Happened, float]]:

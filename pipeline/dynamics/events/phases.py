@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -28,7 +29,7 @@ from flexclear.pipeline.dynamics.run.observation import observe
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges, Panel, crawls
 from flexclear.pipeline.dynamics.run.run import Run, follow, maker, observed, require_shallow
 from flexclear.pipeline.dynamics.run.start import consistent_start, mends
-from flexclear.pipeline.dynamics.run.trajectory import SLICE, Followed, Stop, never, output_times
+from flexclear.pipeline.dynamics.run.trajectory import SLICE, Followed, Stop, Trajectory, never, output_times
 from flexclear.pipeline.dynamics.starts.snapshot import moving
 
 if TYPE_CHECKING:
@@ -63,15 +64,16 @@ def simulated(
     plan = _Plan(scene, bundles, progress, judges.run if judges is not None else None)
     start, phases, waiting = _Start(scene.model_copy(update={"event": {}})), list[Phase](), dict(scene.event)
     while True:
-        phase, event, after = _in_words(phases, lambda: plan.phase(start, waiting, phases))  # noqa: B023
+        with _in_words(phases):
+            phase, event, after = plan.phase(start, waiting, phases)
         phases.append(phase)
         if event is None or after is None:
             break
         del waiting[event]
-        t = phase.end
-        start, happened = _in_words(phases, lambda: plan.changed(event, *after, phases[-1]))  # noqa: B023
-        phases[-1] = replace(phases[-1], happened=happened)
-        progress(None, f"at t = {t:.6g} s: {event} ({scene.event[event].kind})")
+        with _in_words(phases):
+            start, happened = plan.changed(event, *after, phase)
+        phases[-1] = replace(phase, happened=happened)
+        progress(None, f"at t = {phase.end:.6g} s: {event} ({happened.kind})")
     doubts = [f"event {name} did not happen in this run" for name in waiting]
     if scene.contacts() or scene.stop:
         doubts.append("a run with events has no predictability horizon: run it again from a start nearby to see one")
@@ -80,11 +82,12 @@ def simulated(
     return joined(scene, phases, doubts)
 
 
-def _in_words(phases: list[Phase], make: Callable[[], tuple]) -> tuple:  # type: ignore[type-arg]
-    """What is made; errors of the scene that an event has left name the event."""
+@contextmanager
+def _in_words(phases: list[Phase]) -> Iterator[None]:
+    """Errors of the scene that an event has left name the event."""
     last = next((phase.happened.name for phase in reversed(phases) if phase.happened is not None), None)
     try:
-        return make()
+        yield
     except InputError as error:
         if last is None or error.place.startswith("[event."):
             raise
@@ -108,7 +111,8 @@ class _Plan:
         t, end = start.scene.time.start, self.scene.time.end
         due = {n: e for n, e in waiting.items() if not e.before & waiting.keys()}
         timed = {n: max(e.at, t) for n, e in due.items() if isinstance(e.at, float)}
-        until, first = min([(at, n) for n, at in timed.items()], default=(end, None))
+        first = min(timed, key=timed.__getitem__, default=None)
+        until = end if first is None else timed[first]
         scene = start.scene.model_copy(
             update={"time": start.scene.time.model_copy(update={"end": max(until, t + END * (end - t))})}
         )
@@ -130,8 +134,9 @@ class _Plan:
                 f"'{waiting[name].at}' is true already where the run begins",
                 "turn the comparison, or change the scene that the event would make",
             )
-        if watch.held or (first is not None and until <= t):
-            return phase, (watch.held or [first])[0], (scene, engine, y)
+        at_once = watch.held[0] if watch.held else first if until <= t else None
+        if at_once is not None:
+            return phase, at_once, (scene, engine, y)
         last, trajectory, switched, event = self._followed(engine, made, y, watch, bool(conditions))
         event = first if event is None and first is not None and until < end else event
         seen = observed(last, trajectory)
@@ -159,7 +164,7 @@ class _Plan:
 
     def _followed(
         self, engine: Engine, made: Callable[[str, Progress], Engine], y: np.ndarray, watch: Watch, watched: bool
-    ) -> tuple[Engine, object, str, str | None]:
+    ) -> tuple[Engine, Trajectory, str, str | None]:
         """The trajectory to the end of a phase, and the event whose condition ends it."""
         times = output_times(engine.breaks, self.scene.output.interval, self.scene.time.start)
         if not watched:
