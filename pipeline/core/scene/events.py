@@ -14,6 +14,7 @@ from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import Drive, JointDrive, PathDrive
 from flexclear.pipeline.core.scene.fields import Part, PartName
 from flexclear.pipeline.core.scene.loads import Load, SampledPid
+from flexclear.pipeline.core.scene.owners import COORDINATES
 from flexclear.pipeline.core.scene.quantity import condition
 from flexclear.pipeline.core.units import quantity
 
@@ -80,17 +81,6 @@ class Event(Part):
         """Events that happen before this one."""
         family, name = self.part
         return {name for name in (self.after, name if family == "event" else None) if name}
-
-
-def locked(scene: Any, event: Event, name: str, known: Mapping[str, Mapping[str, bool]]) -> dict[str, tuple[str, bool]]:
-    """Coordinates that a lock called `name` holds: name of what holds it -> coordinate, and whether it is an angle.
-
-    known: coordinates of joint types, as `owners.COORDINATES`.
-    """
-    joint = scene.joint.get(event.part[1])
-    coordinates = known.get(joint.type, {}) if joint is not None else {}
-    several = len(coordinates) > 1
-    return {f"{name}.{c}" if several else name: (c, turns) for c, turns in coordinates.items()}
 
 
 @cache
@@ -176,8 +166,6 @@ def _problems(scene: Any, name: str, event: Event) -> Iterator[tuple[str, str]]:
 
 
 def _of_lock(scene: Any, name: str, joint: Any) -> Iterator[tuple[str, str]]:
-    from flexclear.pipeline.core.scene.owners import COORDINATES
-
     if isinstance(joint, CONTACTS):
         yield "lock", "a joint with clearance has no coordinate to hold: lock an ideal joint"
     elif joint.type not in COORDINATES:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from flexclear.pipeline.core.scene.drives import JointDrive
-from flexclear.pipeline.core.scene.events import Event, locked, switched
+from flexclear.pipeline.core.scene.events import Event, switched
 from flexclear.pipeline.core.scene.fields import Part
 from flexclear.pipeline.core.scene.laws import KINDS, Constant, Delayed, Sum
-from flexclear.pipeline.core.scene.owners import COORDINATES
+from flexclear.pipeline.core.scene.owners import COORDINATES, locked
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.drives.pieces import pieces_of
@@ -59,8 +59,7 @@ def driven(scene: Scene, name: str, event: Event) -> list[Held]:
     """Coordinates whose motion an event prescribes: those of a lock, or the one whose drive is switched."""
     family, part = event.part
     if event.kind == "lock" and scene.joint[part].type in COORDINATES:
-        known = locked(scene, event, name, COORDINATES)
-        return [_held(scene, drive, part, c) for drive, (c, _) in known.items()]
+        return [_held(scene, drive, part, c) for drive, (c, _) in locked(scene, name, event).items()]
     if event.kind == "switch" and family == "drive" and part in scene.drive:
         drive: Any = scene.drive[part]
         return [_held(scene, part, drive.joint, drive.coordinate)]
