@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,13 @@ from scipy.integrate import quad
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.progress import silent
-from flexclear.pipeline.core.scene.load import scene_of
+from flexclear.pipeline.core.scene.load import edited, load_scene, scene_of
+from flexclear.pipeline.core.scene.quantity import parse_recorded
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.record.point import Runner
+from flexclear.stages import s4_simulate
 
+TREE = Path(__file__).resolve().parents[2]
 G, GROUND = 9.81, {"type": "ground", "frames": {"O": {}}}
 GRAVITY = {"type": "gravity", "acceleration": [0.0, -G, 0.0]}
 
@@ -357,3 +363,38 @@ def test_a_lock_of_what_has_gone_is_refused() -> None:
     event = {"break": {"at": 0.1, "release": "joint.hinge"}, "brake": {"at": 0.2, "lock": "joint.hinge"}}
     with pytest.raises(InputError, match=r"\[event.brake.lock\]: joint.hinge has been released before"):
         pendulum(event)
+
+
+def press(**changes: Any) -> Scene:
+    return edited(load_scene(TREE / "scenes" / "gallery" / "shear_pin.toml"), changes)
+
+
+def test_only_scenes_with_events_reach_their_modules() -> None:
+    """A part that an event brings in is in the key of the run."""
+    with_events, without = press(), press(event={})
+    packages = [[n for n in s4_simulate.modules(one) if ".dynamics.events" in n] for one in (with_events, without)]
+    assert packages == [["flexclear.pipeline.dynamics.events.phases"], []]
+    wave = {"law": {"type": "harmonic", "amplitude": [0.1], "frequency": [3.0]}}
+    switched = press(event={"e": {"at": 0.1, "switch": "drive.motor", "to": wave}})
+    assert "flexclear.pipeline.dynamics.drives.harmonic" in s4_simulate.modules(switched)
+    assert s4_simulate.params(with_events) != s4_simulate.params(press(**{"event.break.at": "abs(pin.force) > 41 N m"}))
+
+
+def test_points_of_sweeps_go_over_events() -> None:
+    """A point records what the run of its scene has."""
+    scene = press(**{"load.workpiece.stiffness": 2.5e4})
+    names = ("slider.position.x.final", "pin.force.largest", "guide.velocity.series")
+    recorded = [parse_recorded(name, scene.owners()) for name in names]
+    point = Runner({}, recorded).run(scene)
+    assert not point.refused
+    run = dynamics.simulate(scene, {}, silent)
+    assert float(point.values[names[0]]) == run["position"].sel(body="slider", axis="x").values[-1]
+    assert float(point.values[names[1]]) == np.abs(run["drive_force"].sel(drive="pin").values).max()
+    # two rows for each of the two events, of which none is at a regular output
+    assert len(point.values[names[2]]) == run.sizes["time"] - 4 == 201
+
+
+@pytest.mark.parametrize("result", [dynamics.ensemble, dynamics.sections, dynamics.cost])
+def test_results_that_know_no_events_refuse_them(result: Any) -> None:
+    with pytest.raises(InputError, match="needs a scene without events"):
+        result(press(), {}, silent)
