@@ -4,9 +4,11 @@
 .PHONY: all help setup check test test-slow interpreters bench atlas chaos docs clean
 
 VENV := .venv
+# where environments hold their programs: Windows calls that folder otherwise
+BIN := $(if $(filter Windows_NT,$(OS)),Scripts,bin)
 READY := $(VENV)/.ready
 TOOLS := $(VENV)/.tools
-RUN := $(VENV)/bin/python
+RUN := $(VENV)/$(BIN)/python
 # the first Python on the path that is new enough; `make PYTHON=/path/to/python3.12` names another
 CANDIDATES := python3 python3.13 python3.12 python3.11 python3.14 python
 PYTHON ?= $(shell for p in $(CANDIDATES); do \
@@ -21,10 +23,10 @@ help: ## This list
 setup: $(TOOLS) ## Create .venv with the pinned versions (done by itself when needed)
 
 check: $(TOOLS) ## Format, lint, types and import rules
-	$(VENV)/bin/ruff format --check .
-	$(VENV)/bin/ruff check .
-	$(VENV)/bin/mypy
-	$(VENV)/bin/lint-imports
+	$(VENV)/$(BIN)/ruff format --check .
+	$(VENV)/$(BIN)/ruff check .
+	$(VENV)/$(BIN)/mypy
+	$(VENV)/$(BIN)/lint-imports
 
 test: $(TOOLS) ## Tests, except those marked slow
 	$(RUN) -m pytest -q -n auto --dist loadfile
@@ -39,9 +41,9 @@ interpreters: $(READY) ## A short run under every other Python, and with the low
 	@try() { there=$(VENV)/others/$$1; echo "-- $$1"; p=$$2; extra=$$3; days=$$4; shift 4; \
 		test $$there/.ready -nt constraints.txt && test $$there/.ready -nt pyproject.toml && \
 		test $$there/.ready -nt .ci/lowest.txt && test -n "$$(find $$there/.ready -mtime -$$days)" || { \
-			$$p -m venv $$there && $$there/bin/pip install -q --retries 1 --timeout 20 "$$@" -e ".$$extra" && \
+			$$p -m venv $$there && $$there/$(BIN)/pip install -q --retries 1 --timeout 20 "$$@" -e ".$$extra" && \
 			touch $$there/.ready; } || { echo "skipped: what it needs is not available here"; return 0; }; \
-		FLEXCLEAR_RESULTS=$$there/results $$there/bin/python -m flexclear doctor; }; \
+		FLEXCLEAR_RESULTS=$$there/results $$there/$(BIN)/python -m flexclear doctor; }; \
 	ran=" "; for p in $(OTHERS); do \
 		v=$$($$p -c 'import sys; print("%d.%d" % sys.version_info[:2])' 2>/dev/null) || continue; \
 		case "$$ran" in *" $$v "*) continue;; esac; ran="$$ran$$v "; \
@@ -66,7 +68,7 @@ docs: $(READY) ## The documentation as a site: results/site/index.html
 
 clean: ## Remove results and caches; .venv stays
 	rm -rf results build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
-	find pipeline stages tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find flexclear papers pipeline stages tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Made once, and again when the versions that are asked for change. Bytecode is made of what is imported, when it is.
 INSTALL := $(RUN) -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 # first of all: it pins BLAS to one thread, which NumPy reads when it is imported
-from flexclear import pipeline  # noqa: F401  isort: skip
-
 import argparse
 import os
 import sys
@@ -16,11 +14,11 @@ from pathlib import Path
 
 from benchmarks import families, log, page, system
 from benchmarks.family import WRONG, Case, Family, Record
-from flexclear.pipeline.core.errors import FlexclearError, InputError
-from flexclear.pipeline.core.registry import suggestion
+from flexclear.commands.__main__ import INTERRUPTED
+from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.progress import Monitor, duration
 from flexclear.pipeline.post.plotting.table import pipe_table
-from flexclear.stages.__main__ import INTERRUPTED
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -28,7 +28,7 @@ PARTS: Mapping[str, Mapping[str, str]] = {
     f"{_RUN}.run.horizon": {"Pair.perturbed_run": "integrating"},
     f"{_RUN}.run.run": {"observed": "recording"},
     f"{_RUN}.record.dataset": {"recorded": "recording"},
-    "flexclear.pipeline.post.series": {"derived": "deriving"},
+    "flexclear.pipeline.post.single_run.series": {"derived": "deriving"},
 }
 _spent: dict[str, float] = {}
 _adding = Lock()
@@ -84,7 +84,7 @@ def main(arguments: list[str]) -> int:
     """Run the command, and tell its parts."""
     started = time.process_time()
     listen()
-    from flexclear.stages.__main__ import main as command
+    from flexclear.commands.__main__ import main as command
 
     code = command(arguments)
     whole = time.process_time()

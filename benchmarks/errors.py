@@ -12,10 +12,10 @@ import xarray as xr
 from benchmarks.mechanisms import Mechanism
 from benchmarks.timing import once
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.integrators import DEFAULT, VIBRATING
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.run.engine import Engine, another
 from flexclear.pipeline.dynamics.run.observation import frames
 from flexclear.pipeline.dynamics.run.run import observed

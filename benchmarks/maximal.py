@@ -20,7 +20,7 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.mechanisms import joint_laws
-from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.numerics.rotations import skew
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.model.merge import (
     Frame,

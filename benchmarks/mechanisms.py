@@ -10,12 +10,13 @@ import numpy as np
 import xarray as xr
 
 from benchmarks.timing import once
-from flexclear.pipeline.core.progress import silent
+from flexclear.commands.scenes import bundles, find_scene
 from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
 from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 from flexclear.pipeline.dynamics.run.engine import Engine
@@ -23,7 +24,6 @@ from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.specialised import specialise
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
-from flexclear.stages.run import bundles, find_scene
 
 #: the scenes of the paper, from the least to the fullest
 SCENES = ("ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb")

@@ -17,8 +17,8 @@ from typing import Any
 from benchmarks import families, log
 from benchmarks.family import Family, Record
 from benchmarks.log import Session
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.plotting.table import pipe_table
 

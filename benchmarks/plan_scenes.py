@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from flexclear.commands.new import TEMPLATES
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import TREE
-from flexclear.stages.new import TEMPLATES
 
 #: density [kg/m^3], Young's modulus [Pa], Poisson's ratio
 MATERIALS = {

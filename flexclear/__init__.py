@@ -1,6 +1,6 @@
 """flexclear from Python: ``import flexclear as fc``.
 
-``flexclear.pipeline`` and ``flexclear.stages`` are the folders of these names at the top of the repository: links in
+``flexclear.pipeline``, ``stages`` and ``papers`` are the folders of these names at the top of the repository: links in
 a checkout, plain folders where flexclear is installed. Where a checkout has no links, as on Windows, the top itself is
 looked through.
 """
@@ -11,16 +11,17 @@ from typing import TYPE_CHECKING
 if not os.path.isdir(os.path.join(os.path.dirname(__file__), "pipeline")):
     __path__.append(os.path.dirname(os.path.dirname(os.path.abspath(__file__))))
 
-from flexclear import pipeline
-from flexclear.pipeline import __all__ as __all__
+from flexclear.pipeline.core.system import threads as threads  # isort: skip  (before NumPy is loaded)
+from flexclear import public
+from flexclear.public import __all__ as __all__
 
 if TYPE_CHECKING:
-    from flexclear.pipeline import *  # noqa: F403  (listed there)
+    from flexclear.public import *  # noqa: F403  (listed there)
 
 
 def __getattr__(name: str) -> object:
-    """The functions of `pipeline`, listed there alone, `Scene` and the version."""
-    return getattr(pipeline, name)
+    """The functions of `public`, listed there alone, `Scene`, the errors and the version."""
+    return getattr(public, name)
 
 
 def __dir__() -> list[str]:

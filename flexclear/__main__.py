@@ -2,7 +2,7 @@
 
 import sys
 
-from flexclear.stages.__main__ import main
+from flexclear.commands.__main__ import main
 
 if __name__ == "__main__":
     sys.exit(main())

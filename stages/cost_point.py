@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.progress import Progress, silent
-from flexclear.pipeline.core.system import peak_memory
+from flexclear.pipeline.core.system.platforms import peak_memory
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.stages.kernels import warm
-from flexclear.stages.s4_simulate import bundles, rebuild
+from flexclear.stages.simulation import bundles, rebuild
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,9 +31,9 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     import xarray as xr
 
     from flexclear.pipeline import dynamics
-    from flexclear.pipeline.core import quantities
-    from flexclear.pipeline.core.errors import SolverError
+    from flexclear.pipeline.core.artifacts import quantities
     from flexclear.pipeline.core.scene.quantity import parse
+    from flexclear.pipeline.core.system.errors import SolverError
 
     scene = rebuild(params["simulate"], inputs)
     reduced = bundles(inputs)
@@ -63,9 +63,9 @@ def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], pr
     import xarray as xr
 
     from flexclear.pipeline import dynamics
-    from flexclear.pipeline.core import quantities
-    from flexclear.pipeline.core.errors import SolverError
+    from flexclear.pipeline.core.artifacts import quantities
     from flexclear.pipeline.core.scene.quantity import parse
+    from flexclear.pipeline.core.system.errors import SolverError
 
     scene, reduced = rebuild(params["simulate"], inputs), bundles(inputs)
     warm(scene, reduced, progress)

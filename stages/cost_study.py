@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.pipeline.core.progress import Progress
+    from flexclear.pipeline.core.system.progress import Progress
 
 #: contact events are located to this fraction of the clearance (flexclear.pipeline.dynamics.integrate.contact_events)
 LOCATED = 1e-12
@@ -19,8 +19,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, the `own`
     setting of the scene (own_integrator, own_rtol or own_step), what was left `undone` in words, whether the study is
-    `complete`, and `peers`, as of `stages.cost_peers`.  The reference is the tightest run among the points, and a run
-    by another method confirms it.
+    `complete`, and `peers`, as of `flexclear.commands.cost_peers`.  The reference is the tightest run among the
+    points, and a run by another method confirms it.
     """
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.cost import answer, causes, price, statistics, work_precision

@@ -8,23 +8,23 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import of_run
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import (
-    s1_mesh,
-    s2_modes,
-    s3_bundle,
-    s3_rigid,
-    s4_linear,
-    s4_sections,
-    s4_simulate,
-    s5_post,
-    s6_render,
-    s7_overview,
+    derived_series,
+    linearisation,
+    meshing,
+    modal_analysis,
+    overview_figures,
+    poincare_sections,
+    reduction,
+    rendering,
+    rigid_body,
+    simulation,
 )
 
 #: stages in order, as `--to` names them
@@ -60,14 +60,14 @@ class Graph:
     def mesh(self) -> dict[str, Task]:
         """By body with a recipe."""
         for recipe in self.scene.recipes().values():
-            s1_mesh.check_size(Path(recipe), self.scene.limits, self.recipe)
+            meshing.check_size(Path(recipe), self.scene.limits, self.recipe)
         return {
             body: self._body_task(
                 "mesh",
                 body,
-                "flexclear.stages.s1_mesh:run",
-                s1_mesh.params(Path(recipe), self.recipe),
-                modules=s1_mesh.modules(Path(recipe)),
+                "flexclear.stages.meshing:run",
+                meshing.params(Path(recipe), self.recipe),
+                modules=meshing.modules(Path(recipe)),
                 context={"folder": str(Path(recipe).parent.resolve()), "file": recipe},
             )
             for body, recipe in self.scene.recipes().items()
@@ -80,10 +80,10 @@ class Graph:
             body: self._body_task(
                 "modes",
                 body,
-                "flexclear.stages.s2_modes:run",
-                s2_modes.params(part),
+                "flexclear.stages.modal_analysis:run",
+                modal_analysis.params(part),
                 {"mesh": self.mesh[body]},
-                s2_modes.modules(part, f"{self.scene.path or self.scene.name} [body.{body}.modes]"),
+                modal_analysis.modules(part, f"{self.scene.path or self.scene.name} [body.{body}.modes]"),
             )
             for body, part in self.scene.flexible().items()
         }
@@ -95,12 +95,12 @@ class Graph:
             body: self._body_task(
                 "bundle",
                 body,
-                "flexclear.stages.s3_bundle:run",
-                s3_bundle.params(self.scene, body),
+                "flexclear.stages.reduction:run",
+                reduction.params(self.scene, body),
                 {"mesh": self.mesh[body], "modes": self.modes[body]},
                 (
-                    *s1_mesh.modules(Path(part.mesh)),
-                    *s3_bundle.modules(self.scene, body, s1_mesh.kind_of(Path(part.mesh))),
+                    *meshing.modules(Path(part.mesh)),
+                    *reduction.modules(self.scene, body, meshing.kind_of(Path(part.mesh))),
                 ),
             )
             for body, part in self.scene.flexible().items()
@@ -113,10 +113,10 @@ class Graph:
             body: self._body_task(
                 "rigid",
                 body,
-                "flexclear.stages.s3_rigid:run",
+                "flexclear.stages.rigid_body:run",
                 {},
                 {"mesh": self.mesh[body]},
-                s1_mesh.modules(Path(part.mesh)),
+                meshing.modules(Path(part.mesh)),
             )
             for body, part in self.scene.meshed().items()
         }
@@ -124,22 +124,22 @@ class Graph:
     @cached_property
     def simulate(self) -> Task:
         """One run; shown as ``run.nc``."""
-        return self._simulation("simulate", "flexclear.stages.s4_simulate:run", "run.nc", ensemble=False)
+        return self._simulation("simulate", "flexclear.stages.simulation:run", "run.nc", ensemble=False)
 
     @cached_property
     def ensemble(self) -> Task | None:
         """Members of the ensemble, if the scene asks for one."""
         if self.scene.ensemble is None:
             return None
-        return self._simulation("ensemble", "flexclear.stages.s4_simulate:run_ensemble", "ensemble.nc", ensemble=True)
+        return self._simulation("ensemble", "flexclear.stages.simulation:run_ensemble", "ensemble.nc", ensemble=True)
 
     @cached_property
     def sections(self) -> Task:
         """The motion sampled once in each period of its laws; shown as ``sections.nc``."""
-        params, modules = s4_sections.params(self.scene), s4_simulate.modules(self.scene)
+        params, modules = poincare_sections.params(self.scene), simulation.modules(self.scene)
         return self._scene_task(
             "sections",
-            "flexclear.stages.s4_sections:run",
+            "flexclear.stages.poincare_sections:run",
             params,
             self.bodies(),
             names={"nc": "sections.nc"},
@@ -153,15 +153,15 @@ class Graph:
         # the figure is headed by the name, which is a fact for once
         params: dict[str, object] = {"scene": self.scene.name}
         return self._scene_task(
-            "verdict", "flexclear.stages.s5_verdict:run", params, inputs, names={"nc": "verdict.nc"}
+            "verdict", "flexclear.stages.motion_verdict:run", params, inputs, names={"nc": "verdict.nc"}
         )
 
     @cached_property
     def post(self) -> Task:
         """What is derived from the run."""
         inputs = {"run": self.simulate} | ({"ensemble": self.ensemble} if self.ensemble else {})
-        params = s5_post.params(self.scene)
-        return self._scene_task("post", "flexclear.stages.s5_post:run", params, inputs, names={"nc": "post.nc"})
+        params = derived_series.params(self.scene)
+        return self._scene_task("post", "flexclear.stages.derived_series:run", params, inputs, names={"nc": "post.nc"})
 
     @cached_property
     def render(self) -> dict[str, Task]:
@@ -171,14 +171,14 @@ class Graph:
         return {f"{what} {kind}": self.picture(what, kind) for what, kind in pairs}
 
     def picture(self, what: str, kind: str, time: float | None = None) -> Task:
-        """One of what `s6_render.FORMATS` lists; `time`: of vibrations, as of `linear`."""
-        params = s6_render.params(self.scene, what, kind)
+        """One of what `rendering.FORMATS` lists; `time`: of vibrations, as of `linear`."""
+        params = rendering.params(self.scene, what, kind)
         bundles = {f"bundle/{body}": task for body, task in self.bundle.items()}
         source = (
             {} if what == "modes" else {"linear": self.linear(time)} if what == "vibrations" else {"run": self.simulate}
         )
         inputs: dict[str, Task] = {**source, **bundles}
-        task = self._scene_task("render", "flexclear.stages.s6_render:run", params, inputs)
+        task = self._scene_task("render", "flexclear.stages.rendering:run", params, inputs)
         folder = self._folder("paraview" if kind == "pvd" else "")
         return replace(task, part=f"{what} {kind}", folder=folder)
 
@@ -191,11 +191,16 @@ class Graph:
         vibrations: bool = True,
     ) -> Task:
         """Equilibrium in one pose; with its natural vibrations shown as ``linear.nc``, else as ``equilibrium.nc``."""
-        params = s4_linear.params(self.scene, time, drives, moving=moving, vibrations=vibrations)
+        params = linearisation.params(self.scene, time, drives, moving=moving, vibrations=vibrations)
         name = "linear" if vibrations else "equilibrium"
-        modules = s4_simulate.modules(self.scene)
+        modules = simulation.modules(self.scene)
         return self._scene_task(
-            name, "flexclear.stages.s4_linear:run", params, self.bodies(), names={"nc": f"{name}.nc"}, modules=modules
+            name,
+            "flexclear.stages.linearisation:run",
+            params,
+            self.bodies(),
+            names={"nc": f"{name}.nc"},
+            modules=modules,
         )
 
     def campbell(
@@ -206,9 +211,9 @@ class Graph:
         drives: Mapping[str, float] | None = None,
     ) -> Task:
         """Vibrations over the speed of a drive, shown as ``campbell.nc``."""
-        params = s4_linear.campbell_params(self.scene, speeds, drive, time, drives)
-        modules = s4_simulate.modules(self.scene)
-        function = "flexclear.stages.s4_linear:campbell"
+        params = linearisation.campbell_params(self.scene, speeds, drive, time, drives)
+        modules = simulation.modules(self.scene)
+        function = "flexclear.stages.linearisation:campbell"
         return self._scene_task(
             "campbell", function, params, self.bodies(), names={"nc": "campbell.nc"}, modules=modules
         )
@@ -267,7 +272,9 @@ class Graph:
     def overview(self) -> Task:
         """General figures of the run."""
         inputs = {"run": self.simulate, "post": self.post}
-        task = self._scene_task("overview", "flexclear.stages.s7_overview:run", s7_overview.params(self.scene), inputs)
+        task = self._scene_task(
+            "overview", "flexclear.stages.overview_figures:run", overview_figures.params(self.scene), inputs
+        )
         return replace(task, part="figures", folder=self._folder("figures"))
 
     @cached_property
@@ -278,12 +285,12 @@ class Graph:
     def bodies(self) -> dict[str, Task]:
         """The tasks of bodies that runs need, as these call them: ``bundle/<body>``, ``rigid/<body>``."""
         return {f"bundle/{body}": task for body, task in self.bundle.items()} | {
-            f"{s3_rigid.PREFIX}{body}": task for body, task in self.rigid.items()
+            f"{rigid_body.PREFIX}{body}": task for body, task in self.rigid.items()
         }
 
     def _simulation(self, stage: str, run: str, name: str, *, ensemble: bool) -> Task:
-        params = s4_simulate.params(self.scene, ensemble=ensemble)
-        modules = s4_simulate.modules(self.scene)
+        params = simulation.params(self.scene, ensemble=ensemble)
+        modules = simulation.modules(self.scene)
         return self._scene_task(stage, run, params, self.bodies(), names={"nc": name}, modules=modules)
 
     def _folder(self, below: str = "") -> str:

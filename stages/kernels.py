@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import s4_simulate
+from flexclear.stages import simulation
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.artifacts.labelled import Labelled
-    from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
 
 
 def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
@@ -26,16 +26,16 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
         scene=scene.name,
         part=f"{scene.solver.integrator} {'chosen' if scene.solver.step is None else 'fixed'} {scene.solver.events}",
         run="flexclear.stages.kernels:run",
-        params={"simulate": s4_simulate.params(scene)},
+        params={"simulate": simulation.params(scene)},
         inputs=bundles,
-        modules=s4_simulate.modules(scene),
+        modules=simulation.modules(scene),
         folder="",
     )
 
 
 def shared(scene: Scene) -> tuple[str, ...]:
     """Equal for scenes that run on the same kernels: numbers and wiring are not compiled."""
-    return s4_simulate.modules(scene)
+    return simulation.modules(scene)
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -46,7 +46,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     import xarray as xr
 
     begun = _processor_time()
-    warm(s4_simulate.rebuild(params["simulate"], inputs), s4_simulate.bundles(inputs), progress)
+    warm(simulation.rebuild(params["simulate"], inputs), simulation.bundles(inputs), progress)
     return {"nc": xr.Dataset(attrs={"compile_seconds": _processor_time() - begun})}
 
 

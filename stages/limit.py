@@ -6,8 +6,8 @@ import argparse
 import math
 import re
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
+from flexclear.pipeline.core.system.errors import InputError
 
 
 def deadline(options: argparse.Namespace | None) -> tuple[float, str]:

@@ -16,8 +16,8 @@ from typing import Any
 
 from flexclear.pipeline.core.artifacts.paths import TREE, results_root
 from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.errors import FlexclearError, InputError
-from flexclear.pipeline.core.log import set_level
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError
+from flexclear.pipeline.core.system.log import set_level
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.core.workflow.fingerprint import Sources, sources_of
 from flexclear.pipeline.core.workflow.progress import Monitor

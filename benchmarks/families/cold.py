@@ -19,7 +19,7 @@ from pathlib import Path
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, short, table
 from benchmarks.timing import of_children
-from flexclear.pipeline.core.system import cores
+from flexclear.pipeline.core.system.platforms import cores
 
 SCENES = ("ideal", "csj", "far_csj_cb")
 

@@ -18,7 +18,7 @@ from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, spread, table
 from benchmarks.timing import Times, interleaved, of_children
 from flexclear.pipeline.core.artifacts.paths import TREE, results_root
-from flexclear.pipeline.core.system import cores
+from flexclear.pipeline.core.system.platforms import cores
 
 #: so many, since single ones take up to a quarter longer on a machine that others use as well
 ROUNDS = 11

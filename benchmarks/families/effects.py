@@ -15,12 +15,12 @@ import numpy as np
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import Columns, table
 from benchmarks.timing import once
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.run import engines, follow
 from flexclear.pipeline.dynamics.run.start import consistent_start
-from flexclear.pipeline.post.effect_sizes import written
+from flexclear.pipeline.post.answers.effect_sizes import written
 
 SCENE, RIGID = "sps4/far_csj_cb", "sps4/csj"
 #: what is asked for
@@ -63,10 +63,10 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _influences() -> list[Record]:
-    from flexclear.stages import effects, run
+    from flexclear.commands import effects, scenes
     from flexclear.stages.workplace import open_workplace
 
-    scene = edited(load_scene(run.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
+    scene = edited(load_scene(scenes.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
     found = effects.dataset(scene, open_workplace())
     records = []
     for quantity in WATCHED:
@@ -93,10 +93,10 @@ def _endless(value: Any) -> bool:
 
 
 def _started(name: str, **changes: Any) -> tuple[Any, Any, np.ndarray]:
-    from flexclear.stages import run
+    from flexclear.commands import scenes
 
-    scene = edited(load_scene(run.find_scene(name)), {"ensemble": None, **changes})
-    reduced = run.bundles(scene) if scene.flexible() else {}
+    scene = edited(load_scene(scenes.find_scene(name)), {"ensemble": None, **changes})
+    reduced = scenes.bundles(scene) if scene.flexible() else {}
     engine, other = engines(scene, reduced, silent)
     return engine, other, consistent_start(engine)
 

@@ -13,9 +13,9 @@ from benchmarks.mechanisms import Mechanism, mechanism
 from benchmarks.page import Columns, short, table
 from benchmarks.timing import Times, slope
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Ensemble
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.dynamics.run import specialised
 

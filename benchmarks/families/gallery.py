@@ -12,13 +12,13 @@ import xarray as xr
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import DOCS
+from flexclear.commands.scenes import bundles, find_scene
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.post import derive
-from flexclear.stages import s6_render
-from flexclear.stages.run import bundles, find_scene
+from flexclear.stages import rendering
 
 PICTURES = DOCS / "gallery"
 #: of the pictures: pixels, and colours that are kept, so that a page of them stays small
@@ -217,6 +217,23 @@ def _rolling(run: xr.Dataset, scene: Scene) -> str:
     return f"It gets {float(np.linalg.norm(moved)):.2f} m far; it slips by {100 * abs(slip):.2g} %."
 
 
+def _cam(run: xr.Dataset, scene: Scene) -> str:
+    late = run.isel(time=(run["time"] >= 0.2).values)
+    torque, press = abs(late["drive_force"]).max(), late["load_force"].sel(load="contact", axis="z")
+    profile = 0.01 * (1.0 - np.cos(late["joint_position"].sel(coordinate="shaft")))
+    off = abs(late["joint_position"].sel(coordinate="rail") - profile).max()
+    return (
+        f"Up to {float(torque):.2g} N m; the contact carries {float(press.min()):.2g} to {float(press.max()):.2g} N, "
+        f"and the follower stays within {1e6 * float(off):.2g} µm of the profile."
+    )
+
+
+def _backlash(run: xr.Dataset, scene: Scene) -> str:
+    late = run["joint_position"].isel(time=(run["time"] >= 1.0).values)
+    pinion, wheel = (np.degrees(2.0 * _amplitude(late.sel(coordinate=name))) for name in ("pinion", "wheel"))
+    return f"The wheel swings by {wheel:.2f}°, {pinion / 3.0 - wheel:.2f}° less than the teeth's ratio gives."
+
+
 def _controllers(run: xr.Dataset, scene: Scene) -> str:
     push = abs(run["controller_force"]).max("time")
     return f"The hardest push is {float(push.max()):.3g} N, by '{push.idxmax().item()}'."
@@ -259,6 +276,8 @@ ENTRIES = {
         Entry("checks/gears", "Which ratio has the planetary train?", _gears, {"time.end": "0.2 s"}),
         Entry("gallery/gear_shaft", "At which frequency does a disc on a flexible shaft wind up and down?", _shaft),
         Entry("gallery/driven_yoke", "How far is the motion of a loose yoke off a cosine?", _driven_yoke),
+        Entry("gallery/cam", "How hard must a motor turn a cam that lifts a spring-loaded follower?", _cam),
+        Entry("gallery/backlash", "How much of a swing does the backlash of a gear pair take?", _backlash),
         Entry("checks/scotch_yoke", "How often does a loose pin hit its slot?", _yoke),
         Entry("checks/ball_on_plane", "How often does a ball bounce in half a second?", _balls),
         Entry("gallery/rolling_ball", "How far does a ball roll down a slope in a second?", _rolling, at=1.0),
@@ -313,7 +332,7 @@ def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None
 
     from flexclear.pipeline.post.render import film, mechanism
 
-    told = s6_render.params(scene, "motion", "html")
+    told = rendering.params(scene, "motion", "html")
     looks = mechanism.Looks(bodies=told["bodies"], **told.get("view", {}))
     drawn = mechanism.mechanism(run, reduced, looks)
     row = round(entry.at * (run.sizes["time"] - 1))

@@ -14,7 +14,7 @@ from benchmarks.geometry.identify import DANGLE, DZ, Member
 from benchmarks.geometry.kinematics import answer
 from benchmarks.geometry.predict import FLEXIBLE, MEMBERS, RESTITUTION, STARTS, Open
 from benchmarks.page import Columns, table
-from flexclear.pipeline.post.paper import TABLE8, TABLE9
+from flexclear.papers.wang_wang_2019.published import TABLE8, TABLE9
 
 #: layouts of the family whose runs are made: every so manieth of a coarser grid
 COARSE, SHOWN = 0.02, 5

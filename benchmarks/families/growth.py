@@ -17,15 +17,15 @@ from benchmarks.family import REFUSED, Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
 from benchmarks.page import Columns, percent, short, spread, table
 from benchmarks.timing import interleaved, once, slope
+from flexclear.commands.scenes import bundles
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import FlexclearError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import FlexclearError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.specialised import specialise
-from flexclear.stages.run import bundles
 
 LOOPS = (5, 10, 20, 40, 80)
 #: of the flexible rod, of whose Craig-Bampton modes six are static; none cuts a pair of equal frequencies

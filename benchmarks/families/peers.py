@@ -18,7 +18,7 @@ from benchmarks.mechanisms import Mechanism, State, evaluation_time
 from benchmarks.page import Columns, short, spread, table
 from benchmarks.peers_models import CHAINS, LEAN, PEERS, bent
 from benchmarks.timing import interleaved, slope
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.specialised import specialise
 from flexclear.pipeline.dynamics.run.start import consistent_start

@@ -19,11 +19,11 @@ import numpy as np
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Measured, Record
 from benchmarks.page import Columns, short, table
 from benchmarks.plan_scenes import drawn
-from flexclear.pipeline.core import effect_size
-from flexclear.pipeline.core.errors import FlexclearError
+from flexclear.pipeline.core.artifacts import effect_size
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import FlexclearError
 
 SEED, SCENES = 9, 60
 #: starts of runs with contacts
@@ -50,14 +50,15 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _measured(seed: int, number: int, folder: Path) -> Record:
-    from flexclear.stages import plan, s8_plan
+    from flexclear.commands import plan
+    from flexclear.stages import effect_plan
     from flexclear.stages.workplace import check, open_workplace
 
     made = drawn(seed, number, folder / "recipes")
     scene, told = made.scene, dict(made.told)
     place = open_workplace()
     try:
-        task = s8_plan.task(scene)
+        task = effect_plan.task(scene)
         outcome = place.bring(list(task.inputs.values()), 1)
         check(outcome)
         inputs = {name: place.store.load(outcome.records[id(below)]) for name, below in task.inputs.items()}
@@ -67,7 +68,7 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
             decided, planning = _planned(params, inputs)
     except FlexclearError as error:
         return {**told, "verdict": REFUSED, "reason": str(error)}
-    from flexclear.pipeline.post.plan import dataset
+    from flexclear.pipeline.post.answers.plan import dataset
 
     planned = plan.of(scene, dataset(decided, scene.title, {q.name: q.unit for q in scene.requested()}))
     full = edited(scene, {"accuracy": None})
@@ -102,10 +103,10 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
 
 def _planned(params: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, float]:
     """A plan, and the processor time that it took [s]."""
-    from flexclear.stages import s8_plan
+    from flexclear.stages import effect_plan
 
     begun = time.process_time()
-    found = s8_plan.decided(params, inputs, _silent)
+    found = effect_plan.decided(params, inputs, _silent)
     return found, time.process_time() - begun
 
 
@@ -115,25 +116,25 @@ def _silent(fraction: float | None, text: str) -> None:
 
 def _reduced(inputs: dict[str, Any], modes: Any) -> dict[str, Any]:
     """Inputs with the bundles of fewer modes where the plan takes them."""
-    from flexclear.stages import s8_plan
+    from flexclear.stages import effect_plan
 
-    by_count = [level for level in s8_plan.less(inputs) if modes and all(body in level for body in modes)]
+    by_count = [level for level in effect_plan.less(inputs) if modes and all(body in level for body in modes)]
     chosen = next((n for n in by_count if all(n[body].sizes["mode"] == count for body, count in modes.items())), {})
     return inputs | {f"bundle/{body}": chosen[body] for body in modes}
 
 
 def _run(scene: Scene, inputs: dict[str, Any], chosen: list[Any]) -> tuple[Any, float]:
     """What is watched of a scene, and the processor time of one run [s]."""
-    from flexclear.stages import s4_simulate, s4_watched
+    from flexclear.stages import simulation, watched_quantities
 
-    plain = s4_watched.plain(scene)
+    plain = watched_quantities.plain(scene)
     rigid = {name: data for name, data in inputs.items() if name.removeprefix("rigid/") in plain.meshed()}
-    filled = s4_simulate.rebuild(s4_simulate.params(plain), rigid)
-    bundles = {name: data for name, data in s4_simulate.bundles(inputs).items() if name in filled.flexible()}
+    filled = simulation.rebuild(simulation.params(plain), rigid)
+    bundles = {name: data for name, data in simulation.bundles(inputs).items() if name in filled.flexible()}
     end = filled.time.start + WARM * (filled.time.end - filled.time.start)
-    s4_watched.watch(edited(filled, {"time.end": end}), bundles, chosen, 0)
+    watched_quantities.watch(edited(filled, {"time.end": end}), bundles, chosen, 0)
     begun = time.process_time()
-    found = s4_watched.watch(filled, bundles, chosen, MEMBERS)
+    found = watched_quantities.watch(filled, bundles, chosen, MEMBERS)
     spent = time.process_time() - begun
     loose = bool(filled.contacts() or filled.stop)
     return found, spent / (MEMBERS if loose else 1)

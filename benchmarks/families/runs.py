@@ -9,7 +9,7 @@ from benchmarks.mechanisms import SCENES, Mechanism, mechanism
 from benchmarks.page import Columns, spread, table
 from benchmarks.timing import interleaved, once
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 

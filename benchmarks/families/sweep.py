@@ -14,15 +14,15 @@ import numpy as np
 
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.page import percent, table
+from flexclear.commands.scenes import bundles
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
 from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.dynamics.compile.functions import Entry
 from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.stages.run import bundles
-from flexclear.stages.s4_simulate import params
-from flexclear.stages.sweep_engine import Job, engine
-from flexclear.stages.sweep_points import Family as Points
+from flexclear.stages.simulation import params
+from flexclear.stages.sweeps.sweep_engine import Job, engine
+from flexclear.stages.sweeps.sweep_points import Family as Points
 
 #: points that are timed of each kind, after two that are not
 POINTS = 24

@@ -18,7 +18,7 @@ from itertools import product
 import numpy as np
 
 from benchmarks.geometry.kinematics import STROKE, Answer, Layout, answer
-from flexclear.pipeline.post.paper import TABLE3, TABLE8
+from flexclear.papers.wang_wang_2019.published import TABLE3, TABLE8
 
 CLEARANCE = TABLE3["socket_radius"] - TABLE3["ball_radius"]
 #: sensitivities that Table 8 has [m/m, rad/m]

@@ -11,12 +11,12 @@ import xarray as xr
 from benchmarks.family import REFUSED, Record
 from benchmarks.geometry import scenes
 from benchmarks.geometry.kinematics import Layout
+from flexclear.commands import scenes as stages
+from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
+from flexclear.papers.wang_wang_2019.models import JOINT, PLATFORM
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.progress import silent
-from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
-from flexclear.pipeline.post.models import JOINT, PLATFORM
-from flexclear.stages import run as stages
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.stages.workplace import open_workplace
 
 #: coefficients of restitution, none of which the paper prints

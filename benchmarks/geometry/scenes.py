@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from benchmarks.geometry.kinematics import Layout
+from flexclear.commands.scenes import find_scene
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.stages.run import find_scene
 
 #: places along a leg [m]: rod's lower end and centre from A1 down, cylinder's centre from B up
 ROD_END, ROD_CENTRE, CYLINDER_CENTRE = 0.28, 0.16, 0.146

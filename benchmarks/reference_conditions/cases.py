@@ -10,7 +10,7 @@ import xarray as xr
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.dynamics.record.cost import Cost
-from flexclear.stages.s4_simulate import bundles, rebuild
+from flexclear.stages.simulation import bundles, rebuild
 
 Files = dict[str, Any]
 JOINT, BODY = "A1", "platform"

@@ -12,15 +12,15 @@ import xarray as xr
 from benchmarks.geometry import identify
 from benchmarks.geometry.kinematics import Layout
 from benchmarks.geometry.scenes import edits
-from flexclear.pipeline.core.errors import InputError
+from flexclear.commands.scenes import find_scene
 from flexclear.pipeline.core.scene.load import load_scene, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.structure.fe import mesh
 from flexclear.pipeline.structure.modes.solution import solve
-from flexclear.stages import s4_simulate
+from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
-from flexclear.stages.run import find_scene
 
 ROD = "rod1"
 #: frame of the rod that carries the prismatic joint, by its distance from the rod's lower end [mm]
@@ -105,9 +105,9 @@ def task(case: Case) -> Task:
         stage="reference-conditions",
         scene=given.name,
         run=f"{module}:{'members' if case.clearance and case.condition != RIGID else 'single'}",
-        params=s4_simulate.params(given, ensemble=case.clearance),
+        params=simulation.params(given, ensemble=case.clearance),
         inputs={f"bundle/{body}": _told_apart(made, case) for body, made in graph.bundle.items()},
-        modules=(module, *s4_simulate.modules(given)),
+        modules=(module, *simulation.modules(given)),
         folder="",
         part=f"{_where(case)}, {case.label}" + (", clearance" if case.clearance else ""),
     )

@@ -23,7 +23,7 @@ from benchmarks.reference_conditions.design import (
     PLACES,
     RIGID,
 )
-from flexclear.pipeline.post.models import FAR_CB, FAR_FIXED, FAR_FREE
+from flexclear.papers.wang_wang_2019.models import FAR_CB, FAR_FIXED, FAR_FREE
 
 #: those of the paper's models where they have such modes, the others from the same palette
 COLORS = dict(zip(CONDITIONS, (FAR_FREE.color, FAR_FIXED.color, "#56B4E9", "#CC79A7", FAR_CB.color), strict=True))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+import flexclear as fc
 from benchmarks import family
 from benchmarks.family import Measured
 from benchmarks.family import Record as Row
@@ -26,9 +27,8 @@ from benchmarks.reference_conditions.design import (
     TOP,
     Case,
 )
-from flexclear import pipeline
-from flexclear.pipeline.post.errors import Deviation, ensemble_deviations, max_deviation
-from flexclear.stages.run import Workplace, check, open_workplace
+from flexclear.commands.scenes import Workplace, check, open_workplace
+from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
 
 #: directions in the axes of the rod's frames, z along the rod: axial, bending, torsion
 DIRECTIONS = ("z", "x", "rz")
@@ -100,7 +100,7 @@ def frequency_rows() -> Iterator[Row]:
         sets = [Case(where, c, design.whole(where, c, COUNT)) for c in CONDITIONS] + [Case(where, FULL)]
         for case in sets:
             for time in TIMES:
-                found = pipeline.frequencies(design.scene(case), time)["undamped_frequency"].values
+                found = fc.frequencies(design.scene(case), time)["undamped_frequency"].values
                 elastic = np.sort(found[found > 1.0])[:VIBRATIONS]
                 yield identity(case) | {"time": time, "frequency": elastic.tolist()}
 

@@ -7,9 +7,9 @@ from benchmarks.site.text import table
 from flexclear.pipeline.core.artifacts import schema as artifacts
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
 from flexclear.pipeline.core.artifacts.schema import Schema
-from flexclear.pipeline.core.variable import Variable
-from flexclear.pipeline.post.schema import POST
-from flexclear.pipeline.post.verdict import VERDICT
+from flexclear.pipeline.core.scene.variable import Variable
+from flexclear.pipeline.post.sections.verdict import VERDICT
+from flexclear.pipeline.post.single_run.schema import POST
 
 RECIPES = DOCS / "examples" / "datasets"
 #: datasets in the order of their making: heading, where the file is, schema

@@ -13,7 +13,15 @@ first: what is fresh comes from the cache. Examples run as tests. What the datas
 [datasets.md](../datasets.md), which errors there are at the end of this page.
 
 """
-ERRORS = """## Errors
+ERRORS = """## What stays
+
+Public are the names in `fc.__all__`, the keys of scene files, recipes and sweeps, the commands with their options and
+exit codes, and the variables of [datasets.md](../datasets.md). A release that breaks one of them has a new first
+number. Before that the old name works for at least one release and warns (`DeprecationWarning`, or one line of the
+command), and CHANGELOG.md names what replaces it. Everything else may change with each release, `flexclear.pipeline`
+and `flexclear.stages` included.
+
+## Errors
 
 All are `fc.FlexclearError`: `fc.InputError` where something given is wrong (the message names the place, the value, the
 rule and the remedy), `fc.SolverError` where a computation refuses or gives up (with the time, the part and the reason),

@@ -12,7 +12,7 @@ from benchmarks.family import FINISHED, REFUSED, WRONG, Record
 from benchmarks.page import png
 from benchmarks.stability.runs import LEDGER
 from benchmarks.stability.scenes import ALONG, RANGES, Parameters
-from flexclear.pipeline.core.integrators import DEFAULT, INTEGRATORS
+from flexclear.pipeline.core.scene.integrators import DEFAULT, INTEGRATORS
 from flexclear.pipeline.post.plotting.style import SOFT, plt, style
 
 BLUE, MARKS = "#0072B2", {REFUSED: ("D", "#E69F00"), WRONG: ("X", "#D55E00")}

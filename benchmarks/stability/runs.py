@@ -14,16 +14,16 @@ import numpy as np
 from benchmarks import crew
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Measured, Record
 from benchmarks.stability.scenes import Parameters, scene, sweep
+from flexclear.commands.scenes import Workplace, bundles, open_workplace
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.errors import FlexclearError, SolverError
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import parse
+from flexclear.pipeline.core.system.errors import FlexclearError, SolverError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.stages.graph import Graph
-from flexclear.stages.run import Workplace, bundles, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -15,7 +15,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from flexclear import pipeline
+import flexclear as fc
 
 #: speeds [rad/s] of the rotor; of the blade in units of sqrt(E I / (rho A)) / L^2
 ROTOR_SPEEDS, BLADE_SPEEDS = np.linspace(0.0, 300.0, 13), np.linspace(0.0, 12.0, 9)
@@ -28,8 +28,8 @@ MASS, ACROSS, ALONG = 10.0, 0.1, 0.2
 
 def vibrations(scene: str, speed: float) -> np.ndarray:
     """Angular frequencies about steady turning [rad/s], in the axes that turn."""
-    changed = pipeline.load_scene(scene, override={"drive.axle.law.coefficients": [0.0, float(speed)]})
-    return 2.0 * np.pi * pipeline.frequencies(changed, moving=True).frequency.values
+    changed = fc.load_scene(scene, override={"drive.axle.law.coefficients": [0.0, float(speed)]})
+    return 2.0 * np.pi * fc.frequencies(changed, moving=True).frequency.values
 
 
 def whirls(speed: float) -> np.ndarray:

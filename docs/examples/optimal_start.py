@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import root
 
-from flexclear import pipeline
+import flexclear as fc
 
 SCENE = Path(__file__).parents[2] / "scenes/checks/oscillator.toml"
 PERIOD, FORCE = 0.5, 3.0  # of the push [s, N]
@@ -24,12 +24,10 @@ PLACES = ("body.mass.pose.position.2", "body.mass.velocity.2")
 
 def ends(starts: np.ndarray) -> np.ndarray:
     """Place [m] and velocity [m/s] after a period, of some starts side by side; shape (starts, 2) as of `starts`."""
-    scene = pipeline.edited(
-        pipeline.load_scene(SCENE), {"load.push": PUSH, "body.mass.velocity": [0, 0, 0], "time.end": PERIOD}
-    )
+    scene = fc.edited(fc.load_scene(SCENE), {"load.push": PUSH, "body.mass.velocity": [0, 0, 0], "time.end": PERIOD})
     vary = dict(zip(PLACES, starts.T, strict=True))
     keep = ["mass.position.final", "mass.velocity.final"]
-    found = pipeline.sweep(scene, vary, keep, combine="list", workers=1)
+    found = fc.sweep(scene, vary, keep, combine="list", workers=1)
     return np.stack([found[name].sel(axis="z").values for name in keep], axis=1)
 
 

@@ -7,14 +7,14 @@ from pathlib import Path
 
 from scipy.optimize import brentq
 
-from flexclear import pipeline
+import flexclear as fc
 
 SCENE = Path(__file__).parents[2] / "scenes/checks/oscillator.toml"
 
 
 def final_velocity(stiffness: float) -> float:
     """Velocity of the mass at the end [m/s]; a value asked for again comes from the cache."""
-    found = pipeline.sweep(
+    found = fc.sweep(
         SCENE, {"load.spring.stiffness": [stiffness]}, ["mass.velocity.final"], set={"time.end": "0.5 s"}, workers=1
     )
     return float(found["mass.velocity.final"].sel(axis="z").item())

@@ -11,7 +11,7 @@ import numpy as np
 from SALib.analyze import sobol as indices
 from SALib.sample import sobol
 
-from flexclear import pipeline
+import flexclear as fc
 
 SCENE = Path(__file__).parents[2] / "scenes/sps4/csj.toml"
 #: place of the scene -> range, in SI
@@ -45,7 +45,7 @@ def study(count: int = 32, workers: int | None = None) -> tuple[np.ndarray, dict
     points = sobol.sample(PROBLEM, count, calc_second_order=False, seed=1)
     vary = {name: points[:, k] for k, name in enumerate(UNKNOWNS)}
     keep = ["platform.position.final"]
-    found = pipeline.sweep(SCENE, vary, keep, combine="list", set=SET, workers=workers)
+    found = fc.sweep(SCENE, vary, keep, combine="list", set=SET, workers=workers)
     height = found["platform.position.final"].sel(axis="z").values
     error = height - height.mean()
     return error, indices.analyze(PROBLEM, error, calc_second_order=False, seed=1)

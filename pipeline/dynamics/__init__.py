@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.artifacts.labelled import Labelled, LabelledArrays
-    from flexclear.pipeline.core.progress import Progress
     from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
     from flexclear.pipeline.dynamics.record.cost import Cost
     from flexclear.pipeline.dynamics.run.method_selection import Suit
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
@@ -20,7 +20,7 @@ __all__ = ["campbell", "cost", "ensemble", "equilibrium", "frequencies", "sectio
 
 def simulate(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
     """What `simulated` gives, as a dataset; so is what there is of a run that is asked to stop."""
-    from flexclear.pipeline.core.errors import StoppedError
+    from flexclear.pipeline.core.system.errors import StoppedError
 
     try:
         return simulated(scene, bundles, progress).to_xarray()
@@ -42,14 +42,14 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     """
     from flexclear.pipeline.core.artifacts.labelled import of
     from flexclear.pipeline.core.artifacts.schema import incomplete
-    from flexclear.pipeline.core.errors import StoppedError
+    from flexclear.pipeline.core.system.errors import StoppedError
     from flexclear.pipeline.dynamics.record.dataset import recorded, warnings
     from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable
     from flexclear.pipeline.dynamics.run.run import Run, integrate
 
     def once(edited: Scene, judges: Judges | None = None) -> LabelledArrays:
         if edited.event:
-            from flexclear.pipeline.core.registry import lookup
+            from flexclear.pipeline.core.scene.registry import lookup
             from flexclear.pipeline.dynamics.effects import EVENTS
 
             phased: LabelledArrays = lookup(EVENTS, "phases", where="[event]")(edited, bundles, progress, judges)
@@ -117,7 +117,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
 
 def _require_without_events(scene: Scene, what: str) -> None:
     """InputError for a scene with events, of which there is no such result."""
-    from flexclear.pipeline.core.errors import InputError
+    from flexclear.pipeline.core.system.errors import InputError
 
     if scene.event:
         name = next(iter(scene.event))

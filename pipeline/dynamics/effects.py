@@ -1,7 +1,8 @@
 """What each effect of a scene brings: the parts that its machine code is composed of, and the modules that hold them.
 
 Nothing is compiled here, nor is anything imported that compiles: generated files (`compile.sources`), lazy imports
-(`core.registry`) and the keys of results (`compile.sources.modules`) read the same tables, those of the family folders.
+(`core.scene.registry`) and the keys of results (`compile.sources.modules`) read the same tables, those of the family
+folders.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core import integrators
-from flexclear.pipeline.core.registry import module_of
+from flexclear.pipeline.core.scene import integrators
 from flexclear.pipeline.core.scene.ideal import WITHOUT_CLEARANCE, loose
+from flexclear.pipeline.core.scene.registry import module_of
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
@@ -35,7 +36,7 @@ class Parts:
     surfaces, forms, frictions: of contacts.  joint_frictions: laws of ideal joints.
     wear: whether that of contacts is counted.  stops: whether joint coordinates have ends.
     couplings: whether they follow each other.      harmonics: whether a law of time has some.
-    load_kinks: whether friction along them bends.
+    loads: their types, of expressions with their structure.  load_kinks: whether some bend.
     articulated: whether the tree is so deep that its mass matrix is factored by articulated inertias.
     """
 
@@ -97,7 +98,7 @@ def most_parts(scene: Scene) -> Parts:
         surfaces=tuple(sorted({joint.type for joint in contacts.values()})),
         forms=tuple(sorted(import_module(FORMS).NAMES)) if contacts or scene.stop else (),
         frictions=tuple(sorted({j.friction.law for j in contacts.values() if j.friction is not None})),
-        loads=tuple(sorted({load.type for load in scene.forces().values()})),
+        loads=tuple(sorted({load_kind(scene, name) for name in scene.forces()})),
         stops=bool(scene.stop),
         couplings=bool(scene.gear),
         closures=True,
@@ -115,8 +116,16 @@ def joint_frictions(scene: Scene) -> tuple[str, ...]:
     return tuple(sorted({joint.friction.law for joint in scene.rubbing().values() if joint.friction is not None}))
 
 
+def load_kind(scene: Scene, name: str) -> str:
+    """Kind of a load by which its code is composed: its type, and behind that the structure of its expression."""
+    from flexclear.pipeline.core.scene.formulas import formula
+
+    written = formula(scene, name)
+    return f"{scene.forces()[name].type} {written.code}" if written else str(scene.forces()[name].type)
+
+
 def load_kinks(scene: Scene) -> bool:
-    """Whether the friction of a load bends."""
+    """Whether a load bends: its friction, or its expression."""
     return any(getattr(load, "bends", False) for load in scene.load.values())
 
 

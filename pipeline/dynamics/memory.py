@@ -36,11 +36,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.core.event_kinds import CLOSING as CLOSING
-from flexclear.pipeline.core.event_kinds import COMPRESSION as COMPRESSION
-from flexclear.pipeline.core.event_kinds import OPENING as OPENING
-from flexclear.pipeline.core.event_kinds import SLIPPING as SLIPPING
-from flexclear.pipeline.core.event_kinds import STICKING as STICKING
+from flexclear.pipeline.core.scene.event_kinds import CLOSING as CLOSING
+from flexclear.pipeline.core.scene.event_kinds import COMPRESSION as COMPRESSION
+from flexclear.pipeline.core.scene.event_kinds import OPENING as OPENING
+from flexclear.pipeline.core.scene.event_kinds import SLIPPING as SLIPPING
+from flexclear.pipeline.core.scene.event_kinds import STICKING as STICKING
 from flexclear.pipeline.dynamics.kernels import kernel
 
 _place = count()
@@ -141,13 +141,13 @@ class Room:
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
     MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES, N_RUBBING, N_BEARINGS, RUBBING_SLOT,
-    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS,
+    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS,
 ) = _named(
     SIZES,
     "n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger n_pairs "
     "n_known_pairs n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
     "n_loads n_internal load_slot n_couplings n_surfaces n_rubbing n_bearings rubbing_slot n_worn wear_slot n_bodies "
-    "n_frames n_components n_guards",
+    "n_frames n_components n_guards n_load_bends",
 )
 # fmt: on
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
@@ -195,9 +195,10 @@ CONTACTS = wiring("outer inner normal friction surfaces bristle")  # surfaces: t
 LAWS = wiring("piece0 n_pieces")  # the drives' laws first
 PIECE_HARMONICS = wiring("harmonic0 n_harmonics")
 #: a: site, -1 where the world holds against it; gauge, measured: of the joint coordinate that it acts along, and of one
-#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame; book: where
-#: in the ledger its work is, and then its loss
-LOADS = wiring("a b law0 number0 gauge measured internal0 follows book")
+#: that it measures, or -1; internal0: first of its states; follows: whether it turns with its frame; look0, bend0: its
+#: first of LOOKS and LOAD_BENDS; book: where in the ledger its work is, and then its loss
+LOADS = wiring("a b law0 number0 gauge measured internal0 follows look0 bend0 book")
+LOOKS = wiring("index")  # what expressions read: number of a site, or of a gauge
 LOAD_KINDS = wiring("load0 n_loads")
 #: how a joint coordinate is measured between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
 #: turns: index of the angle with its full turns among the internal states or -1
@@ -223,7 +224,9 @@ BOOKS = wiring("work loss load")  # of each independent mechanism: places in the
 DRIVES = wiring("book")  # place in the ledger of each drive's work
 
 # Numbers in f --------------------------------------------------------------------------------------------------------
-LINK_NUMBERS = numbers("mass com:3 inertia:6")  # inertia about the centre of mass (xx yy zz xy xz yz), link axes
+#: inertia about the centre of mass (xx yy zz xy xz yz), link axes; borne, reaching: mass of the link and all beyond,
+#: and a bound of their polar moment about its origin
+LINK_NUMBERS = numbers("mass com:3 inertia:6 borne reaching")
 SITE_NUMBERS = numbers("origin:3 axes:3x3")  # in the link
 FLEX_NUMBERS = numbers("mass first_moment:3 second_moment:3x3")
 FLEX_DATA = numbers("value")  # per body: C1 (3n), E (9n), modal mass (n n), stiffness (n), damping (n)
@@ -268,12 +271,9 @@ OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
 WRENCH = work("moment:3 force:3")
 COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
 #: of each link, about its origin, which arm leads to from its parent's: what it offers to its parent, inertia as
-#: (turning mixed; mixed^T moving) of twists to wrenches; a wrench; an acceleration; mass, first and polar moment of
-#: all beyond; the wrench that its own accelerations need (`equations.articulated`)
-ARTICULATED = work(
-    "turning:6 mixed:3x3 moving:6 moment:3 force:3 angular:3 linear:3 arm:3 mass centre:3 polar own_moment:3 "
-    "own_force:3"
-)
+#: (turning mixed; mixed^T moving) of twists to wrenches; a wrench; an acceleration; the wrench that its own
+#: accelerations need (`equations.articulated`)
+ARTICULATED = work("turning:6 mixed:3x3 moving:6 moment:3 force:3 angular:3 linear:3 arm:3 own_moment:3 own_force:3")
 #: of three closure rows at once: what a link transmits to its parent, a column each
 TRANSMITTED = work("moments:3x3 forces:3x3")
 #: of each coordinate: its column about its link's origin, and the factor's K
@@ -303,8 +303,7 @@ LAW = work("value rate second_rate")
 #: what a load does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
 #: energy, power that it brings in, power that it loses
 LOAD = work("force:3 moment:3 value rate stored power loss")
-#: speeds along the coordinates of loads whose friction bends
-LOAD_SPEEDS = work("now")
+LOAD_BENDS = work("now")  # of loads that bend: speeds along their coordinates, arguments of max, min and abs
 #: what a bearing does now; unit: wrench of its friction on the joint's second body per normal force, about the kernels'
 #: origin; loss: what it takes per normal force [m/s]
 BEARING = work("load slip loss unit_moment:3 unit_force:3")

@@ -13,17 +13,17 @@ __all__ = ["derive", "derived"]
 
 
 def derive(run: xr.Dataset, ensemble: xr.Dataset | None = None) -> xr.Dataset:
-    """Series and tables of a run, and of its ensemble (`pipeline.post.series.derive`).
+    """Series and tables of a run, and of its ensemble (`pipeline.post.single_run.series.derive`).
 
     Imported when it is called: a command that only asks what is fresh needs no xarray.
     """
-    from flexclear.pipeline.post.series import derive as series
+    from flexclear.pipeline.post.single_run.series import derive as series
 
     return series(run, ensemble)
 
 
 def derived(run: LabelledArrays, ensemble: LabelledArrays | None = None) -> LabelledArrays:
     """The same of arrays, without xarray."""
-    from flexclear.pipeline.post.series import derived as series
+    from flexclear.pipeline.post.single_run.series import derived as series
 
     return series(run, ensemble)

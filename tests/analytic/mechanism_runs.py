@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.progress import silent
+from flexclear.commands import scenes as stages
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.stages import run as stages
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.stages.workplace import Workplace, open_workplace
 
 TREE = Path(__file__).resolve().parents[2]

@@ -6,9 +6,9 @@ from typing import Any
 
 import xarray as xr
 
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles
 
 

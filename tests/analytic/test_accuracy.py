@@ -6,10 +6,11 @@ import json
 
 import pytest
 
-from flexclear.pipeline import dynamics, load_scene
-from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.errors import InputError
+from flexclear import load_scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import parse
+from flexclear.pipeline.core.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, bundles
 
 CSJ = TREE / "scenes" / "sps4" / "csj.toml"

@@ -9,7 +9,7 @@ import pytest
 import scipy.linalg
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.structure.fe import beam, mesh
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve

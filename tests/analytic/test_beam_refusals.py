@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import mesh
 from tests.analytic.beam_models import RECIPE
 

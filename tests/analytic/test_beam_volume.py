@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.structure.fe import mesh
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve

@@ -12,7 +12,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts import compliance as core
 from flexclear.pipeline.core.artifacts import deficits as words
 from flexclear.pipeline.core.artifacts import modal
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import mesh
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.kinds.kind import of_mesh

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from tests.analytic.linear_runs import frequencies
 from tests.analytic.mechanism_runs import run
 from tests.properties.mechanisms import scene, simulate

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.commands.__main__ import main
+from flexclear.commands.frequencies import speeds
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.stages.__main__ import main
-from flexclear.stages.frequencies import speeds
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
 from tests.analytic.test_unbalanced_rotors import ACROSS, ALONG, MASS, MIXED, SIDE, SLOPE, TURNS, Table, rotor
 
 

@@ -12,10 +12,10 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.record.dataset import recorded
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges
 from flexclear.pipeline.dynamics.run.run import integrate

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from flexclear.pipeline.post import chaos
-from flexclear.pipeline.post.verdict import judge
+from flexclear.pipeline.post.sections import chaos
+from flexclear.pipeline.post.sections.verdict import judge
 
 N = 600
 

@@ -14,10 +14,10 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.dynamics.compile import stacks
 from flexclear.pipeline.dynamics.kernels import INTERPRETED

@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 from pydantic import TypeAdapter
 
-from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.solver import Solver
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics.run.ledger import usual
 from tests.analytic.mechanism_runs import Overrides, impacts, run
 from tests.reference import contact_solutions as exact

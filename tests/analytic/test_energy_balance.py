@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import silent
 
 BODY = {"type": "rigid", "mass": 1.0, "inertia": [0.01, 0.01, 0.01]}
 

@@ -11,13 +11,13 @@ import xarray as xr
 from scipy.integrate import quad
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited, load_scene, scene_of
 from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.stages import s4_simulate
+from flexclear.stages import simulation
 
 TREE = Path(__file__).resolve().parents[2]
 G, GROUND = 9.81, {"type": "ground", "frames": {"O": {}}}
@@ -372,12 +372,12 @@ def press(**changes: Any) -> Scene:
 def test_only_scenes_with_events_reach_their_modules() -> None:
     """A part that an event brings in is in the key of the run."""
     with_events, without = press(), press(event={})
-    packages = [[n for n in s4_simulate.modules(one) if ".dynamics.events" in n] for one in (with_events, without)]
+    packages = [[n for n in simulation.modules(one) if ".dynamics.events" in n] for one in (with_events, without)]
     assert packages == [["flexclear.pipeline.dynamics.events.phases"], []]
     wave = {"law": {"type": "harmonic", "amplitude": [0.1], "frequency": [3.0]}}
     switched = press(event={"e": {"at": 0.1, "switch": "drive.motor", "to": wave}})
-    assert "flexclear.pipeline.dynamics.drives.harmonic" in s4_simulate.modules(switched)
-    assert s4_simulate.params(with_events) != s4_simulate.params(press(**{"event.break.at": "abs(pin.force) > 41 N m"}))
+    assert "flexclear.pipeline.dynamics.drives.harmonic" in simulation.modules(switched)
+    assert simulation.params(with_events) != simulation.params(press(**{"event.break.at": "abs(pin.force) > 41 N m"}))
 
 
 def test_points_of_sweeps_go_over_events() -> None:

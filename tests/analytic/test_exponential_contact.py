@@ -7,9 +7,10 @@ from functools import cache
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline import dynamics, load_scene
-from flexclear.pipeline.core.progress import silent
+from flexclear import load_scene
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles, impacts
 
 #: sixteen impacts in 23 ms, then a contact that lasts, in which ball and rod vibrate at some 4 kHz

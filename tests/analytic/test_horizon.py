@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.progress import silent
-from flexclear.pipeline.core.quantities import PERTURBATION, lasting
+from flexclear.pipeline.core.artifacts.quantities import PERTURBATION, lasting
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.run.observation import frames
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.post.horizon import horizon
+from flexclear.pipeline.post.single_run.horizon import horizon
 from tests.analytic.mechanism_runs import TREE, run
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from tests.analytic.integrator_scenes import NO_PROJECTION, SCENES, ledger_free, reference, trajectory
 
 #: integrator -> order, order of its dense output's error, steps per second at which errors are neither coarse nor

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from tests.analytic.integrator_scenes import double_pendulum, trajectory
 
 pytestmark = pytest.mark.slow

@@ -14,8 +14,8 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
 from tests.analytic.mechanism_runs import run
 from tests.properties.mechanisms import GRAVITY, Table, joint, scene, simulate
 from tests.reference.rubbing_slider_crank import released
@@ -219,7 +219,7 @@ def of_wrench(kind: str, sizes: dict[str, Any], axis: np.ndarray, force: np.ndar
 
 def axes_of(dataset: xr.Dataset, table: Scene, name: str) -> list[np.ndarray]:
     """Along which the bearings of a joint lie, world axes, (time, 3) each."""
-    from flexclear.pipeline.core.algebra import axes_to_matrix, quaternion_to_matrix
+    from flexclear.pipeline.core.numerics.rotations import axes_to_matrix, quaternion_to_matrix
 
     found = []
     for frame, k in zip(table.joint[name].between, (0, 1), strict=True):

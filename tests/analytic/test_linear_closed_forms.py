@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from tests.analytic.linear_runs import frequencies
 from tests.analytic.mechanism_runs import TREE, bundles
 

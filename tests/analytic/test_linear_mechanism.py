@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.linear.bench import state
 from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium
 from flexclear.pipeline.dynamics.linear.vibrations import vibrations

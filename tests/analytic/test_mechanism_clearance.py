@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
-from flexclear.pipeline.post.paper import TABLE8
+from flexclear.papers.wang_wang_2019.published import TABLE8
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from tests.analytic.mechanism_runs import impacts, run
 from tests.reference import contact_solutions as exact
 from tests.reference import sps4

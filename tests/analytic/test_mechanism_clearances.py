@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import rotation_between
+from flexclear.pipeline.core.numerics.rotations import rotation_between
 from tests.analytic.mechanism_runs import impacts, run
 
 BOTH, ALL = "sps4/variants/csj_a1_a2", "sps4/variants/csj_all"

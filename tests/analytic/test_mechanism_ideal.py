@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from tests.analytic.mechanism_runs import run
 from tests.reference import sps4
 from tests.reference.ideal_motion import UP, Motion, ideal

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.numerics.rotations import skew
 from tests.reference import sps4
 from tests.reference.ideal_motion import UP, Motion, ideal
 from tests.reference.inverse_dynamics import leg_inertia, reactions

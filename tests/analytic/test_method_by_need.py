@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics, load_scene
-from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.effect_size import recorded as recorded_quantities
-from flexclear.pipeline.core.progress import silent
+from flexclear import load_scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.artifacts.effect_size import recorded as recorded_quantities
 from flexclear.pipeline.core.scene.load import edited, with_numbers
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.effects import schemes
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.run import progress_rate, trajectory

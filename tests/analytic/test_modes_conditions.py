@@ -11,7 +11,7 @@ import pytest
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import mesh
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.kinds.kind import of_mesh
@@ -114,7 +114,7 @@ def means(model: Model) -> sp.csr_array:
 def test_dense_and_sparse_solvers_agree_on_held_functionals(
     monkeypatch: pytest.MonkeyPatch, body: Flexibility, rows: Callable[[Model], sp.csr_array]
 ) -> None:
-    from flexclear.pipeline.core.progress import silent
+    from flexclear.pipeline.core.system.progress import silent
     from flexclear.pipeline.structure.modes import normal
 
     held = rows(body.model)

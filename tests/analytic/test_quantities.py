@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import silent
-from flexclear.pipeline.core.quantities import evaluate
+from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.artifacts.quantities import evaluate
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.owners import COORDINATES
 from flexclear.pipeline.core.scene.quantity import KINDS, OF_CONTACTS, Quantity, Recorded, parse, parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import simulate
 from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.record.point import Runner

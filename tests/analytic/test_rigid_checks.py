@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from tests.analytic.mechanism_runs import run
 
 #: IFToMM A01, closed form in Jacobi's functions: time [s], x, y [m]

@@ -8,8 +8,8 @@ from numpy.polynomial import Legendre
 from scipy.linalg import eigh
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
 from tests.analytic.test_turning_beams import flapping_and_lagging
 from tests.properties.mechanisms import GRAVITY, Table, joint, scene
 from tests.reference.turning_beams import WRIGHT

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear import pipeline
+import flexclear as fc
+from flexclear.commands.__main__ import main
+from flexclear.commands.sections import write_page
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.post.verdict import derive
-from flexclear.stages.__main__ import main
-from flexclear.stages.sections import write_page
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.post.sections.verdict import derive
 
 #: of the driven pendulum in scenes/checks, from its tangent equations by SciPy's DOP853 over 2000 periods
 CHAOTIC = 0.112
@@ -24,7 +24,7 @@ CHAOTIC = 0.112
 
 @pytest.fixture(scope="module")
 def pendulum() -> Scene:
-    return pipeline.load_scene("scenes/checks/driven_pendulum.toml")
+    return fc.load_scene("scenes/checks/driven_pendulum.toml")
 
 
 def with_torque(scene: Scene, amplitude: float, **sections: object) -> Scene:
@@ -100,7 +100,7 @@ def test_a_motion_that_no_law_repeats_is_refused(capsys: pytest.CaptureFixture[s
 
 
 def test_the_repeated_stroke_with_clearance_and_rigid_rods_settles_on_one_period() -> None:
-    scene = pipeline.load_scene("scenes/sps4/variants/first_csj.toml")
+    scene = fc.load_scene("scenes/sps4/variants/first_csj.toml")
     short = edited(scene, {"sections.transient": 2, "sections.periods": 40, "sections.exponent_periods": 20})
     found = dynamics.sections(short, {}, silent)
     verdict = derive(found)

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from tests.analytic import four_bars
 from tests.properties.mechanisms import Table, simulate
 

@@ -7,7 +7,7 @@ import pytest
 from skfem import Basis, ElementHex1, ElementTetP2, ElementVector, MeshHex, MeshTet2
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.solid import elasticity, lattice
 from flexclear.pipeline.structure.fe.solid.elasticity import Solid
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS, shape_functions

@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.structure.fe.solid import elasticity, lattice
 from flexclear.pipeline.structure.fe.solid.elasticity import Solid
 from flexclear.pipeline.structure.sparse.dissection import dissect

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.solid import lattice
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.modes.solution import solve

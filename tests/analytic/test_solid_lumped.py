@@ -11,7 +11,7 @@ import scipy.io
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import mesh
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import bundle

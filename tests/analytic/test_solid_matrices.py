@@ -11,7 +11,7 @@ import scipy.io
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import mesh as beams
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.model import Model

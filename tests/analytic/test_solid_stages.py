@@ -11,16 +11,16 @@ import pytest
 import xarray as xr
 from pydantic import ValidationError
 
-from flexclear import pipeline
-from flexclear.pipeline.core import file_dependencies
+import flexclear as fc
+from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.artifacts.store import write_dataset
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Modes
+from flexclear.pipeline.core.system import file_dependencies
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.stages import s1_mesh, s2_modes, s3_bundle
-from flexclear.stages.__main__ import main
+from flexclear.stages import meshing, modal_analysis, reduction
 from tests.analytic.solid_models import block, build
 
 MESHES = Path(__file__).parents[2] / "meshes"
@@ -35,13 +35,13 @@ def stored(data: xr.Dataset, path: Path) -> xr.Dataset:
 def test_a_solid_goes_through_the_stages(tmp_path: Path) -> None:
     recipe = MESHES / "checks" / "solid_rod.toml"
     body = FlexibleBody(type="flexible", mesh=str(recipe), modes=Modes(reference="craig-bampton", up_to="5000 Hz"))
-    assert s1_mesh.modules(recipe) == ("flexclear.pipeline.structure.kinds.solid",)
-    assert "flexclear.pipeline.structure.kinds.solid" in s2_modes.modules(body, "scene")
-    made = s1_mesh.run(s1_mesh.params(recipe), {}, silent)
+    assert meshing.modules(recipe) == ("flexclear.pipeline.structure.kinds.solid",)
+    assert "flexclear.pipeline.structure.kinds.solid" in modal_analysis.modules(body, "scene")
+    made = meshing.run(meshing.params(recipe), {}, silent)
     mesh = stored(made["nc"], tmp_path / "mesh.nc")
-    solved = s2_modes.run(s2_modes.params(body), {"mesh": mesh}, silent)
+    solved = modal_analysis.run(modal_analysis.params(body), {"mesh": mesh}, silent)
     modes = stored(solved["nc"], tmp_path / "modes.nc")
-    bundle = stored(s3_bundle.run({}, {"mesh": mesh, "modes": modes}, silent)["nc"], tmp_path / "bundle.nc")
+    bundle = stored(reduction.run({}, {"mesh": mesh, "modes": modes}, silent)["nc"], tmp_path / "bundle.nc")
     # six constraint modes; between held ends two pairs lie below 5 kHz
     assert bundle.sizes["mode"] == 10
     (tmp_path / "mesh.vtu").write_bytes(made["vtu"])
@@ -62,19 +62,19 @@ def test_files_of_a_recipe_count_by_their_content(tmp_path: Path) -> None:
     recipe.write_text(
         '[shape]\ntype = "matrices"\nunits = "m-kg-s"\nfile = "body.npz"\n[frames]\nfoot = { nodes = [1, 2, 3] }\n'
     )
-    params = s1_mesh.params(recipe)
+    params = meshing.params(recipe)
     with file_dependencies.watched(tmp_path) as read:
-        made = s1_mesh.run({**params, "folder": str(tmp_path)}, {}, silent)["nc"]
+        made = meshing.run({**params, "folder": str(tmp_path)}, {}, silent)["nc"]
     again = stored(made, tmp_path / "mesh.nc")
     assert of_mesh(again).assemble(again).size == 36
-    assert s1_mesh.params(recipe) == params
+    assert meshing.params(recipe) == params
     assert file_dependencies.digests(["body.npz"], tmp_path) == {"body.npz": read["body.npz"]}
     with (tmp_path / "body.npz").open("ab") as file:
         file.write(b"\0")
     assert file_dependencies.digests(["body.npz"], tmp_path) != {"body.npz": read["body.npz"]}
     (tmp_path / "body.npz").unlink()
     with pytest.raises(InputError, match=r"there is no file .*body\.npz"):
-        s1_mesh.params(recipe)
+        meshing.params(recipe)
 
 
 @pytest.mark.slow
@@ -84,7 +84,7 @@ def test_a_solid_swings_as_the_beam_does(monkeypatch: pytest.MonkeyPatch, tmp_pa
     scene = MESHES.parent / "scenes" / "checks" / "swinging_rod.toml"
     ends = []
     for name in ("actuated_rod.toml", "checks/solid_rod.toml"):
-        run = pipeline.run(pipeline.load_scene(scene, override={"body.rod.mesh": str(MESHES / name)}))
+        run = fc.run(fc.load_scene(scene, override={"body.rod.mesh": str(MESHES / name)}))
         assert float(np.abs(run["energy_error"]).max()) < 1e-10
         ends.append(run["position"].values[-1, 0])
     # a uniform pendulum swings alike whatever its mass (the solid's eight sides lack 8e-4 of it); the two differ by

@@ -10,10 +10,10 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.starts import ideal, snapshot
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.test_assembly import loose

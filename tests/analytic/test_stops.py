@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 from scipy.optimize import brentq
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import TREE, impacts, run

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from tests.analytic.stress_runs import recorded, run
 
 PIECES = 12

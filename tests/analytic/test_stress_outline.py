@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.record.body_loads import Motion
 from flexclear.pipeline.dynamics.record.stress import peak_stresses, section_forces
 from flexclear.pipeline.structure.fe import section as sections

@@ -15,15 +15,15 @@ import xarray as xr
 from skfem.helpers import ddot, sym_grad, trace
 
 import flexclear as fc
-from flexclear.pipeline.core.algebra import components, matrices, principal, von_mises
 from flexclear.pipeline.core.artifacts import modal  # noqa: F401  (registers `dataset.modal`)
-from flexclear.pipeline.core.errors import FlexclearError
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.numerics.rotations import components, matrices, principal, von_mises
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.post import body_stress
+from flexclear.pipeline.core.system.errors import FlexclearError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.post.render import player
 from flexclear.pipeline.post.render.mechanism import mechanism
-from flexclear.pipeline.post.series import derive
+from flexclear.pipeline.post.shapes import body_stress
+from flexclear.pipeline.post.single_run.series import derive
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.model import solid_of, unknowns_of
 from flexclear.pipeline.structure.kinds.kind import of_mesh

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics.record.dataset import dataset as dataset_of
 from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.run import integrate

@@ -8,9 +8,9 @@ import xarray as xr
 from scipy.integrate import solve_ivp
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.analytic.test_rotors import ritz
 

@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import SolverError
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import SolverError
 from tests.analytic.linear_runs import frequencies
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.reference.turning_beams import SPIN_UP, WRIGHT

@@ -7,10 +7,10 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import silent
 from tests.analytic.linear_runs import frequencies
 from tests.properties.mechanisms import GRAVITY, Table, joint, scene
 

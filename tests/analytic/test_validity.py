@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline import dynamics, load_scene
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.progress import silent
+from flexclear import load_scene
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.start import consistent_start

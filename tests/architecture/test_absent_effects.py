@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from flexclear.pipeline.core.registry import module_of
 from flexclear.pipeline.core.scene.load import compose, load_scene
+from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import fingerprint
 from flexclear.pipeline.dynamics import loads
@@ -234,7 +234,7 @@ def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
 
 def test_the_numbers_of_event_kinds_are_part_of_the_key() -> None:
     """Kernels have them compiled in, and datasets hold them: code of another numbering must not be taken."""
-    assert "flexclear.pipeline.core.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))
+    assert "flexclear.pipeline.core.scene.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))
 
 
 def digest(scene: Scene) -> str:

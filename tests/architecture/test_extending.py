@@ -28,7 +28,7 @@ PLACES = {
     "quadratic_drag": "pipeline/dynamics/loads",
     "cycloidal": "pipeline/dynamics/drives",
     "momentum": "pipeline/dynamics/record",
-    "mass": "stages",
+    "mass": "flexclear/commands",
 }
 
 
@@ -47,7 +47,7 @@ def edited(text: str, hunk: str) -> str:
 
 def installed(root: Path, tree: Path, name: str) -> Path:
     """A copy of the sources with the example in it."""
-    for package in ("flexclear", "pipeline", "stages"):
+    for package in ("flexclear", "papers", "pipeline", "stages"):
         shutil.copytree(root / package, tree / package, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(examples(root) / f"{name}.py", tree / PLACES[name])
     head, *hunks = (examples(root) / f"{name}.diff").read_text().split("@@\n")

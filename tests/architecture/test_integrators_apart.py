@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.core.integrators import INTEGRATORS
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.compile.sources import sources
 from flexclear.pipeline.dynamics.effects import Parts, Scheme, scheme_of
 from flexclear.pipeline.dynamics.integrate import NAMES
 from flexclear.pipeline.dynamics.integrate.method import keep_nothing
-from flexclear.stages import s4_simulate
+from flexclear.stages import simulation
 
 PACKAGE = "flexclear.pipeline.dynamics.integrate"
 PARTS = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
@@ -104,5 +104,5 @@ def test_no_number_of_the_solver_is_compiled_in(root: Path, one: dict, other: di
 @pytest.mark.parametrize("solver", [{}, {"step": 1e-5}, {"integrator": "rk4", "step": 1e-5, "events": "at step ends"}])
 def test_the_key_of_a_run_holds_what_its_code_reaches(root: Path, solver: dict) -> None:
     scene = load_scene(root / "scenes" / "sps4" / "csj.toml", {"solver": solver})
-    known = functions.SOURCES.closure(["flexclear.stages.s4_simulate", *s4_simulate.modules(scene)]).keys()
+    known = functions.SOURCES.closure(["flexclear.stages.simulation", *simulation.modules(scene)]).keys()
     assert {f"{PACKAGE}.{name}" for name in reached(scheme_of(scene.solver))} <= set(known)

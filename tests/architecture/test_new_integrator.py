@@ -16,7 +16,7 @@ MODULE = '''"""Heun's method of order 2, with Euler's as its error estimate."""
 
 import numpy as np
 
-from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics.integrate import hermite
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
@@ -52,7 +52,7 @@ METHOD = Method(
 '''
 LINE = '"heun": Traits("heun_euler", 2, hands_over_to=STIFF, tolerances=TO_1E_9, steps=STEPS),'
 ABOVE = '"dopri5": Traits('
-LIST, FOLDER = Path("pipeline/core/integrators.py"), Path("pipeline/dynamics/integrate")
+LIST, FOLDER = Path("pipeline/core/scene/integrators.py"), Path("pipeline/dynamics/integrate")
 #: a quarter of the pendulum's period, IFToMM benchmark A01 [s]
 QUARTER = 2.367841947576237 / 4.0
 
@@ -63,7 +63,7 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The project with the module and the line, and two scenes of a pendulum."""
     folder = tmp_path_factory.mktemp("project")
-    for name in ("flexclear", "pipeline", "stages"):
+    for name in ("flexclear", "papers", "pipeline", "stages"):
         shutil.copytree(root / name, folder / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     (folder / FOLDER / "heun_euler.py").write_text(MODULE)
     before, above, after = (folder / LIST).read_text().partition(ABOVE)
@@ -145,7 +145,7 @@ def test_a_cost_study_compares_it(python: Command) -> None:
         python,
         """
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.stages import cost_design
+from flexclear.commands import cost_design
 designs = cost_design.wide(load_scene("own.toml"), ("heun",))
 print(json.dumps([[d.group, d.scene.solver.integrator, d.scene.solver.rtol, d.scene.solver.step] for d in designs]))
 """,
@@ -168,12 +168,12 @@ KEYS = """
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from pathlib import Path
-from flexclear.stages import s4_simulate
+from flexclear.stages import simulation
 sources = Sources(Path.cwd())
 found = {}
 for name in ("new", "own"):
-    modules = s4_simulate.modules(load_scene(f"{name}.toml"))
-    found[name] = sorted(sources.closure(["flexclear.stages.s4_simulate", *modules]))
+    modules = simulation.modules(load_scene(f"{name}.toml"))
+    found[name] = sorted(sources.closure(["flexclear.stages.simulation", *modules]))
 print(json.dumps(found))
 """
 

@@ -16,17 +16,17 @@ from pathlib import Path, PureWindowsPath
 import pytest
 
 import flexclear as fc
-from flexclear.pipeline.core import portable, system
-from flexclear.pipeline.core.errors import InputError
+from flexclear.commands import doctor, reproduction, shown_folders
+from flexclear.commands.__main__ import COMMANDS, main
 from flexclear.pipeline.core.scene.load import scene_name
-from flexclear.stages import bundle, doctor, owner
-from flexclear.stages.__main__ import COMMANDS, main
+from flexclear.pipeline.core.system import file_names, platforms
+from flexclear.pipeline.core.system.errors import InputError
 from tests.architecture import windows_rules as rules
 
 #: what of `os` and `signal` is not on Windows, or means something else there
 ELSEWHERE = (*rules.MODULES, *rules.FUNCTIONS, "SIGKILL", "link", "kill")
 #: the one module of each tree that may ask for them
-ONES = ("pipeline/core/system.py", "benchmarks/system.py")
+ONES = ("pipeline/core/system/platforms.py", "benchmarks/system.py")
 
 
 def run(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -63,7 +63,7 @@ def windows(without_links: Path, tmp_path_factory: pytest.TempPathFactory) -> Ca
 def without_links(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A checkout as git makes it where it must not make links: they are small files that hold a path."""
     folder = tmp_path_factory.mktemp("checkout")
-    for name in ("pipeline", "stages", "scenes", "meshes"):
+    for name in ("papers", "pipeline", "stages", "scenes", "meshes"):
         shutil.copytree(root / name, folder / name, ignore=shutil.ignore_patterns("__pycache__"))
     (folder / "flexclear").mkdir()
     for path in (root / "flexclear").iterdir():
@@ -71,17 +71,16 @@ def without_links(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
             (folder / "flexclear" / path.name).write_text(os.readlink(path))
         elif path.is_file():
             shutil.copy(path, folder / "flexclear")
+    shutil.copytree(root / "flexclear/commands", folder / "flexclear/commands")
     shutil.copy(root / "pyproject.toml", folder)
     return folder
 
 
 def test_one_module_asks_for_what_only_some_systems_have(root: Path) -> None:
     found = []
-    for path in (
-        p for name in ("pipeline", "stages", "flexclear", "benchmarks") for p in sorted((root / name).rglob("*.py"))
-    ):
+    for path in _sources(root, "benchmarks"):
         place = path.relative_to(root).as_posix()
-        if place in ONES or place.startswith(("flexclear/pipeline", "flexclear/stages")):
+        if place in ONES:
             continue
         for node in ast.walk(ast.parse(path.read_bytes())):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
@@ -96,10 +95,15 @@ def test_one_module_asks_for_what_only_some_systems_have(root: Path) -> None:
     assert found == []
 
 
+def _sources(root: Path, *more: str) -> list[Path]:
+    folders = ("flexclear/commands", "papers", "pipeline", "stages", *more)
+    return [path for name in folders for path in sorted((root / name).rglob("*.py"))]
+
+
 def test_all_text_is_read_and_written_as_utf_8(root: Path) -> None:
     """Windows takes the console's code page for it otherwise, and ends lines with two characters."""
     found = []
-    for path in (p for name in ("pipeline", "stages", "benchmarks") for p in sorted((root / name).rglob("*.py"))):
+    for path in _sources(root, "benchmarks"):
         for node in ast.walk(ast.parse(path.read_bytes())):
             requested = _asked(node)
             if requested:
@@ -130,7 +134,7 @@ def _asked(node: ast.AST) -> set[str]:
 def test_workers_are_made_without_fork(root: Path) -> None:
     """Windows has none, and on macOS what the system's libraries hold does not outlive it."""
     found = []
-    for path in (p for name in ("pipeline", "stages") for p in sorted((root / name).rglob("*.py"))):
+    for path in _sources(root):
         text = path.read_text(encoding="utf-8")
         pools = re.findall(r"ProcessPoolExecutor\(.+|multiprocessing\.(?:Pool|Process|Manager|Queue|set_start)", text)
         found += [f"{path.name}: {call}" for call in pools if "mp_context" not in call]
@@ -160,7 +164,7 @@ def test_a_flexible_body_is_made_without_links(without_links: Path) -> None:
 def test_a_checkout_without_links_has_the_keys_of_one_with_links(root: Path, without_links: Path) -> None:
     """Nothing is run again because of where a source lies."""
     text = (
-        "from flexclear.stages.run import graphs, open_workplace\n"
+        "from flexclear.commands.scenes import graphs, open_workplace\n"
         "place = open_workplace()\n"
         "(graph,) = graphs(['checks/pendulum'])\n"
         "from flexclear.pipeline.core.workflow.execute import key_of\n"
@@ -181,9 +185,9 @@ def test_a_console_of_an_old_code_page_shows_what_it_can(root: Path, tmp_path: P
 
 def test_a_running_process_is_alive_and_one_that_ended_is_not() -> None:
     with subprocess.Popen([sys.executable, "-c", "input()"], stdin=subprocess.PIPE) as process:
-        assert system.alive(process.pid)
+        assert platforms.alive(process.pid)
         process.communicate(b"\n")
-    assert not system.alive(process.pid)
+    assert not platforms.alive(process.pid)
 
 
 @pytest.fixture
@@ -210,23 +214,23 @@ def test_a_file_that_is_open_elsewhere_is_waited_for(tmp_path: Path, held: list[
     new.write_bytes(b"new")
     old.write_bytes(b"old")
     held[0] = 3
-    system.replace(new, old)
+    platforms.replace(new, old)
     assert old.read_bytes() == b"new"
     held[0] = 3
-    system.remove(old)
+    platforms.remove(old)
     assert not old.exists()
 
 
 def test_a_file_that_stays_open_elsewhere_is_named(
     tmp_path: Path, held: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(system, "PATIENCE", 0.0)
+    monkeypatch.setattr(platforms, "PATIENCE", 0.0)
     new, old = tmp_path / "new", tmp_path / "run.nc"
     new.write_bytes(b"new")
     old.write_bytes(b"old")
     held[0] = 1000
     with pytest.raises(PermissionError, match=r"run\.nc is protected, or open in another program"):
-        system.replace(new, old)
+        platforms.replace(new, old)
     assert old.read_bytes() == b"old"
 
 
@@ -294,9 +298,9 @@ def test_a_title_that_is_a_device_names_no_folder(root: Path) -> None:
 
 
 def test_names_are_the_same_where_any_system_takes_them_for_the_same() -> None:
-    assert portable.folded("Gru\u0308n") == portable.folded("GR\u00dcN") == "gr\u00fcn"
-    assert portable.is_device("NUL.toml")
-    assert not portable.is_device("console")
+    assert file_names.folded("Gru\u0308n") == file_names.folded("GR\u00dcN") == "gr\u00fcn"
+    assert file_names.is_device("NUL.toml")
+    assert not file_names.is_device("console")
 
 
 def test_scenes_that_differ_in_capitals_only_are_not_run_together(tmp_path: Path, root: Path) -> None:
@@ -307,17 +311,17 @@ def test_scenes_that_differ_in_capitals_only_are_not_run_together(tmp_path: Path
         shutil.copy(root / "scenes" / "checks" / "pendulum.toml", path)
         scenes.append(fc.load_scene(path))
     with pytest.raises(InputError, match="replace each other"):
-        owner.refuse_namesakes(scenes)
+        shown_folders.refuse_namesakes(scenes)
 
 
 def test_a_launcher_between_parent_and_child_is_no_end_of_the_parent(monkeypatch: pytest.MonkeyPatch) -> None:
     """Python in a virtual environment of Windows is started by one."""
     parent = os.getppid() + 1
-    assert not system.is_parent(parent)
-    monkeypatch.setattr(system.sys, "platform", "win32")
+    assert not platforms.is_parent(parent)
+    monkeypatch.setattr(platforms.sys, "platform", "win32")
     for runs in (True, False):
-        monkeypatch.setattr(system, "alive", lambda process, runs=runs: runs and process == parent)
-        assert system.is_parent(parent) == runs
+        monkeypatch.setattr(platforms, "alive", lambda process, runs=runs: runs and process == parent)
+        assert platforms.is_parent(parent) == runs
 
 
 def test_a_path_written_as_on_windows_is_told_how_to_write_it(tmp_path: Path) -> None:
@@ -333,14 +337,14 @@ def test_a_path_of_windows_is_found_however_toml_writes_it() -> None:
     path = PureWindowsPath("C:\\mine\\rod.toml")
     written = "a = 'C:\\mine\\rod.toml'\nb = \"C:\\\\mine\\\\rod.toml\"\nc = 'C:/mine/rod.toml'"
     assert set(tomllib.loads(written).values()) == {str(path), path.as_posix()}
-    for spelling in bundle._spellings(path):
+    for spelling in reproduction._spellings(path):
         written = written.replace(spelling, "rod.toml")
     assert set(tomllib.loads(written).values()) == {"rod.toml"}
 
 
 def test_a_folder_of_results_that_is_too_deep_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert doctor._results(tmp_path)[1]
-    monkeypatch.setattr(system, "longest_path", lambda: 259)
+    monkeypatch.setattr(platforms, "longest_path", lambda: 259)
     told, fine = doctor._results(tmp_path / ("deep" * 40))
     assert not fine
     assert "longer than paths to files may be here (259 characters" in told

@@ -90,7 +90,7 @@ def test_the_key_of_a_run_holds_all_modules_that_its_code_can_reach(root: Path, 
     """For each type of joint, driven in part where it has several freedoms: a chain of others may take its place."""
     scene = scene_with({"type": name}, solver=solver)
     tree = Sources(root)
-    known = tree.closure(["flexclear.stages.s4_simulate", *modules(scene)]).keys()
+    known = tree.closure(["flexclear.stages.simulation", *modules(scene)]).keys()
     declared = import_module(module_of(effects.JOINTS, "NAMES", name))
     part = next(value for value in vars(declared).values() if hasattr(value, "COORDINATES"))
     possible = {name, "free", *(() if len(part.COORDINATES) < 2 else {c.part for c in part.COORDINATES} | {"fixed"})}
@@ -137,7 +137,7 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
     texts = sources(parts, Scheme("dop853")).values()
     reached = {found for text in texts for found in functions.reached(text)}
     scene = scene_with({"type": "cylindrical"}, **tables)
-    known = Sources(root).closure(["flexclear.stages.s4_simulate", *modules(scene)]).keys()
+    known = Sources(root).closure(["flexclear.stages.simulation", *modules(scene)]).keys()
     assert module in reached
     assert reached <= set(known)
     assert module not in modules(scene_with({"type": "cylindrical"}))

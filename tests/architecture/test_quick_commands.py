@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from flexclear.papers.wang_wang_2019 import tasks as report
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
 from flexclear.pipeline.core.workflow.task import Task, facts, in_order, key
-from flexclear.stages import paper_report as report
 from flexclear.stages.workplace import Workplace
 
 #: what such a command may import: its own code, and what checks scenes
@@ -23,7 +23,7 @@ ALLOWED |= {"typing_inspection", "psutil"}
 SLOW = {"numpy", "xarray", "pandas", "scipy", "numba", "matplotlib", "pyvista", "skfem", "meshio", "netCDF4"}
 #: the command, and what it has imported at its end
 COMMAND = """import sys
-from flexclear.stages.__main__ import main
+from flexclear.commands.__main__ import main
 code = main(sys.argv[1:])
 print(*sys.modules, file=sys.stderr)
 sys.exit(code)"""

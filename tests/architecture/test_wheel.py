@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 #: folders at the top that are packages below `flexclear`
-TOPS = ("pipeline", "stages", "scenes", "meshes")
+TOPS = ("pipeline", "stages", "papers", "scenes", "meshes")
 
 
 @pytest.fixture(name="project")
@@ -18,8 +18,8 @@ def _project(root: Path) -> dict[str, Any]:
 
 
 def test_a_wheel_holds_every_package_and_no_other(root: Path, project: dict[str, Any]) -> None:
-    modules = {p.relative_to(root) for top in ("pipeline", "stages") for p in (root / top).rglob("*.py")}
-    packages = {".".join(("flexclear", *p.parent.parts)) for p in modules}
+    modules = {p.relative_to(root) for top in ("papers", "pipeline", "stages") for p in (root / top).rglob("*.py")}
+    packages = {".".join(("flexclear", *p.parent.parts)) for p in modules} | {"flexclear.commands"}
     assert set(project["tool"]["setuptools"]["packages"]) == packages | {
         "flexclear",
         "flexclear.scenes",
@@ -49,4 +49,4 @@ def test_a_wheel_brings_scenes_meshes_and_templates(root: Path, project: dict[st
 
 
 def test_there_is_one_script_and_it_is_the_command(project: dict[str, Any]) -> None:
-    assert project["project"]["scripts"] == {"flexclear": "flexclear.stages.__main__:main"}
+    assert project["project"]["scripts"] == {"flexclear": "flexclear.commands.__main__:main"}

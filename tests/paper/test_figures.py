@@ -10,20 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear import pipeline
-from flexclear.pipeline.core.registry import lookup
-from flexclear.pipeline.post import figures
-from flexclear.pipeline.post.figures import fig06
+from flexclear.papers.wang_wang_2019 import figures
+from flexclear.papers.wang_wang_2019.figures import fig06
+from flexclear.pipeline.core.scene.registry import lookup
 from tests.paper.material import everything
 
-TREE = Path(pipeline.__file__).parent.parent
+TREE = Path(__file__).resolve().parents[2]
 ARTIFACTS = {"run", "mesh", "tight", "post", "ensemble", "modes", "fine-modes", "bundle", "timing"}
 
 
 def made(name):
     """Files of one figure or table from the made-up artifacts, and nothing but those it asks for."""
     asked = {reference: everything()[reference] for reference in figures.needs(name)}
-    return lookup("flexclear.pipeline.post.figures", name, where="test")(asked)
+    return lookup("flexclear.papers.wang_wang_2019.figures", name, where="test")(asked)
 
 
 def test_all_figures_and_tables_of_the_paper_are_listed():
@@ -34,7 +33,7 @@ def test_all_figures_and_tables_of_the_paper_are_listed():
 
 @pytest.mark.parametrize("name", figures.NAMES)
 def test_needs_are_literal_and_name_scenes_and_artifacts_that_exist(name):
-    module = import_module(f"flexclear.pipeline.post.figures.{name}")
+    module = import_module(f"flexclear.papers.wang_wang_2019.figures.{name}")
     assigned = [node for node in ast.parse(Path(module.__file__).read_text()).body if isinstance(node, ast.Assign)]
     literal = {node.targets[0].id: node.value for node in assigned if isinstance(node.targets[0], ast.Name)}
     assert ast.literal_eval(literal["NEEDS"]) == module.NEEDS

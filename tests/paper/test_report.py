@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import pytest
 
-from flexclear.pipeline.core.registry import lookup
-from flexclear.pipeline.post import figures, report
-from flexclear.pipeline.post.discrepancies import DISCREPANCIES
+from flexclear.papers.wang_wang_2019 import figures, report
+from flexclear.papers.wang_wang_2019.discrepancies import DISCREPANCIES
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.post.overview.page import in_folder
 from tests.paper.material import everything
 
@@ -25,7 +25,9 @@ def results(tmp_path_factory):
     for name in ("fig08", "table08", "table10"):
         folder = root / ("tables" if name.startswith("table") else "figures")
         folder.mkdir(exist_ok=True)
-        for file, content in lookup("flexclear.pipeline.post.figures", name, where="test")(everything()).items():
+        for file, content in lookup("flexclear.papers.wang_wang_2019.figures", name, where="test")(
+            everything()
+        ).items():
             (folder / file).write_bytes(content)
     headline = root / "runs" / RENDERED
     headline.mkdir(parents=True)

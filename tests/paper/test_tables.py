@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.post.figures import table04, table05, table07, table08, table09, table10, table_verdicts
-from flexclear.pipeline.post.plotting.error_table import number
-from flexclear.pipeline.post.plotting.frequency_table import euler_bernoulli_ratio
+from flexclear.papers.wang_wang_2019.figures import table04, table05, table07, table08, table09, table10, table_verdicts
+from flexclear.papers.wang_wang_2019.plotting.error_table import number
+from flexclear.papers.wang_wang_2019.plotting.frequency_table import euler_bernoulli_ratio
 from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
 from tests.paper import synthetic
 from tests.paper.material import WOBBLE, everything

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.schema import Scene
 
 Table = dict[str, Any]

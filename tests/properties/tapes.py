@@ -34,7 +34,7 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     "round": np.round,
     "arctan2": math.atan2,
     "copysign": math.copysign,
-    **{name: getattr(np, name) for name in ("sin", "cos", "exp", "tanh")},
+    **{name: getattr(np, name) for name in ("sin", "cos", "tan", "exp", "log", "tanh")},
 }
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.effects import Scheme
@@ -129,6 +129,40 @@ def massless(coaxial: bool) -> Table:
             table["body"][f"rod{k}"]["pose"]["position"] = position.tolist()
         table["body"]["rod6"]["frames"]["foot"]["axes"] = table["body"]["rod5"]["frames"]["foot"]["axes"]
     return table
+
+
+@pytest.mark.parametrize("name", TREES)
+def test_the_bound_of_what_is_borne_holds_in_any_pose(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pivots are compared with it: mass, and a polar moment that no pose exceeds."""
+    model = tabulated(monkeypatch, Scene.model_validate(TREES[name]), True)
+    numbers, parents = model.arrays.table(m.LINK_NUMBERS), [link.branch.parent for link in model.links]
+    for turns in (0.0, 0.3, 1.0):
+        mass, polar = borne(evaluated(model, turns=turns), parents)
+        assert numbers["borne"][1:] == pytest.approx(mass, rel=1e-12)  # a dozen sums
+        assert np.all(numbers["reaching"][1:] >= polar * (1.0 - 1e-12))
+
+
+def test_the_bound_of_what_is_borne_is_no_larger_than_a_straight_chain_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A larger one would call light links massless."""
+    model = tabulated(monkeypatch, Scene.model_validate(rods(10)), True)
+    _, polar = borne(evaluated(model), [link.branch.parent for link in model.links])
+    assert model.arrays.table(m.LINK_NUMBERS)["reaching"][1:] == pytest.approx(polar, rel=1e-12)
+
+
+def borne(found: Evaluated, parents: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Mass of each moving link and all beyond, and polar moment about its origin in an evaluated pose."""
+    space, numbers = found.space, found.model.arrays.table(m.LINK_NUMBERS)
+    frames = m.named(m.LINK_FRAMES, space.w[space.h[m.LINK_FRAMES.place] :][: len(parents) * m.LINK_FRAMES.size])
+    centres = frames["origin"] + np.einsum("ijk,ik->ij", frames["axes"], numbers["com"])
+    spins = 0.5 * numbers["inertia"][:, :3].sum(axis=1)
+    mass, polar = np.zeros(len(parents)), np.zeros(len(parents))
+    for j in range(1, len(parents)):
+        i = j
+        while i:  # of all links between it and the ground
+            mass[i] += numbers["mass"][j]
+            polar[i] += numbers["mass"][j] * np.sum((centres[j] - frames["origin"][i]) ** 2) + spins[j]
+            i = parents[i]
+    return mass[1:], polar[1:]
 
 
 @pytest.mark.parametrize("articulated", [True, False])

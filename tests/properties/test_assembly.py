@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.errors import FlexclearError, InputError
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import TREE, bundles

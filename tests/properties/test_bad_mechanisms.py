@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
-from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.run.run import engine_of
 from tests.analytic.mechanism_runs import TREE

@@ -12,8 +12,8 @@ import pytest
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.structure.fe import beam, mesh
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.kinds.kind import of_mesh

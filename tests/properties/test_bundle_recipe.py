@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import mesh, section
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
-from flexclear.stages import s1_mesh
+from flexclear.stages import meshing
 
 MESHES = Path(__file__).parents[2] / "meshes"
 
@@ -29,7 +29,7 @@ def test_every_recipe_builds_and_says_where_its_values_come_from(path: Path) -> 
     rod = mesh.build(mesh.read_recipe(path))
     assert rod.sizes["node"] == rod.sizes["cell"] + 1
     for part in ("shape", "material", "section", "elements"):
-        assert s1_mesh.sources(path)[part] == "Table 2"
+        assert meshing.sources(path)[part] == "Table 2"
 
 
 def test_the_equal_area_square_changes_only_the_mass() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.quantities import standard_error
+from flexclear.pipeline.core.artifacts.quantities import standard_error
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.cost import statistics
 

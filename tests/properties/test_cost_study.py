@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.post.cost import causes, page, price, split, work_precision
 from flexclear.pipeline.post.cost.study import Point, assemble, resolved
 

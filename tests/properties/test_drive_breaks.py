@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline import load_scene
+from flexclear import load_scene
 from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, jump
 from flexclear.pipeline.dynamics.run.run import engine_of
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
-from flexclear.pipeline.core.registry import module_of
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
+from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import joints
 from flexclear.pipeline.dynamics import memory as m

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.clearance import Ambrosio, LuGre, ModifiedCoulomb
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics.contact import friction
 from tests.properties.kernels import from_python
 

@@ -11,7 +11,7 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.algebra import (
+from flexclear.pipeline.core.numerics.rotations import (
     matrix_to_quaternion,
     quaternion_to_matrix,
     rotation_vector_to_matrix,

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_quaternion, skew
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_quaternion, skew
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics import joints
 from tests.properties.kernels import from_python
 

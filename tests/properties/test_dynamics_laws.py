@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexclear.pipeline.core.registry import lookup, module_of
 from flexclear.pipeline.core.scene.clearance import NormalLaw
+from flexclear.pipeline.core.scene.registry import lookup, module_of
 from flexclear.pipeline.dynamics.contact import form as forms
 from flexclear.pipeline.dynamics.contact import normal
 from flexclear.pipeline.dynamics.contact.law import Resolved

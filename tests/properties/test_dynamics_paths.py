@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix, rotation_vector_to_matrix
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix, rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.laws import drive_laws
 from tests.analytic.mechanism_runs import TREE, run
 from tests.properties.mechanisms import GRAVITY, body, frame, ground, joint, scene, simulate

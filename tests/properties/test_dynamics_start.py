@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.assembly import assembled
 from flexclear.pipeline.dynamics.model.given_start import moved
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import trajectory as stepping
 from flexclear.pipeline.dynamics.run.run import observed

@@ -9,8 +9,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 
 FREQUENCY, RADIUS = 10.0, 0.02
 

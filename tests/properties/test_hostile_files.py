@@ -17,19 +17,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flexclear.commands import cost_peers, scenes
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import checked, read_checked, sha256
-from flexclear.pipeline.core.artifacts.seal import sealed
 from flexclear.pipeline.core.artifacts.store import Store, read_record
-from flexclear.pipeline.core.errors import FlexclearError, InputError
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
-from flexclear.pipeline.core.workflow.journal import Journal, State
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError
+from flexclear.pipeline.core.workflow.journal import Journal, State, sealed
 from flexclear.pipeline.post.render import shape_files
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.solid import imported
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
-from flexclear.stages import cost_peers, run
 from tests.properties.test_hostile_scenes import BASE
 
 #: processor time [s] after which work counts as endless: refusals take 0.3 s, and what they refuse takes hours
@@ -91,12 +90,12 @@ def test_a_long_row_of_scenes_that_extend_each_other_is_refused(tmp_path: Path) 
 def test_values_of_the_command_line_are_refused_as_those_of_files(value: str, tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(BASE)
     with refused(r"too deeply|is not a number|\[body.crank.mass\]"):
-        run.loaded(str(tmp_path / "s.toml"), [f"body.crank.mass={value}"])
+        scenes.loaded(str(tmp_path / "s.toml"), [f"body.crank.mass={value}"])
 
 
 def test_many_changes_give_a_name_that_a_folder_can_have(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(BASE)
-    names = {run.loaded(str(tmp_path / "s.toml"), [f"title={'a' * 300}{k}"]).name for k in range(2)}
+    names = {scenes.loaded(str(tmp_path / "s.toml"), [f"title={'a' * 300}{k}"]).name for k in range(2)}
     assert len(names) == 2
     assert max(map(len, names)) < 255  # bytes of a name on all usual file systems
 
@@ -105,7 +104,7 @@ def test_results_take_the_place_of_no_device() -> None:
     """A new file of that name would be put there, and the device be gone."""
     for target in ("/dev/null", "/" + "x" * 5000):
         with refused("no ordinary file|can be no file"):
-            run.check_target(Path(target))
+            scenes.check_target(Path(target))
 
 
 SWEEP: dict[str, Any] = {"scene": "s", "keep": ["b.position.final"], "vary": {}}

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
-from flexclear.pipeline.core.errors import InputError, ResourceError
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.fields import Inertia, Position
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.units import UNITS, quantity, unit
+from flexclear.pipeline.core.scene.units import UNITS, quantity, unit
+from flexclear.pipeline.core.system.errors import InputError, ResourceError
 from flexclear.pipeline.dynamics.model.assembly import assembled
 from flexclear.pipeline.dynamics.model.mechanism import build
 

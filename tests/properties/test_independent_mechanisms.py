@@ -10,9 +10,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.model.mechanism import build
 
 STIFFNESS, FREQUENCY = 400.0, 20.0

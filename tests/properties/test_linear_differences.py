@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics.linear.differences import Rounding, derivative
 
 #: what a double resolves, as the callers say it

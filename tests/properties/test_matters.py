@@ -7,7 +7,7 @@ import pytest
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.matters import (
+from flexclear.pipeline.post.answers.matters import (
     IDEAL,
     Pair,
     assemble,

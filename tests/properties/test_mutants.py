@@ -10,11 +10,11 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.core.errors import FlexclearError, InputError, ResourceError
 from flexclear.pipeline.core.scene.limits import Limits
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError, ResourceError
 from flexclear.pipeline.structure.kinds import kind
-from flexclear.stages import s1_mesh
+from flexclear.stages import meshing
 from flexclear.stages.graph import Graph
 from tests.properties.mutants import mutant, sound
 
@@ -30,8 +30,8 @@ def read_scene(path: Path) -> None:
 
 def read_recipe(path: Path) -> None:
     """As far as stage 1 gets."""
-    s1_mesh.check_size(path, Limits(cells=1000))
-    table = s1_mesh.params(path)["recipe"]
+    meshing.check_size(path, Limits(cells=1000))
+    table = meshing.params(path)["recipe"]
     kind.of_recipe(table).build(table, path.parent)
 
 

@@ -13,10 +13,9 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.post.body_shape import surface
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, shape_files, surfaces, vibrations
 from flexclear.pipeline.post.render.forms import Seat
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
@@ -24,10 +23,11 @@ from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.render.solids import equivalent
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.wheels import wheels
-from flexclear.pipeline.post.rod_shape import AROUND, PER_CELL
+from flexclear.pipeline.post.shapes.body_shape import surface
+from flexclear.pipeline.post.shapes.rod_shape import AROUND, PER_CELL
 from flexclear.pipeline.structure.kinds.kind import of_recipe
 from flexclear.pipeline.structure.modes.rigid import drawn
-from flexclear.stages import s4_simulate, s6_render
+from flexclear.stages import rendering, simulation
 from tests.paper import synthetic
 
 needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)
@@ -116,13 +116,13 @@ def test_a_scene_says_what_a_body_looks_like_and_no_run_depends_on_it():
     drawn = load_scene(
         "scenes/checks/pendulum.toml", override={f"body.{name}.geometry": SHAPES, f"body.{name}.color": "#CC79A7"}
     )
-    assert s4_simulate.params(drawn) == s4_simulate.params(plain)
-    told = s6_render.params(drawn, "motion", "html")["bodies"][name]
+    assert simulation.params(drawn) == simulation.params(plain)
+    told = rendering.params(drawn, "motion", "html")["bodies"][name]
     assert told["color"] == "#CC79A7"
     surface = forms.shapes(told["geometry"], Path("."))
     assert surface.points.max(axis=0) == pytest.approx([0.25, 0.01, 0.005], rel=1e-12)
     assert surface.points[:, 0].min() == pytest.approx(-0.02, rel=1e-12)
-    assert "bodies" not in s6_render.params(plain, "modes", "html")
+    assert "bodies" not in rendering.params(plain, "modes", "html")
 
 
 @pytest.mark.parametrize("suffix", [".stl", ".vtk", ".ply", ".obj"])
@@ -157,7 +157,7 @@ def test_a_shape_file_that_is_not_there_is_told_with_its_place():
         "scenes/checks/pendulum.toml", override={f"body.{name}.geometry": [{"type": "file", "file": "/no/part.stl"}]}
     )
     with pytest.raises(InputError, match=rf"body\.{name}\.geometry\.0.*no/part\.stl"):
-        s6_render.params(there, "motion", "png")
+        rendering.params(there, "motion", "png")
 
 
 def test_a_film_is_slow_around_the_strongest_impact_and_even_without():
@@ -189,7 +189,7 @@ def test_the_viewer_bends_a_rod_as_the_run_does():
 
 
 def surfaces_of(bundle) -> np.ndarray:
-    from flexclear.pipeline.post.body_shape import surface
+    from flexclear.pipeline.post.shapes.body_shape import surface
 
     return surface(bundle, np.zeros(bundle.sizes["mode"]))[0]
 
@@ -309,7 +309,7 @@ def test_what_cannot_be_shown_so_is_not_offered(what: str, kind: str):
     from flexclear.pipeline.post.render.pictures import MAKERS
 
     assert kind not in MAKERS[what]
-    assert {name: tuple(kinds) for name, kinds in MAKERS.items()} == s6_render.FORMATS
+    assert {name: tuple(kinds) for name, kinds in MAKERS.items()} == rendering.FORMATS
 
 
 # Wheels and sections --------------------------------------------------------------------------------------------------

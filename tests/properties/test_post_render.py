@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.post import body_shape, derive
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.render import gl
 from flexclear.pipeline.post.render.mechanism import Looks, mechanism, part_pose, placed
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.render.solids import equivalent
-from flexclear.pipeline.post.rod_shape import AROUND, PER_CELL, centre_line, scale_to, surface
+from flexclear.pipeline.post.shapes import body_shape
+from flexclear.pipeline.post.shapes.rod_shape import AROUND, PER_CELL, centre_line, scale_to, surface
 from tests.paper import synthetic
 
 needs_gl = pytest.mark.skipif(gl.state().endswith("none"), reason=gl.REMEDY)

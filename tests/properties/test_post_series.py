@@ -8,13 +8,17 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 
-from flexclear.pipeline.core.algebra import quaternion_product, rotation_between, rotation_vector_to_quaternion
-from flexclear.pipeline.core.quantities import common_times
+from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation, velocity_at_events
+from flexclear.papers.wang_wang_2019.plotting.phase import at_times
+from flexclear.pipeline.core.artifacts.quantities import common_times
+from flexclear.pipeline.core.numerics.angles import angle_about_y, turning
+from flexclear.pipeline.core.numerics.rotations import (
+    quaternion_product,
+    rotation_between,
+    rotation_vector_to_quaternion,
+)
 from flexclear.pipeline.post import derive
-from flexclear.pipeline.post.errors import ensemble_deviations, max_deviation, velocity_at_events
-from flexclear.pipeline.post.horizon import horizon, spread
-from flexclear.pipeline.post.poincare import at_times
-from flexclear.pipeline.post.rotations import angle_about_y, turning
+from flexclear.pipeline.post.single_run.horizon import horizon, spread
 from tests.paper import synthetic
 
 angles = st.floats(-1.5, 1.5)

@@ -7,9 +7,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.algebra import continued, matrix_to_quaternion, quaternion_to_matrix
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.numerics.rotations import continued, matrix_to_quaternion, quaternion_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.equations.named_bodies import put_quaternion
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.topology import topology

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import edited, load_scene, with_numbers
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
 from flexclear.pipeline.dynamics.model.model import tabulate

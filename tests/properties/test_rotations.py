@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.algebra import cross, matrix_to_quaternion, quaternion_to_matrix, turned
+from flexclear.pipeline.core.numerics.rotations import cross, matrix_to_quaternion, quaternion_to_matrix, turned
 
 #: rounding of sums of three products of numbers of one
 ROUNDING = 1e-14

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.stages import s4_simulate
+from flexclear.stages import simulation
 
 TREE = Path(__file__).resolve().parents[2]
 
@@ -188,14 +188,14 @@ def test_columns_may_be_numbers(tmp_path: Path) -> None:
 def test_what_a_run_depends_on_is_the_content_of_the_table_not_its_place(tmp_path: Path) -> None:
     there = tmp_path / "there"
     there.mkdir()
-    here, moved = (s4_simulate.params(load_scene(write(folder, ROWS))) for folder in (tmp_path, there))
+    here, moved = (simulation.params(load_scene(write(folder, ROWS))) for folder in (tmp_path, there))
     assert here["scene"] == moved["scene"]
     assert str(tmp_path) not in str(here)
-    edited = s4_simulate.params(load_scene(write(tmp_path, ROWS.replace("20", "21"))))
+    edited = simulation.params(load_scene(write(tmp_path, ROWS.replace("20", "21"))))
     assert edited["scene"] != here["scene"]
     # a worker rebuilds the scene without the file
     (tmp_path / "moves" / "angle.csv").unlink()
-    assert s4_simulate.params(s4_simulate.rebuild(copy.deepcopy(edited), {})) == edited
+    assert simulation.params(simulation.rebuild(copy.deepcopy(edited), {})) == edited
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,12 @@ import pytest
 import xarray as xr
 from pydantic import TypeAdapter, ValidationError
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix, rotation_between
 from flexclear.pipeline.core.artifacts import deficits
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix, rotation_between
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.core.units import any_quantity, quantity, unit
+from flexclear.pipeline.core.scene.units import any_quantity, quantity, unit
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.beam_recipe import NodeFrame
 from flexclear.pipeline.structure.fe.recipe_parts import TurnedFrame
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.mechanisms import Table, simulate

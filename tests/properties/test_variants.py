@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flexclear.commands.new import write
+from flexclear.pipeline.core.artifacts.effect_size import chance, influence
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.effect_size import chance, influence
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.effect_sizes import closed
-from flexclear.pipeline.post.effect_sizes import variants as needed
-from flexclear.stages.new import write
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.post.answers.effect_sizes import closed
+from flexclear.pipeline.post.answers.effect_sizes import variants as needed
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from typing import Any
 
 import pytest
 
-from flexclear.stages import sweep_engine
+from flexclear.stages.sweeps import sweep_engine
 
 #: a process that is silent for so long hangs, however slow or busy the machine is [s]
 PATIENCE = 600.0
@@ -28,7 +28,7 @@ import os, time
 from pathlib import Path
 import numpy as np
 import xarray as xr
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.scene.schema import Scene
 
 def log(text):
@@ -171,7 +171,7 @@ def project(tmp_path: Path, root: Path) -> Iterator[Project]:
     """A fresh copy with small engines and two scenes: tiny/ideal and tiny/contact."""
     folder = tmp_path / "project"
     folder.mkdir()
-    for name in ("flexclear", "pipeline", "stages"):
+    for name in ("flexclear", "papers", "pipeline", "stages"):
         shutil.copytree(root / name, folder / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(root / "pyproject.toml", folder)
     (folder / "pipeline" / "dynamics" / "__init__.py").write_text(ENGINE)

@@ -18,7 +18,7 @@ from benchmarks.__main__ import main
 from benchmarks.families import commands, solids
 from benchmarks.family import Case, Family
 from benchmarks.log import Session
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 
 FAMILIES = {name: page.named(name) for name in families.NAMES}
 PAGES = sorted({family.page for family in FAMILIES.values()})

@@ -24,13 +24,13 @@ from benchmarks.mechanisms import (
     without_clearance,
     without_friction,
 )
+from flexclear.commands import cost_peers
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.stages import cost_peers
 from tests.reference import sps4
 from tests.reference.ideal_motion import ideal
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.stages import bundle
-from flexclear.stages.__main__ import main
+from flexclear.commands import reproduction
+from flexclear.commands.__main__ import main
+from flexclear.pipeline.core.system.errors import InputError
 
 ROD = """
 title = "A rod"
@@ -62,12 +62,12 @@ def test_a_failure_is_repeated_from_one_file_without_a_path_of_this_machine(
 
 
 def test_a_run_that_ends_otherwise_is_told(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = bundle.make(str(scene), [], ["numpy"], tmp_path / "bundle.zip")
+    path = reproduction.make(str(scene), [], ["numpy"], tmp_path / "bundle.zip")
     with zipfile.ZipFile(path) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}
     facts = json.loads(content["facts.json"])
     facts |= {"exit_code": 0, "libraries": {"numpy": "1.0"}}
-    path.write_bytes(bundle._packed({**content, "facts.json": json.dumps(facts).encode()}))
+    path.write_bytes(reproduction._packed({**content, "facts.json": json.dumps(facts).encode()}))
     assert main(["doctor", "--repeat", str(path)]) == 4
     told = capsys.readouterr()
     assert "there with 0" in told.out
@@ -78,9 +78,9 @@ def test_a_run_that_ends_otherwise_is_told(scene: Path, tmp_path: Path, capsys: 
 def test_a_file_that_leads_out_of_its_folder_is_refused(name: str, tmp_path: Path) -> None:
     facts = {"scene": "a.toml", "settings": [], "exit_code": 0, "libraries": {}, "python": ""}
     content = {"facts.json": json.dumps(facts).encode(), "log.txt": b"", name: b"x"}
-    (tmp_path / "a.zip").write_bytes(bundle._packed(content))
+    (tmp_path / "a.zip").write_bytes(reproduction._packed(content))
     with pytest.raises(InputError, match="lead out of it"):
-        bundle.repeat(tmp_path / "a.zip", [])
+        reproduction.repeat(tmp_path / "a.zip", [])
 
 
 def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
@@ -90,7 +90,7 @@ def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
     for content in (b"", b"PK\x03\x04", whole.getvalue(), whole.getvalue()[:40]):
         (tmp_path / "a.zip").write_bytes(content)
         with pytest.raises(InputError):
-            bundle.repeat(tmp_path / "a.zip", [])
+            reproduction.repeat(tmp_path / "a.zip", [])
 
 
 def test_a_run_that_is_repeated_is_compared_to_the_last_bit(
@@ -98,12 +98,12 @@ def test_a_run_that_is_repeated_is_compared_to_the_last_bit(
 ) -> None:
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     scene = Path(shutil.copy(root / "scenes" / "checks" / "pendulum.toml", tmp_path))
-    path = bundle.make(str(scene), ["time.end='20 ms'"], ["numpy"], tmp_path / "bundle.zip")
+    path = reproduction.make(str(scene), ["time.end='20 ms'"], ["numpy"], tmp_path / "bundle.zip")
     assert main(["doctor", "--repeat", str(path)]) == 0
     assert "the run is the same to the last bit" in capsys.readouterr().out
     with zipfile.ZipFile(path) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}
     facts = json.loads(content["facts.json"]) | {"settings": ["time.end='30 ms'"]}
-    path.write_bytes(bundle._packed({**content, "facts.json": json.dumps(facts).encode()}))
+    path.write_bytes(reproduction._packed({**content, "facts.json": json.dumps(facts).encode()}))
     assert main(["doctor", "--repeat", str(path)]) == 0
     assert "the run is not the same to the last bit" in capsys.readouterr().out

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.pipeline.core import machine
+from flexclear.commands import why
+from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.artifacts.disk import checked
 from flexclear.pipeline.core.artifacts.store import Record, Store
-from flexclear.stages import why
-from flexclear.stages.__main__ import main
+from flexclear.pipeline.core.system import machine
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.stages.__main__ import main, parser
+from flexclear.commands.__main__ import main, parser
 from flexclear.stages.graph import STAGES
 from tests.stages.conftest import CONTACT, JOINT, SCENE
 

@@ -8,18 +8,19 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.commands import compare
+from flexclear.commands.new import write
 from flexclear.pipeline.core.scene.ideal import ideal
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.parts import MeshedRigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.overview import comparison, curves, figures, overlay, page
 from flexclear.pipeline.structure.fe import mesh as meshes
 from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.modes import rigid
-from flexclear.stages import compare, s3_rigid
+from flexclear.stages import rigid_body
 from flexclear.stages.graph import Graph
-from flexclear.stages.new import write
 from flexclear.stages.workplace import open_workplace
 from tests.paper import synthetic
 
@@ -54,7 +55,7 @@ def test_no_modes_make_a_rigid_body_and_so_does_the_recipe_alone(crank: Path):
     pose = {"position": [0.05, 0, 0]}
     table = {"rod": {"type": "rigid", "mesh": "rod.toml", "pose": pose}}
     data = rigid.build(meshes.build(read_recipe(crank.parent / "rod.toml")))
-    filled = s3_rigid.filled(table, {"rigid/rod": data})["rod"]
+    filled = rigid_body.filled(table, {"rigid/rod": data})["rod"]
     assert filled["mass"] == float(data["mass"])
     assert set(filled["frames"]) == {"big_end", "middle", "small_end"}
     assert filled["pose"] == pose

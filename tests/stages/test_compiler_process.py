@@ -225,7 +225,7 @@ def test_workers_have_no_second_process() -> None:
 
 @pytest.mark.parametrize("scenes, idle", [(["tiny/stays"], True), (["tiny/stays", "tiny/contact"], False)])
 def test_a_task_hears_whether_it_is_the_only_one(tmp_path: Path, root: Path, scenes: list[str], idle: bool) -> None:
-    tasks = [Task("simulate", name, "flexclear.stages.s4_simulate:run", {"scene": name}, "") for name in scenes]
+    tasks = [Task("simulate", name, "flexclear.stages.simulation:run", {"scene": name}, "") for name in scenes]
     heard: list[bool] = []
 
     class Pool:

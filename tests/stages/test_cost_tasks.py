@@ -8,18 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core import quantities
+from flexclear.commands import cost, cost_design, cost_peers, scenes
+from flexclear.commands.__main__ import main
+from flexclear.commands.cost_design import Setting
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.pipeline.post.cost.answer import sentences
-from flexclear.stages import cost, cost_design, cost_peers, run
-from flexclear.stages.__main__ import main
-from flexclear.stages.cost_design import Setting
 from flexclear.stages.workplace import Workplace
 
 OWN = Setting("dop853", 1e-6)
@@ -79,12 +79,12 @@ def test_points_are_measured_alone_with_kernels_compiled_before(study: cost.Stud
 def test_errors_are_those_against_a_converged_run_of_another_method(study: cost.Study, swing: Scene, place: Workplace):
     found, _ = study.drawn()
     solver = {"solver": {"integrator": "radau", "rtol": 1e-12}}
-    converged = run.run(edited(swing, solver), place)
+    converged = scenes.run(edited(swing, solver), place)
     told = 0
     for rtol in found["rtol"].values:
         if np.isnan(found.error_by_tolerance.sel(adaptive_integrator="dop853", rtol=rtol)).any():
             continue  # too loose: the energy balance does not close
-        other = run.run(edited(swing, {"solver": {"integrator": "dop853", "rtol": float(rtol)}}), place)
+        other = scenes.run(edited(swing, {"solver": {"integrator": "dop853", "rtol": float(rtol)}}), place)
         for name in map(str, found["quantity"].values):
             q = parse(name, swing.owners())
             error = quantities.error(other, converged, q) / max(quantities.scale(converged, q), 1e-300)

@@ -15,15 +15,15 @@ import xarray as xr
 import flexclear as fc
 from benchmarks.site import datasets, keys
 from benchmarks.site.__main__ import stale
+from flexclear.commands.__main__ import main
+from flexclear.commands.new import write
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
 from flexclear.pipeline.core.artifacts.store import write_dataset
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import simulate
 from flexclear.pipeline.post import derive
-from flexclear.stages.__main__ import main
-from flexclear.stages.new import write
 
 #: symbols of UDUNITS-2 that datasets use; a product of them, each with an integer exponent, is a unit
 SYMBOLS = ("kg", "m", "s", "N", "Pa", "J", "W", "Hz", "rad")

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from flexclear.commands import compile_ahead, doctor, new
+from flexclear.commands.__main__ import main
 from flexclear.pipeline.dynamics.compile import files
 from flexclear.pipeline.post.render import gl
-from flexclear.stages import ahead, doctor, new
-from flexclear.stages.__main__ import main
 
 
 def test_the_doctor_finds_this_place_well(capsys: pytest.CaptureFixture[str]):
@@ -56,7 +56,7 @@ def test_the_usual_kinds_are_compiled_where_no_scene_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
-    monkeypatch.setattr(ahead, "USUAL", ("pendulum",))
+    monkeypatch.setattr(compile_ahead, "USUAL", ("pendulum",))
     assert main(["doctor", "--compile"]) == 0
     assert "compiled: all that runs of pendulum call" in capsys.readouterr().out
     assert not (tmp_path / "results").exists()
@@ -68,7 +68,7 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path, roo
     environment = {**os.environ, "FLEXCLEAR_RESULTS": str(tmp_path / "results"), "FLEXCLEAR_KERNELS": str(kernels)}
 
     def command(*words: str) -> None:
-        subprocess.run([sys.executable, "-m", "flexclear.stages", *words], cwd=root, env=environment, check=True)
+        subprocess.run([sys.executable, "-m", "flexclear.commands", *words], cwd=root, env=environment, check=True)
 
     def code() -> dict[Path, int]:
         return {path: path.stat().st_mtime_ns for path in kernels.rglob(f"*{files.CODE}")}

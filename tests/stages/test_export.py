@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.commands import export
 from flexclear.pipeline.core.artifacts.table import table
-from flexclear.pipeline.core.errors import InputError
-from flexclear.stages import export
+from flexclear.pipeline.core.system.errors import InputError
 
 
 @pytest.fixture

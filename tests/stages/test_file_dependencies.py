@@ -10,19 +10,19 @@ import meshio
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core import file_dependencies
 from flexclear.pipeline.core.artifacts.store import Record, Store
-from flexclear.pipeline.core.errors import ResourceError
-from flexclear.pipeline.core.external_files import companions, read_mesh
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system import file_dependencies
+from flexclear.pipeline.core.system.errors import ResourceError
+from flexclear.pipeline.core.system.external_files import companions, read_mesh
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.execute import execute, find, states
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
 from flexclear.pipeline.core.workflow.task import Task, facts
 from flexclear.pipeline.post import pages
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.kinds.kind import of_mesh
-from flexclear.stages import s4_simulate
+from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import Workplace
 from tests.analytic.solid_models import block, build
@@ -227,14 +227,14 @@ def test_names_of_files_are_no_facts(tmp_path: Path, root: Path, sources: Source
     graphs = [Graph(load_scene(path)) for path in (root / "scenes" / "checks" / "clamped_rod.toml", other)]
     for one, renamed in zip(*(graph.up_to("post") for graph in graphs), strict=True):
         assert facts(one, {}, sources) == facts(renamed, {}, sources)
-    assert "renamed" not in str(s4_simulate.params(graphs[1].scene))
+    assert "renamed" not in str(simulation.params(graphs[1].scene))
 
 
 def test_libraries_that_write_and_draw_count(sources: Sources) -> None:
     """Also those that are chosen by a name in a call, and those that a library needs in turn."""
-    plain = facts(Task("s", "scene", "flexclear.stages.s3_bundle:run", {}, ""), {}, sources)
+    plain = facts(Task("s", "scene", "flexclear.stages.reduction:run", {}, ""), {}, sources)
     assert plain["library netCDF4"][0].isdigit()
-    drawn = facts(Task("s", "scene", "flexclear.stages.s6_render:run", {}, ""), {}, sources)
+    drawn = facts(Task("s", "scene", "flexclear.stages.rendering:run", {}, ""), {}, sources)
     assert drawn["library vtk"][0].isdigit()
     assert drawn["library pillow"][0].isdigit()
 

@@ -10,24 +10,24 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear import pipeline
-from flexclear.pipeline.core.errors import FlexclearError, InputError
+import flexclear as fc
+from flexclear.commands.__main__ import main
+from flexclear.commands.frequencies import text
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
-from flexclear.stages.__main__ import main
-from flexclear.stages.frequencies import text
 from flexclear.stages.graph import Graph
 
 #: makes one equilibrium in a fresh process and prints the own modules that it loaded
 LOADED = """
 import sys
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.stages import s4_linear
+from flexclear.stages import linearisation
 before = set(sys.modules)
 scene = load_scene(sys.argv[1])
-params = s4_linear.params(scene, None, None, moving=False, vibrations=True)
-s4_linear.run(params, {}, lambda share, text: None)
+params = linearisation.params(scene, None, None, moving=False, vibrations=True)
+linearisation.run(params, {}, lambda share, text: None)
 print(*sorted(n for n in sys.modules.keys() - before if n.split(".")[0] in ("flexclear",)))
 """
 
@@ -75,17 +75,17 @@ def test_a_wrong_time_is_refused(root: Path, capsys: pytest.CaptureFixture[str],
 
 def test_an_unknown_drive_is_refused(root: Path) -> None:
     with pytest.raises(FlexclearError, match="there is no such drive") as told:
-        pipeline.equilibrium(path_of(root, "pendulum"), drives={"motor": 0.1})
+        fc.equilibrium(path_of(root, "pendulum"), drives={"motor": 0.1})
     assert told.value.exit_code == InputError.exit_code
 
 
 def test_an_equilibrium_comes_from_the_cache_and_says_what_its_numbers_mean(root: Path) -> None:
-    first, again = (pipeline.equilibrium(path_of(root, "pendulum")) for _ in range(2))
+    first, again = (fc.equilibrium(path_of(root, "pendulum")) for _ in range(2))
     assert first.identical(again)
     assert "frequency" not in first
     assert first.attrs["Conventions"].startswith("CF-")
     assert first.position.attrs["units"] == "m"
-    both = pipeline.frequencies(path_of(root, "pendulum"))
+    both = fc.frequencies(path_of(root, "pendulum"))
     assert both.frequency.attrs["units"] == "Hz"
     assert both.position.values == pytest.approx(first.position.values, abs=1e-14)
 

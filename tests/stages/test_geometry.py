@@ -11,11 +11,11 @@ import pytest
 from benchmarks.geometry import identify, kinematics, scenes
 from benchmarks.geometry.identify import DANGLE, DZ
 from benchmarks.geometry.kinematics import Layout, answer, jacobians, poses
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.commands.scenes import find_scene
+from flexclear.papers.wang_wang_2019.published import TABLE8
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.post.paper import TABLE8
-from flexclear.stages.run import find_scene
 
 TREE = Path(__file__).resolve().parents[2]
 TAKEN = (0.07, 0.15, 0.35)

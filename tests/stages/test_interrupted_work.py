@@ -14,11 +14,11 @@ from numba import config
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.errors import InputError, StoppedError
-from flexclear.pipeline.core.integrators import INTEGRATORS
-from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError, StoppedError
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import cores, journal, schedule, stopping
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import Task

@@ -11,7 +11,7 @@ import pytest
 
 from flexclear.pipeline.core.artifacts.disk import checked, publish
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.compile import files, folder, machine_code
 from flexclear.pipeline.dynamics.compile.files import bring, claimed, compiled, loaded
 

@@ -14,9 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexclear.pipeline.core.artifacts.disk import read_checked
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.fingerprint import (
+    ABOVE,
     TREE,
     Sources,
     code_digest,
@@ -26,7 +27,7 @@ from flexclear.pipeline.core.workflow.fingerprint import (
     sources_of,
 )
 from flexclear.pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
-from flexclear.stages import s4_simulate, s5_post
+from flexclear.stages import derived_series, simulation
 from flexclear.stages.graph import Graph
 
 LEAVES = (
@@ -91,7 +92,7 @@ def test_reasons_are_words():
 def test_imports_are_found_wherever_they_stand():
     text = b"""
 import numpy as np
-from flexclear.pipeline.core import units
+from flexclear.pipeline.core.scene import units
 from . import near
 from ..far import thing
 from typing import TYPE_CHECKING
@@ -101,7 +102,7 @@ else:
     import scipy.sparse
 def f():
     try:
-        import flexclear.stages.run
+        import flexclear.commands.run
     except ImportError:
         match f:
             case 1:
@@ -109,11 +110,11 @@ def f():
 """
     own, libraries = imported(text, "flexclear.pipeline.post.module", package=False)
     assert {
-        "flexclear.pipeline.core",
-        "flexclear.pipeline.core.units",
+        "flexclear.pipeline.core.scene",
+        "flexclear.pipeline.core.scene.units",
         "flexclear.pipeline.post.near",
         "flexclear.pipeline.far.thing",
-        "flexclear.stages.run",
+        "flexclear.commands.run",
     } <= own
     assert libraries == {"numpy", "scipy", "xarray"}
     own, _ = imported(b"from .near import x", "flexclear.pipeline.post", package=True)
@@ -137,11 +138,11 @@ def test_sources_are_parsed_while_other_threads_parse(monkeypatch: pytest.Monkey
 
 def test_a_closure_holds_every_file_that_its_modules_name(root: Path, sources: Sources):
     """Whatever the search leaves out as the name of something in a module is no file."""
-    closure = sources.closure(["flexclear.stages.s4_simulate", "flexclear.pipeline.post.figures.fig11"])
+    closure = sources.closure(["flexclear.stages.simulation", "flexclear.papers.wang_wang_2019.figures.fig11"])
     named = {name for module in closure.values() for name in module.own} | {
         n for name in closure for n in parents(name)
     }
-    assert {name for name in named if source_file(root, name) is not None} <= closure.keys()
+    assert {name for name in named if source_file(root, name) is not None} <= closure.keys() | ABOVE
 
 
 def test_a_root_that_does_not_exist_is_an_error(root: Path):
@@ -176,7 +177,7 @@ def sources(root: Path) -> Sources:
 @pytest.fixture
 def copy(root: Path, tmp_path: Path) -> Path:
     """Source and scenes, to be edited."""
-    for name in ("flexclear", "pipeline", "stages", "scenes", "meshes"):
+    for name in ("flexclear", "papers", "pipeline", "stages", "scenes", "meshes"):
         shutil.copytree(root / name, tmp_path / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
     return tmp_path
 
@@ -219,7 +220,7 @@ def test_another_sentence_about_a_value_runs_nothing_again(root: Path, sources: 
     edits = {"body.platform.source.mass": "weighed", "joint.A1.source.clearance": "assumed: measured"}
     before, after = (Graph(load_scene(path, override)) for override in ({}, edits))
     assert changed(keys(before, sources), keys(after, sources)) == {"post"}
-    told = s5_post.origins(after.scene)
+    told = derived_series.origins(after.scene)
     assert json.loads(told["sources"])["body.platform.mass"] == "weighed"
     assert json.loads(told["assumptions"])["joint.A1.clearance"] == "assumed: measured"
 
@@ -234,7 +235,7 @@ def test_another_sentence_in_a_recipe_makes_no_mesh_again(root: Path, copy: Path
     )
     before, after = graph(root, "sps4/far_cb"), graph(copy, "sps4/far_cb")
     assert changed(keys(before, sources), keys(after, sources)) == {"post"}
-    told = s5_post.origins(after.scene)
+    told = derived_series.origins(after.scene)
     assert json.loads(told["sources"])["body.rod1.recipe.shape"] == "Table 2"
     assert json.loads(told["assumptions"])["body.rod1.recipe.material"] == "assumed: aluminium"
 
@@ -260,19 +261,19 @@ def test_content_of_the_recipe_counts(root: Path, copy: Path, sources: Sources):
 @pytest.mark.parametrize(
     "module, scenes",
     [
-        ("dynamics/contact/friction/modified_coulomb.py", {"sps4/csj"}),
-        ("dynamics/contact/normal/lankarani_nikravesh.py", {"sps4/csj"}),
-        ("dynamics/joints/prismatic.py", {"sps4/ideal", "sps4/csj", "sps4/far_cb"}),
-        ("structure/modes/reference/craig_bampton.py", {"sps4/far_cb"}),
-        ("dynamics/loads/gravity.py", set()),
-        ("post/figures/fig11.py", set()),
+        ("pipeline/dynamics/contact/friction/modified_coulomb.py", {"sps4/csj"}),
+        ("pipeline/dynamics/contact/normal/lankarani_nikravesh.py", {"sps4/csj"}),
+        ("pipeline/dynamics/joints/prismatic.py", {"sps4/ideal", "sps4/csj", "sps4/far_cb"}),
+        ("pipeline/structure/modes/reference/craig_bampton.py", {"sps4/far_cb"}),
+        ("pipeline/dynamics/loads/gravity.py", set()),
+        ("papers/wang_wang_2019/figures/fig11.py", set()),
     ],
 )
 def test_editing_a_module_reruns_only_scenes_that_reach_it(
     root: Path, sources: Sources, copy: Path, module: str, scenes: set[str]
 ):
     before = {name: keys(graph(root, name), sources) for name in ("sps4/ideal", "sps4/csj", "sps4/far_cb")}
-    path = copy / "pipeline" / module
+    path = copy / module
     path.write_text(path.read_text() + "\nEDITED = 1\n")
     edited = Sources(copy)
     after = {name: keys(graph(root, name), edited) for name in before}
@@ -323,15 +324,15 @@ def test_docstrings_count_where_they_are_titles():
 @pytest.mark.parametrize(
     "module, edit",
     [
-        ("core/system.py", ('"""', '"""More words. ')),
-        ("core/registry.py", ('"""', '"""More words. ')),
-        ("core/scene/validation_errors.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
-        ("core/citations.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
+        ("pipeline/core/system/platforms.py", ('"""', '"""More words. ')),
+        ("pipeline/core/scene/registry.py", ('"""', '"""More words. ')),
+        ("pipeline/core/scene/validation_errors.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
+        ("pipeline/core/scene/citations.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
     ],
 )
 def test_another_word_runs_nothing_again(root: Path, sources: Sources, copy: Path, module: str, edit: tuple[str, str]):
     before = keys(graph(root, "sps4/far_csj_cb"), sources)
-    path = copy / "pipeline" / module
+    path = copy / module
     path.write_text(path.read_text().replace(*edit, 1))
     assert changed(before, keys(graph(root, "sps4/far_csj_cb"), Sources(copy))) == set()
 
@@ -339,21 +340,23 @@ def test_another_word_runs_nothing_again(root: Path, sources: Sources, copy: Pat
 def test_the_memo_of_imports_notices_edits(copy: Path):
     """Closures with and without the memo are the same before and after an edit."""
     memo = copy / "imports.json"
-    roots = ["flexclear.stages.s4_simulate"]
+    roots = ["flexclear.stages.simulation"]
     assert Sources(copy, memo).closure(roots) == Sources(copy).closure(roots)
     assert memo.is_file()
-    path = copy / "stages" / "s4_simulate.py"
-    path.write_text(path.read_text() + "\nimport flexclear.pipeline.core.algebra\nimport wave\nimport meshio\n")
+    path = copy / "stages" / "simulation.py"
+    path.write_text(
+        path.read_text() + "\nimport flexclear.pipeline.core.numerics.rotations\nimport wave\nimport meshio\n"
+    )
     edited = Sources(copy, memo).closure(roots)
     assert edited == Sources(copy).closure(roots)
-    assert "meshio" in edited["flexclear.stages.s4_simulate"].libraries
+    assert "meshio" in edited["flexclear.stages.simulation"].libraries
     memo.write_text("{ not json")
     assert Sources(copy, memo).closure(roots) == edited
 
 
 def test_a_process_reads_its_own_sources_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """What it runs was loaded then; a memo that is begun later holds all of them all the same."""
-    roots, memo = ["flexclear.stages.s4_simulate"], tmp_path / "imports.json"
+    roots, memo = ["flexclear.stages.simulation"], tmp_path / "imports.json"
     known = sources_of(TREE).closure(roots)
     with monkeypatch.context() as patch:
         patch.setattr(Sources, "_parse", lambda self, path, name: pytest.fail(f"{name} is read again"))
@@ -365,7 +368,7 @@ def test_a_process_reads_its_own_sources_once(tmp_path: Path, monkeypatch: pytes
 
 def test_library_versions_count(root: Path):
     task = Task(
-        "s", "scene", "flexclear.stages.s3_bundle:run", {}, "", modules=("flexclear.pipeline.structure.kinds.beam",)
+        "s", "scene", "flexclear.stages.reduction:run", {}, "", modules=("flexclear.pipeline.structure.kinds.beam",)
     )
     found = facts(task, {}, Sources(root))
     assert {"library numpy", "library scikit-fem", "library skfem", "library xarray"} & found.keys() >= {
@@ -384,7 +387,7 @@ def test_a_scene_survives_the_way_through_its_parameters(root: Path):
             continue
         scene = load_scene(path)
         told = {"name": scene.name, "limits": scene.limits.written()}  # the context of its task
-        again = s4_simulate.rebuild({**told, **s4_simulate.params(scene, ensemble=True)}, {})
+        again = simulation.rebuild({**told, **simulation.params(scene, ensemble=True)}, {})
         assert again.name == scene.name
         left_out = {"title", "description", "accuracy", "sections", "view"}
         one, other = scene.model_dump(exclude=left_out), again.model_dump(exclude=left_out)

@@ -14,14 +14,15 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core import machine
-from flexclear.pipeline.core.errors import InputError, ResourceError
+from flexclear.commands import cost, sections
+from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.scene.limits import check_cells
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
 from flexclear.pipeline.core.scene.resource_estimate import check_run, row
+from flexclear.pipeline.core.system import machine
+from flexclear.pipeline.core.system.errors import InputError, ResourceError
 from flexclear.pipeline.structure.fe.exchange import files
-from flexclear.stages import cost, s4_simulate, sections
-from flexclear.stages.__main__ import main
+from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
 from tests.stages.conftest import JOINT, SCENE
 
@@ -76,7 +77,7 @@ def test_rows_and_members_are_limits_that_a_scene_may_raise(
     load_scene(path, limits | {"output.interval": "1e-12 s", "ensemble.members": 200_000})
     raised = load_scene(path, limits | {"output.interval": "1e-12 s"})
     for told in ({}, {"limits": raised.limits.written()}):  # made again by a stage, which may not be told them
-        assert s4_simulate.rebuild(s4_simulate.params(raised) | told).output.interval == 1e-12
+        assert simulation.rebuild(simulation.params(raised) | told).output.interval == 1e-12
     with pytest.raises(ResourceError, match=r"limits\.rows"):
         with_numbers(load_scene(path), {"output.interval": 1e-12})
     (tmp_path / "many.toml").write_text(
@@ -89,10 +90,10 @@ def test_rows_and_members_are_limits_that_a_scene_may_raise(
 def test_limits_are_no_facts_and_reach_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     plain = load_scene(written(tmp_path, SCENE + JOINT))
     limited = load_scene(written(tmp_path, SCENE + JOINT + '[limits]\nmemory = "10 kB"\n'))
-    assert s4_simulate.params(plain) == s4_simulate.params(limited)
+    assert simulation.params(plain) == simulation.params(limited)
     task = Graph(limited).simulate
     with pytest.raises(ResourceError, match="10 kB are allowed"):
-        s4_simulate.run({**task.params, **task.context}, {}, lambda fraction, text: None)
+        simulation.run({**task.params, **task.context}, {}, lambda fraction, text: None)
 
 
 @pytest.mark.parametrize("family", ["body", "joint"])
@@ -182,7 +183,7 @@ def test_a_page_that_the_disk_has_no_room_for_is_told_by_its_place(
 
 #: a figure of a run, in this process
 DRAWN = """
-from flexclear.stages.run import graphs, open_workplace
+from flexclear.commands.scenes import graphs, open_workplace
 (graph,) = graphs(["checks/pendulum"])
 print([failure.message for failure in open_workplace().bring([graph.overview], jobs=1).failures])
 """

@@ -69,8 +69,10 @@ def test_freed_memory_is_kept_where_that_is_asked_for(root: Path) -> None:
 
 def test_a_command_looks_for_no_garbage_at_its_end(root: Path) -> None:
     """Handlers of the end are called last first: this one after the command's own, which sets all objects aside."""
-    code = "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count())); import flexclear.stages.__main__"
-    told = f"{code}; flexclear.stages.__main__.main()"  # ends when it has said the version, and has set nothing aside
+    code = (
+        "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count())); import flexclear.commands.__main__"
+    )
+    told = f"{code}; flexclear.commands.__main__.main()"  # ends when it has said the version, and has set nothing aside
     command = [sys.executable, "-c", told, "--version"]
     done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
     assert int(done.stdout.split()[-1]) > 1000  # objects; there are tens of thousands

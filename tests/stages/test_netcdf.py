@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.commands.new import write
 from flexclear.pipeline.core.artifacts import netcdf, store
 from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays, labelled, of
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.stages.graph import Graph
-from flexclear.stages.new import write
 from flexclear.stages.workplace import open_workplace
 
 

@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.commands import scenes
+from flexclear.commands.__main__ import main
+from flexclear.commands.as_json import as_json
+from flexclear.commands.check import examined
+from flexclear.commands.new import KINDS, TEMPLATES, write
 from flexclear.pipeline.core.artifacts.paths import results_root
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.json_schema import scene_schema
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.plausibility import implausible
-from flexclear.stages import run
-from flexclear.stages.__main__ import main
-from flexclear.stages.as_json import as_json
-from flexclear.stages.check import examined
-from flexclear.stages.new import KINDS, TEMPLATES, write
+from flexclear.pipeline.core.system.errors import InputError
 from tests.stages.typical_mistakes import MISTAKES, WARNED
 
 REPORTED = dict(
@@ -204,7 +204,7 @@ def test_completion_knows_every_command_and_its_options(shell: str, capsys: pyte
 
 def test_a_value_is_changed_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     scene, _ = write("slider-crank", tmp_path)
-    graph = run.graphs([str(scene)], ["joint.pin.clearance=0.3 mm", "solver.rtol=1e-6"])[0]
+    graph = scenes.graphs([str(scene)], ["joint.pin.clearance=0.3 mm", "solver.rtol=1e-6"])[0]
     assert graph.scene.joint["pin"].clearance == pytest.approx(3e-4, rel=1e-12)
     assert graph.scene.solver.rtol == 1e-6
     assert "joint.pin.clearance=0.3_mm" in graph.simulate.folder  # the results of the file stay

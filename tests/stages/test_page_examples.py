@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from flexclear.stages.__main__ import main
-from flexclear.stages.new import write
+from flexclear.commands.__main__ import main
+from flexclear.commands.new import write
 
 
 def blocks(page: Path, language: str) -> list[str]:

@@ -14,11 +14,11 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import SolverError, StoppedError
-from flexclear.pipeline.core.progress import Progress, silent
-from flexclear.pipeline.core.quantities import LASTING
+from flexclear.pipeline.core.artifacts.quantities import LASTING
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError, StoppedError
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import cores, journal, stopping
 from flexclear.pipeline.dynamics.run import horizon, progress_rate, specialised, trajectory
 from flexclear.pipeline.dynamics.run.engine import Engine

@@ -13,14 +13,17 @@ import xarray as xr
 from scipy.optimize import brentq
 
 import flexclear as fc
-from flexclear.pipeline.core.effect_size import Influence
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import silent
+from flexclear.commands import plan
+from flexclear.commands.__main__ import main
+from flexclear.commands.new import write
+from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.coupling import uncoupled
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.linear.clearance_response import RANK, Bounds, bounds, lever_of
 from flexclear.pipeline.dynamics.linear.response import Response, first_excited, response, vibration
 from flexclear.pipeline.dynamics.model.constraints import constraints
@@ -30,11 +33,9 @@ from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.search import summed
 from flexclear.pipeline.dynamics.plan.tolerance import no_dearer
 from flexclear.pipeline.dynamics.run.run import Run, integrate
-from flexclear.pipeline.post.plan import verdict as judged
-from flexclear.stages import plan, s4_simulate, s4_watched, s8_plan
-from flexclear.stages.__main__ import main
+from flexclear.pipeline.post.answers.plan import verdict as judged
+from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.graph import Graph
-from flexclear.stages.new import write
 from flexclear.stages.workplace import FailedTasksError, open_workplace
 
 #: of the leg's rod [m, Pa, kg/m^3], and what stands on it [kg]
@@ -56,18 +57,18 @@ def _bounds(scene: Scene, chosen: list[Quantity]) -> Bounds:
 def _response(scene: Scene, chosen: list[Quantity]) -> Response:
     """Of a scene's flexible bodies, from the run of its ideal twin."""
     ideal, inputs = _ideal(scene)
-    return response(ideal, s4_simulate.bundles(inputs), chosen)
+    return response(ideal, simulation.bundles(inputs), chosen)
 
 
 def _ideal(scene: Scene) -> tuple[Run, dict[str, xr.Dataset]]:
     """The run of a scene's ideal twin, and what is known of its bodies."""
-    place, task = open_workplace(), s8_plan.task(edited(scene, {"accuracy": {"quantities": {}}}))
+    place, task = open_workplace(), effect_plan.task(edited(scene, {"accuracy": {"quantities": {}}}))
     outcome = place.bring(list(task.inputs.values()), 1)
     inputs = {name: place.store.load(outcome.records[id(below)]) for name, below in task.inputs.items()}
     gone = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
-    bare = s4_watched.plain(variants.without(scene, gone))
+    bare = watched_quantities.plain(variants.without(scene, gone))
     rigid = {name: inputs[name] for name in Graph(bare, shown=False).bodies()}
-    return integrate(s4_simulate.rebuild(s4_simulate.params(bare), rigid), {}, silent), inputs
+    return integrate(simulation.rebuild(simulation.params(bare), rigid), {}, silent), inputs
 
 
 def _standing_leg(tmp_path: Path) -> Scene:
@@ -160,11 +161,11 @@ def test_fewer_modes_to_choose_from_are_the_static_ones_and_half_of_the_others(t
     leg = load_scene(write("leg", tmp_path)[0])
     assert leg.body["rod"].modes.count == 13
     # six static modes, seven others, of which two pairs are nearest to half
-    assert s8_plan.levels(leg) == ({"rod": 6}, {"rod": 10})
+    assert effect_plan.levels(leg) == ({"rod": 6}, {"rod": 10})
     free = edited(leg, {"body.rod.modes": {"reference": "free-free", "count": 8}})
-    assert s8_plan.levels(free) == ({"rod": 4},)
+    assert effect_plan.levels(free) == ({"rod": 4},)
     ratios = edited(leg, {"body.rod.damping": {"ratios": [0.01] * 13}})
-    assert s8_plan.levels(ratios) == ()
+    assert effect_plan.levels(ratios) == ()
 
 
 def test_a_quantity_that_no_bound_holds_for_is_not_bounded_by_those_of_others():

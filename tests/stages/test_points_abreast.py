@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.record import point as points_of
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.run import alike, batched_evaluation
-from flexclear.stages import sweep_engine, sweep_points
+from flexclear.stages.sweeps import sweep_engine, sweep_points
 
 SIDE_BY_SIDE = stacks.supported() and not INTERPRETED
 BALL = ("ball.velocity.largest", "contact.peak_force", "contact.impact_times.last", "ball.position.final")

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from flexclear.pipeline.core.log import LOG, set_level, write_to
+from flexclear.pipeline.core.system.log import LOG, set_level, write_to
 from flexclear.pipeline.core.workflow.progress import Monitor, duration
 
 

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
+from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.post.overview.overlay import colors
-from flexclear.stages.__main__ import main
 from flexclear.stages.graph import Graph
 
 SCENE = "checks/clamped_rod"
@@ -69,7 +69,7 @@ def test_a_model_has_the_same_colour_in_every_figure():
         found = xr.Dataset(attrs={"parameters": json.dumps({"body": body})})
         return found.expand_dims(contact=["A"]) if contact else found
 
-    from flexclear.pipeline.post import models
+    from flexclear.papers.wang_wang_2019 import models
 
     both = colors(
         {"ideal": run(0, None), "csj": run(1, None), "cb": run(0, "craig-bampton"), "free": run(1, "free-free")}

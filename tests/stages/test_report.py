@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from flexclear.papers.wang_wang_2019.tasks import Scenes, figure_tasks
 from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order
-from flexclear.stages.paper_report import Scenes, figure_tasks
 from flexclear.stages.workplace import Workplace
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 FIRST = """
 import numpy, scipy.linalg
-from flexclear.stages.run import graphs, open_workplace
+from flexclear.commands.scenes import graphs, open_workplace
 (graph,) = graphs(["checks/clamped_rod"])
 done = open_workplace().bring(list(graph.bundle.values()), jobs=1)
 print(*(done.records[id(task)].digest for task in graph.bundle.values()))
@@ -58,7 +58,7 @@ def test_a_task_has_one_thread_and_looks_for_more_only_where_there_may_be(root: 
 #: docstrings of a module, a class and a compiled kernel, which become references, titles and meanings of keys
 DOCSTRINGS = """
 from importlib import import_module
-from flexclear.pipeline.core.citations import docstring
+from flexclear.pipeline.core.scene.citations import docstring
 places = [("integrate.dop853", ""), ("contact.normal.hertz", ""), ("contact.normal.hertz", "Hertz")]
 for module, name in places:
     thing = import_module(f"flexclear.pipeline.dynamics.{module}")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import flexclear as fc
-from flexclear.stages.__main__ import main
+from flexclear.commands.__main__ import main
 
 SCENE = "checks/pendulum"
 

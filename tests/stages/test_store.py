@@ -17,7 +17,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts import disk, netcdf
 from flexclear.pipeline.core.artifacts.disk import publish
 from flexclear.pipeline.core.artifacts.store import Record, Store, write_dataset
-from flexclear.pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.system.errors import ResourceError
 
 KEY = "k" * 32
 

@@ -14,21 +14,22 @@ import pytest
 import xarray as xr
 from scipy.special import ellipk
 
-from flexclear import pipeline
+import flexclear as fc
+from flexclear.commands import sweep
+from flexclear.commands.__main__ import main
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.errors import InputError, ResourceError
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.design import design
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
-from flexclear.pipeline.core.units import udunits
+from flexclear.pipeline.core.scene.units import udunits
+from flexclear.pipeline.core.system.errors import InputError, ResourceError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
 from flexclear.pipeline.dynamics.run import engine
-from flexclear.pipeline.post.sweep import figures
-from flexclear.stages import sweep, sweep_plan
-from flexclear.stages.__main__ import main
-from flexclear.stages.s4_simulate import modules
+from flexclear.pipeline.post.overview.sweep_figures import figures
+from flexclear.stages.simulation import modules
+from flexclear.stages.sweeps import sweep_plan
 
 GRAVITY = 9.81
 
@@ -38,9 +39,7 @@ def test_a_pendulum_is_back_after_its_period_whatever_its_length(root: Path):
     lengths = np.array([0.3, 1.0, 2.5])
     periods = 4.0 * ellipk(0.5) * np.sqrt(lengths / GRAVITY)
     vary = {"body.bob.com.0": -lengths, "time.end": periods}
-    found = pipeline.sweep(
-        root / "scenes/checks/pendulum.toml", vary, ["bob.position.final"], combine="list", workers=1
-    )
+    found = fc.sweep(root / "scenes/checks/pendulum.toml", vary, ["bob.position.final"], combine="list", workers=1)
     assert found["bob.position.final"].dims == ("point", "axis")
     away = found["bob.position.final"].values + np.outer(lengths, [1.0, 0.0, 0.0])
     # a miss of the position is quadratic in that of the time, where the pendulum rests; measured 1e-7 of the length
@@ -53,7 +52,7 @@ def test_a_grid_has_its_parameters_as_dimensions_and_coordinates_in_si(root: Pat
         "body.bob.com.0": {"from": "-50 cm", "to": "-2 m", "count": 3},
         "load.gravity.acceleration.1": ["-9.81 m/s^2", "-1.62 m/s^2"],
     }
-    found = pipeline.sweep(
+    found = fc.sweep(
         root / "scenes/checks/pendulum.toml", vary, ["bob.velocity.largest"], set={"output.interval": "5 ms"}, workers=1
     )
     speed = found["bob.velocity.largest"]
@@ -83,7 +82,7 @@ def test_a_point_is_what_the_reductions_of_a_run_are(root: Path):
     keep += ["contact.peak_force", "contact.impulse", "contact.impact_times.count", "contact.impact_times.first"]
     keep += ["contact.force.largest", "ball.orientation.final"]
     values = [0.6, 0.8]
-    found = pipeline.sweep(path, {"joint.contact.normal.restitution": values}, keep, workers=1)
+    found = fc.sweep(path, {"joint.contact.normal.restitution": values}, keep, workers=1)
     for k, value in enumerate(values):
         one = dynamics.simulate(load_scene(path, override={"joint.contact.normal.restitution": value}), {}, silent)
         here, velocity = found.isel({"joint.contact.normal.restitution": k}), one["velocity"].sel(body="ball").values
@@ -112,7 +111,7 @@ def test_sections_of_a_point_are_those_of_the_repeated_motion(root: Path):
     path, count = root / "scenes/checks/driven_pendulum.toml", {"sections.transient": 2, "sections.periods": 20}
     keep = ["bob.position.sections", "bob.angular_velocity.sections", "norm(bob.velocity).sections", "kinetic.sections"]
     vary = {"load.torque.force.amplitude": [0.9, 1.5]}
-    found = pipeline.sweep(path, vary, keep, set=count, workers=1)
+    found = fc.sweep(path, vary, keep, set=count, workers=1)
     asked = {"load.torque.force.amplitude": 1.5, "sections.exponent_periods": 20, **count}
     whole = dynamics.sections(load_scene(path, override=asked), {}, silent)
     here = found.isel({"load.torque.force.amplitude": 1})
@@ -128,7 +127,7 @@ def test_sections_of_a_point_are_those_of_the_repeated_motion(root: Path):
 def test_the_error_that_is_told_is_the_error(root: Path):
     """The oscillator's closed form says how far off a value is; the difference from the tighter run says the same."""
     keep = ["mass.position.final"]
-    found = pipeline.sweep(
+    found = fc.sweep(
         root / "scenes/checks/oscillator.toml",
         {"load.spring.stiffness": [150.0, 250.0]},
         keep,
@@ -148,9 +147,9 @@ def test_the_error_that_is_told_is_the_error(root: Path):
 
 def test_more_values_take_the_finished_points_over(root: Path, fresh: Path, asked: list[str]):
     scene, keep = root / "scenes/checks/pendulum.toml", ["bob.velocity.final"]
-    first = pipeline.sweep(scene, {"body.bob.com.0": [-1.0, -2.0]}, keep, workers=1)
+    first = fc.sweep(scene, {"body.bob.com.0": [-1.0, -2.0]}, keep, workers=1)
     asked.clear()
-    second = pipeline.sweep(scene, {"body.bob.com.0": [-3.0, -2.0, -1.0]}, keep, workers=1)
+    second = fc.sweep(scene, {"body.bob.com.0": [-3.0, -2.0, -1.0]}, keep, workers=1)
     assert len(asked) == 1
     assert second.sel({"body.bob.com.0": [-1.0, -2.0]}).equals(first)
 
@@ -159,7 +158,7 @@ def test_refused_points_keep_their_reason_and_are_not_tried_again(root: Path, fr
     arguments = (root / "scenes/checks/pendulum.toml", {"solver.evaluations": [100, 100_000]}, ["bob.velocity.final"])
     for requested in (2, 0):
         asked.clear()
-        found = pipeline.sweep(*arguments, workers=1)
+        found = fc.sweep(*arguments, workers=1)
         assert len(asked) == requested
         assert found["status"].values.tolist() == [1, 0]
         assert "evaluations" in str(found["reason"].values[0])
@@ -197,7 +196,7 @@ def test_members_give_mean_and_deviation(root: Path):
     """Neighbouring starts of a bouncing ball part with every impact; the first one is the same to their distance."""
     path, keep = root / "scenes/checks/bounce.toml", ["contact.impact_times.first", "ball.velocity.final"]
     vary = {"joint.contact.normal.restitution": [0.7]}
-    found = pipeline.sweep(path, vary, keep, members=4, workers=1).isel({"joint.contact.normal.restitution": 0})
+    found = fc.sweep(path, vary, keep, members=4, workers=1).isel({"joint.contact.normal.restitution": 0})
     drop = np.sqrt(2.0 * 0.1 / GRAVITY)
     # starts are 1e-8 m apart, which the speed of the impact turns into less than 1e-8 s
     assert float(found["contact.impact_times.first"]) == pytest.approx(drop, abs=1e-7)
@@ -263,7 +262,7 @@ def test_what_turns_is_told_in_the_units_of_turning(root: Path):
 def test_a_force_at_some_points_that_is_a_torque_at_others_is_refused(root: Path):
     vary = {"drive.turning.coordinate": ["rotation", "translation"]}
     with pytest.raises(InputError, match="a force at some points and a torque at others"):
-        pipeline.sweep(root / "scenes/checks/spindle.toml", vary, ["turning.drive_force.rms"], workers=1)
+        fc.sweep(root / "scenes/checks/spindle.toml", vary, ["turning.drive_force.rms"], workers=1)
 
 
 def test_units_of_parameters_are_read_by_other_programs():
@@ -309,7 +308,7 @@ def test_every_kind_of_sweep_has_a_figure_of_equal_bytes(root: Path):
     ]
     pictures = set()
     for kind in kinds:
-        found = pipeline.sweep(scene, kind.pop("vary"), keep, workers=1, **kind)
+        found = fc.sweep(scene, kind.pop("vary"), keep, workers=1, **kind)
         drawn = figures(found)
         assert drawn == figures(found)
         assert set(drawn) == {"sweep.png", "sweep.svg"}
@@ -359,7 +358,7 @@ for name in list(before):
     if name.startswith("flexclear.pipeline.dynamics"):
         del sys.modules[name]
 before = set(sys.modules)
-from flexclear.stages.sweep_points import work
+from flexclear.stages.sweeps.sweep_points import work
 (point,), _ = work(family.key, pickle.dumps(family.work), [job.point], True)
 assert not point.refused, point.refused
 print(*sorted(name for name in set(sys.modules) - before if name.split(".")[0] == "flexclear"))
@@ -372,7 +371,7 @@ def test_every_module_that_a_point_runs_is_in_its_key(root: Path, fresh: Path):
         [sys.executable, "-c", LOADED, str(path)], cwd=root, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    known = Sources(root).closure(["flexclear.stages.sweep_points", STORE, *modules(load_scene(path))]).keys()
+    known = Sources(root).closure(["flexclear.stages.sweeps.sweep_points", STORE, *modules(load_scene(path))]).keys()
     loaded = set(done.stdout.split())
     assert len(loaded) > 20
     assert loaded <= known

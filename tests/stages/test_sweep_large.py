@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from flexclear import pipeline
-from flexclear.pipeline.core.errors import ResourceError
-from flexclear.stages import sweep_large
-from flexclear.stages.__main__ import main
+import flexclear as fc
+from flexclear.commands.__main__ import main
+from flexclear.pipeline.core.system.errors import ResourceError
+from flexclear.stages.sweeps import sweep_large
 
 SWEEP = """
 scene = "checks/pendulum"
@@ -66,8 +66,6 @@ def test_what_fits_nowhere_is_refused_before_it_is_run(
     assert _dataset(tmp_path / "small.toml", "", "grid", f"--out={tmp_path / 'x.zarr'}") == 2
     few = {"limits.memory": "1 kB"}
     with pytest.raises(ResourceError, match="keep less"):
-        pipeline.sweep(
-            root / "scenes/checks/pendulum.toml", {"body.bob.mass": [1.0, 2.0]}, ["bob.position.series"], set=few
-        )
+        fc.sweep(root / "scenes/checks/pendulum.toml", {"body.bob.mass": [1.0, 2.0]}, ["bob.position.series"], set=few)
     monkeypatch.undo()
     assert asked == []

@@ -17,10 +17,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from flexclear.commands import sweep
+from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.errors import InputError, ResourceError
-from flexclear.stages import sweep, sweep_engine, sweep_plan
-from flexclear.stages.__main__ import main
+from flexclear.pipeline.core.system.errors import InputError, ResourceError
+from flexclear.stages.sweeps import sweep_engine, sweep_plan
 from flexclear.stages.workplace import open_workplace
 from tests.stages.conftest import PATIENCE
 from tests.stages.sweeps import begun, flexclear, pendulum

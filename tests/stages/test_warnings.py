@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flexclear.pipeline import load_scene
-from flexclear.stages.s4_simulate import missing_compliance
+from flexclear import load_scene
+from flexclear.stages.simulation import missing_compliance
 from tests.analytic.mechanism_runs import bundles
 
 SPS4 = Path(__file__).parents[2] / "scenes" / "sps4"

@@ -14,7 +14,7 @@ import pytest
 
 from flexclear.pipeline.core.artifacts.paths import TREE
 from flexclear.pipeline.core.artifacts.store import Store
-from flexclear.pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.workflow import cores, stopping, workers
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.progress import Monitor
@@ -72,7 +72,7 @@ def test_workers_of_what_failed_or_was_stopped_are_not_kept(end: Callable[[], No
 def test_what_failed_in_a_worker_is_the_task_that_was_asked_for(tmp_path: Path) -> None:
     """Whoever asks for pictures, and can do without them, looks which of its tasks failed; a worker has copies."""
     # without the run that it is of, it cannot be done
-    tasks = [Task("post", scene, "flexclear.stages.s5_post:run", {"of": scene}, "") for scene in ("a", "b")]
+    tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in ("a", "b")]
     outcome = bring(tasks, Store(tmp_path), Sources(TREE), Monitor(), 2)
     assert {id(failure.task) for failure in outcome.failures} == {id(task) for task in tasks}
 
@@ -87,7 +87,7 @@ from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.schedule import bring
 from flexclear.pipeline.core.workflow.task import Task
 print("once", flush=True)
-tasks = [Task("post", scene, "flexclear.stages.s5_post:run", {"of": scene}, "") for scene in "ab"]
+tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in "ab"]
 print(len(bring(tasks, Store(Path(sys.argv[1])), Sources(TREE), Monitor(), 2).failures))
 """
 

@@ -63,7 +63,7 @@ def test_equal_results_stop_the_chain(project: Project):
     project.run("run", "tiny/ideal")
     project.calls()
     first = "from __future__ import annotations\n"
-    project.edit("stages/s4_simulate.py", first, first + "\nEDITED = 1\n")
+    project.edit("stages/simulation.py", first, first + "\nEDITED = 1\n")
     project.run("run", "tiny/ideal", "--to", "simulate")
     assert project.calls() == ["simulate tiny/ideal"]
     assert "post             fresh" in project.run("why", "tiny/ideal").stdout
@@ -130,7 +130,7 @@ def test_a_solver_that_gives_up_stops_only_what_depends_on_it(project: Project, 
 
 def test_a_full_disk_ends_with_4_and_leaves_nothing(project: Project):
     code = (
-        "import resource, sys; from flexclear.stages.__main__ import main;"
+        "import resource, sys; from flexclear.commands.__main__ import main;"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY)); sys.exit(main(['run', 'tiny/ideal']))"
     )
     import subprocess
@@ -183,9 +183,9 @@ def test_an_edited_scene_does_not_take_the_place_of_its_file(project: Project):
     shown = project.results / "runs" / "tiny" / "contact" / "run.nc"
     before = shown.read_bytes()
     code = (
-        "from flexclear import pipeline\n"
-        "scene = pipeline.load_scene('scenes/tiny/contact.toml', override={'output.interval': '1 ms'})\n"
-        "run = pipeline.run(scene)\n"
+        "import flexclear as fc\n"
+        "scene = fc.load_scene('scenes/tiny/contact.toml', override={'output.interval': '1 ms'})\n"
+        "run = fc.run(scene)\n"
         "print(float(run.time[1]), run.attrs['title'])"
     )
     command = [sys.executable, "-c", code]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import pi
 
 from flexclear.pipeline.core.scene.laws import Cycloidal
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 
 

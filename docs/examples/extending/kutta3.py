@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics.integrate import hermite
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing
 from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages

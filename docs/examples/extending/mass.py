@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from flexclear.stages import run
+from flexclear.commands import scenes
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,6 +14,6 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print a line for each scene."""
-    for graph in run.graphs(options.scenes):
+    for graph in scenes.graphs(options.scenes):
         total = sum(body.mass for body in graph.scene.rigid().values())
         print(f"{graph.scene.name}: {total:.6g} kg")

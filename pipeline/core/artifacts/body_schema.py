@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.variable import Schema, Variable
+from flexclear.pipeline.core.scene.variable import Schema, Variable
 
 _V = Variable
 

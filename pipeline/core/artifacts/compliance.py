@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.numerics.rotations import skew
 
 #: directions of a frame's motion, in its own axes
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")

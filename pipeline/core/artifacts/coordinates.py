@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays
-from flexclear.pipeline.core.variable import Schema, Variable
+from flexclear.pipeline.core.scene.variable import Schema, Variable
 
 AXES = ("x", "y", "z")
 QUATERNION = ("w", "x", "y", "z")

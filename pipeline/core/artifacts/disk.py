@@ -22,8 +22,8 @@ from pathlib import Path
 from threading import Thread
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core import system
-from flexclear.pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.system import platforms
+from flexclear.pipeline.core.system.errors import ResourceError
 
 if TYPE_CHECKING:
     from filelock import FileLock
@@ -76,7 +76,7 @@ def publish(path: Path, content: bytes) -> str:
         if made.read_bytes() != content:
             raise OSError(errno.EIO, "what was written does not read back", str(path))
         digest = settle(made, path)
-    system.sync_folder(path.parent)
+    platforms.sync_folder(path.parent)
     return digest
 
 
@@ -94,7 +94,7 @@ def settle(made: Path, path: Path) -> str:
             failed.append(error)
 
     writer = Thread(target=write)
-    if not system.started(writer):
+    if not platforms.started(writer):
         write()
     try:
         digest = digest_of(made)
@@ -103,7 +103,7 @@ def settle(made: Path, path: Path) -> str:
             writer.join()
     if failed:
         raise failed[0]
-    system.replace(made, path)
+    platforms.replace(made, path)
     return digest
 
 
@@ -138,12 +138,12 @@ def copy(source: Path, target: Path) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
     with temporary(target) as made:
         with source.open("rb") as old, made.open("wb") as new:
-            if not system.share_blocks(old, new):
+            if not platforms.share_blocks(old, new):
                 shutil.copyfileobj(old, new, PIECE)
         status = source.stat()
         os.utime(made, ns=(status.st_atime_ns, status.st_mtime_ns))
         made.chmod(0o444)
-        system.replace(made, target)
+        platforms.replace(made, target)
 
 
 def is_copy(source: Path, target: Path) -> bool:
@@ -165,7 +165,7 @@ def temporary(path: Path) -> Iterator[Path]:
         yield made
     finally:
         with contextlib.suppress(PermissionError):  # a library that failed has it still open, on Windows: `sweep` will
-            system.remove(made)
+            platforms.remove(made)
 
 
 @contextlib.contextmanager
@@ -186,7 +186,7 @@ def locked(path: Path, *, wait: bool = True, waiting: Callable[[], None] = lambd
     """
     from filelock import FileLock  # here, since what finds everything fresh locks nothing
 
-    system.set_aside(path)
+    platforms.set_aside(path)
     lock = FileLock(path, thread_local=False, fallback_to_soft=False)
     mine = _acquire(lock, wait=False)
     if mine is None and wait:
@@ -257,7 +257,7 @@ def _abandoned(path: Path) -> bool:
         return False  # none of ours
     if match["host"] != _host():
         return _old(path)
-    return not system.alive(int(match["pid"]))
+    return not platforms.alive(int(match["pid"]))
 
 
 def _old(path: Path) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.compliance import fractions, of_bundle
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 
 #: dimensions that count modes
 DIMENSIONS = ("mode", "mode2")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from flexclear.pipeline.core.version import version
+from flexclear.pipeline.core.system.version import version
 
 #: folder that holds the packages `pipeline` and `stages`: `flexclear`, or, where links are not followed, a checkout
 PACKAGES = Path(__file__).absolute().parents[3]

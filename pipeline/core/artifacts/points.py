@@ -12,7 +12,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.schema import AXES, CONVENTIONS, QUATERNION
 from flexclear.pipeline.core.scene.design import Axis, Design
 from flexclear.pipeline.core.scene.quantity import Recorded
-from flexclear.pipeline.core.units import udunits
+from flexclear.pipeline.core.scene.units import udunits
 
 Values = dict[str, np.ndarray]
 #: what became of a point

@@ -14,10 +14,10 @@ import numpy as np
 from flexclear.pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATRICES, MESH, MODES, RIGID, SOLID, STRESS
 from flexclear.pipeline.core.artifacts.coordinates import AXES, COORDINATES, QUATERNION, turning, with_names
 from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays, of
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.run_schema import RUN
-from flexclear.pipeline.core.variable import Schema, Variable
-from flexclear.pipeline.core.version import DISTRIBUTION, version
+from flexclear.pipeline.core.scene.variable import Schema, Variable
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.version import DISTRIBUTION, version
 
 if TYPE_CHECKING:
     import xarray as xr

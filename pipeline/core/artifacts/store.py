@@ -17,7 +17,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.pipeline.core import system
 from flexclear.pipeline.core.artifacts.disk import (
     checked,
     copy,
@@ -33,7 +32,8 @@ from flexclear.pipeline.core.artifacts.disk import (
     sweep,
     temporary,
 )
-from flexclear.pipeline.core.errors import ResourceError, shown
+from flexclear.pipeline.core.system import platforms
+from flexclear.pipeline.core.system.errors import ResourceError, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -191,14 +191,14 @@ class Store:
     def _keep_edited(self, target: Path, name: str, folder: str, label: str) -> None:
         """Move a shown file out of the way that is neither of the artifact shown last nor of any other."""
         last = self.last(folder, label)
-        system.set_aside(target)
+        platforms.set_aside(target)
         if not target.is_file() or target.is_symlink():
             return
         # of what is not known to have been shown, what could be written to is not ours
         known = last.files.get(name) if last is not None else None
         if digest_of(target) != known if known else target.stat().st_mode & 0o222:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
-            system.replace(target, aside)
+            platforms.replace(target, aside)
             self.say(
                 f"{self._shown(target)} was edited; the edit is stored as {aside.name}, and the result shown again"
             )
@@ -332,7 +332,7 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
     from flexclear.pipeline.core.artifacts.labelled import of  # here, since what finds everything fresh writes nothing
 
     digest = _written(path, of(dataset))
-    system.sync_folder(path.parent)
+    platforms.sync_folder(path.parent)
     return digest
 
 

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from flexclear.pipeline.core import system
 from flexclear.pipeline.core.artifacts.disk import digest_of, read_checked, sha256
 from flexclear.pipeline.core.artifacts.store import FAMILY, PARTIAL, Record, Store, read_record
+from flexclear.pipeline.core.system import platforms
 
 #: what is next to artifacts and is none of their files
 BESIDE = (".json", ".lock", ".names", ".part", ".tmp")
@@ -87,7 +87,7 @@ def remove(store: Store, artifact: Artifact) -> None:
 
 def take_away(path: Path) -> None:
     """Remove a file; a folder of its name is renamed."""
-    system.set_aside(path)
+    platforms.set_aside(path)
     path.unlink(missing_ok=True)
 
 

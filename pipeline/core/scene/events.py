@@ -8,15 +8,15 @@ from typing import Annotated, Any, Self
 
 from pydantic import BeforeValidator, TypeAdapter, ValidationError, WithJsonSchema, model_validator
 
-from flexclear.pipeline.core.event_kinds import CHANGES
-from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import Drive, JointDrive, PathDrive
+from flexclear.pipeline.core.scene.event_kinds import CHANGES
 from flexclear.pipeline.core.scene.fields import Part, PartName
 from flexclear.pipeline.core.scene.loads import Load, SampledPid
 from flexclear.pipeline.core.scene.owners import COORDINATES
 from flexclear.pipeline.core.scene.quantity import condition
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.scene.units import quantity
 
 #: families of the parts that each may name
 NAMED = {

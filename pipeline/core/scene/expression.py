@@ -1,22 +1,25 @@
-"""Expressions of quantities: the grammar, and the check of their units.
+"""Expressions: one grammar of what is watched and of loads, and the check of their units.
 
-Numbers with units and quantities, ``+ - * / ^``, parentheses and `FUNCTIONS`. An expression is read
+Numbers with units, named constants and quantities, ``+ - * / ^``, parentheses and `FUNCTIONS`. An expression is read
 into postfix order: leaves (numbers with their SI units as pairs, and quantities) and the names of operators. `fold`
-evaluates that order in any algebra: of units, of numbers, of arrays.
+evaluates that order in any algebra: of units, of numbers, of arrays, of lines of code.
 """
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
 
-from flexclear.pipeline.core import units
+from flexclear.pipeline.core.scene import units
 
 T = TypeVar("T")
 #: functions of one argument, and those of two or more
-FUNCTIONS = ("abs", "sqrt", "sin", "cos", "tan", "exp", "log", "sign", "step", "norm")
+FUNCTIONS = ("abs", "sqrt", "sin", "cos", "tan", "exp", "log", "tanh", "sign", "step", "norm")
 SEVERAL = ("max", "min")
+#: functions whose slope jumps where their argument, or the difference of the two, is zero; and whose value does
+BENT, JUMPING = ("max", "min", "abs"), ("sign", "step")
 #: operands of each operator
 OPERANDS = {**dict.fromkeys((*"+-*/^", *SEVERAL), 2), **dict.fromkeys(("minus", *FUNCTIONS), 1)}
 NUMBER, ANGLE = units.measured("1"), units.measured("rad")
@@ -30,12 +33,19 @@ _TOKEN = re.compile(
 )
 
 
-def fold(steps: Iterable[Any], leaf: Callable[[Any], T], apply: Callable[[str, list[T]], T]) -> T:
-    """Value of an expression in postfix order: `leaf` of each leaf, `apply` of each operator and its operands."""
+def fold(
+    steps: Iterable[Any],
+    leaf: Callable[[Any], T],
+    apply: Callable[[str, list[T]], T],
+    operands: Callable[[Any], int] = lambda step: OPERANDS[step] if isinstance(step, str) else 0,
+) -> T:
+    """Value of an expression in postfix order: `leaf` of each leaf, `apply` of each operator and its operands.
+
+    operands: how many each step has, 0 of a leaf.
+    """
     stack: list[T] = []
     for step in steps:
-        if isinstance(step, str):
-            count = OPERANDS[step]
+        if count := operands(step):
             stack[-count:] = [apply(step, stack[-count:])]
         else:
             stack.append(leaf(step))
@@ -46,6 +56,23 @@ def measure(steps: Sequence[Any]) -> tuple[units.Exponents, str]:
     """Exponents of the unit, and the dimension of the components; ValueError where the parts do not go together."""
     exponents, dim, _ = fold(steps, _measured, _combined)
     return exponents or NUMBER, dim
+
+
+def check_unit(steps: Sequence[Any], dimension: str, *, vector: bool = False) -> None:
+    """ValueError unless an expression is a number, or a vector, of this dimension; a bare zero is of any."""
+    exponents, dim, _ = fold(steps, _measured, _combined)
+    if bool(dim) != vector:
+        raise ValueError(
+            "it is a number, but a vector belongs here: give three components"
+            if vector
+            else "it is a vector, but a number belongs here: take a component, or norm(...)"
+        )
+    needed = units.exponents(dimension)
+    if exponents is not None and not _same(exponents, needed):
+        turned = "; rad is a unit: divide by 1 rad" if _same((*exponents[:3], 0.0), needed) else ""
+        raise ValueError(
+            f"its value is in {units.si(exponents)}, but {units.a(dimension)} [{units.si(needed)}] belongs here{turned}"
+        )
 
 
 def _measured(leaf: Any) -> Measure:
@@ -104,11 +131,13 @@ def _same(a: units.Exponents | None, b: units.Exponents | None) -> bool:
 class Reader:
     """Reads an expression into postfix order.
 
-    term: the quantity of a name; ValueError where there is none.
+    term: the quantity of a name; ValueError where there is none.  constants: value and SI unit of each, by name.
     """
 
-    def __init__(self, text: str, term: Callable[[str], Any]) -> None:
-        self.text, self.term, self.place = text, term, 0
+    def __init__(
+        self, text: str, term: Callable[[str], Any], constants: Mapping[str, tuple[float, str]] | None = None
+    ) -> None:
+        self.text, self.term, self.constants, self.place = text, term, constants or {}, 0
         self.token = self._next()
 
     def whole(self) -> list[Any]:
@@ -187,6 +216,10 @@ class Reader:
         name = token["name"]
         if name in (*FUNCTIONS, *SEVERAL) and self._take("("):
             return self._function(name)
+        if name in self.constants:
+            return [self.constants[name]]
+        if name == "pi":
+            return [(math.pi, "1")]
         term = self.term(name)
         if not term.over_time or term.dim == "quat":
             raise ValueError(f"'{name}' cannot be part of an expression: it is no number or vector over time")

@@ -16,8 +16,8 @@ from pydantic import (
     model_validator,
 )
 
-from flexclear.pipeline.core.axes import check_axes, check_axis
-from flexclear.pipeline.core.units import a, components, quantity
+from flexclear.pipeline.core.numerics.axes import check_axes, check_axis
+from flexclear.pipeline.core.scene.units import a, components, quantity
 
 
 def _scalar(dimension: str) -> Any:
@@ -238,7 +238,7 @@ class Pose(Part):
         """Unit quaternion w x y z, frame to parent, shape (4,)."""
         import numpy as np
 
-        from flexclear.pipeline.core.algebra import (
+        from flexclear.pipeline.core.numerics.rotations import (
             axes_to_matrix,
             axis_to_matrix,
             matrix_to_quaternion,

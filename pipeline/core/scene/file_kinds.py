@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 
 SCENE, SWEEP, RECIPE = "a scene", "a sweep of a scene", "a mesh recipe"
 #: keys that only files of a kind have

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import Any
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.appearance import UNSEEN
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 
 #: effects that can be taken away, and how a scene without them is called
 EFFECTS = {"clearance": "without clearance", "flexibility": "rigid"}

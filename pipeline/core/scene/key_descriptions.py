@@ -6,7 +6,7 @@ import inspect
 import re
 from collections.abc import Collection
 
-from flexclear.pipeline.core.citations import docstring
+from flexclear.pipeline.core.scene.citations import docstring
 
 
 def meanings(part: type, keys: Collection[str]) -> dict[str, str]:

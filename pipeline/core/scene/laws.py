@@ -12,9 +12,9 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 
 from pydantic import BeforeValidator, Field, WithJsonSchema, field_validator, model_validator
 
-from flexclear.pipeline.core.file_dependencies import note
 from flexclear.pipeline.core.scene.fields import Angle, Part, Rate, Time
-from flexclear.pipeline.core.units import any_quantity, quantity, unit, unknown
+from flexclear.pipeline.core.scene.units import any_quantity, quantity, unit, unknown
+from flexclear.pipeline.core.system.file_dependencies import note
 
 _TEXT = {"type": ["number", "string"], "description": "SI number, or text with a unit that fits the quantity"}
 Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJsonSchema(_TEXT)]
@@ -278,8 +278,29 @@ class Delayed(Part):
     law: "Bare"
 
 
+class Expression(Part):
+    """An expression of the time `t` that makes polynomials and sines, as ``h * sin(w * t)^2``.
+
+    `max`, `min`, `abs`, `sign` and `step` part it into pieces between start and end.
+    value: the expression.  values: named constants, each a number or text with its unit.  start, end: between which it
+    is used, where it has such kinks.
+    """
+
+    type: Literal["expression"]
+    value: str
+    values: dict[str, Value] = Field(default_factory=dict)
+    start: Time = 0.0
+    end: Time | None = None
+
+    @model_validator(mode="after")
+    def _lasts(self) -> Self:
+        if self.end is not None and not self.start < self.end:
+            raise ValueError(f"it must end after it starts; start = {self.start:g} s, end = {self.end:g} s")
+        return self
+
+
 Law = Annotated[
-    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated | Delayed,
+    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated | Delayed | Expression,
     Field(discriminator="type"),
 ]
 #: all of them

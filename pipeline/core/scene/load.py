@@ -13,17 +13,17 @@ from typing import Annotated, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from flexclear.pipeline.core import portable
-from flexclear.pipeline.core.errors import InputError, ResourceError, shown
-from flexclear.pipeline.core.file_dependencies import note
-from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.fields import LONGEST_NAME
 from flexclear.pipeline.core.scene.file_kinds import SCENE, require_kind
 from flexclear.pipeline.core.scene.limits import check_parts
 from flexclear.pipeline.core.scene.not_toml import not_toml
+from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import NAMING
 from flexclear.pipeline.core.scene.validation_errors import input_errors
+from flexclear.pipeline.core.system import file_names
+from flexclear.pipeline.core.system.errors import InputError, ResourceError, shown
+from flexclear.pipeline.core.system.file_dependencies import note
 
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "event")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
@@ -74,7 +74,7 @@ def scene_of(table: Mapping[str, Any], override: Mapping[str, object] | None = N
     check_parts(copied, origin, FAMILIES)
     scene = _read(copied, origin)
     name = "-".join(re.findall(r"\w+", scene.title.lower()))[:LONGEST_NAME] or "scene"
-    scene._name = f"{name}-scene" if portable.is_device(name) else name
+    scene._name = f"{name}-scene" if file_names.is_device(name) else name
     return scene
 
 
@@ -164,7 +164,7 @@ def scene_name(path: Path) -> str:
     else:
         here = Path.cwd()
         parts = whole.relative_to(here).parts if whole.is_relative_to(here) else (whole.name,)
-    for reason in filter(None, map(portable.unfit, parts)):
+    for reason in filter(None, map(file_names.unfit, parts)):
         raise InputError(shown(str(path)), f"{reason}: results go into a folder of that name", "rename it")
     return "/".join(parts)
 

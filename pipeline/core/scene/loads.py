@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
+from flexclear.pipeline.core.scene.expression import BENT
 from flexclear.pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness, Time
 from flexclear.pipeline.core.scene.laws import Bare, Value
 from flexclear.pipeline.core.scene.matrices import NOTHING, BushingDamping, BushingStiffness
@@ -83,6 +84,64 @@ class JointForce(Part):
     joint: str
     coordinate: str | None = None
     force: Bare
+
+
+class _ByExpression(Part):
+    """What loads by an expression have. It combines `values`, quantities of position and velocity, and the time `t`.
+
+    values: named constants, each a number or text with its unit.
+    """
+
+    values: dict[str, Value] = Field(default_factory=dict)
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The expressions."""
+        force: str | tuple[str, ...] = self.force  # type: ignore[attr-defined]
+        return (force,) if isinstance(force, str) else force
+
+    @property
+    def bends(self) -> bool:
+        """Whether it has values at which its slope jumps."""
+        return any(f"{name}(" in text.replace(" ", "") for name in BENT for text in self.texts)
+
+
+class JointExpression(_ByExpression):
+    """Force [N] or torque [N m] along a joint coordinate, on the joint's second body, by an expression.
+
+    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  force: the expression, as
+    ``-k * max(0, guide.position - 10 mm)^1.5``.  values: named constants, each a number or text with its unit.
+    """
+
+    type: Literal["joint-expression"]
+    joint: str
+    coordinate: str | None = None
+    force: str
+
+
+class LineExpression(_ByExpression):
+    """Tension between the origins of two frames, along the line between them, by an expression.
+
+    between: the two frames.  force: the expression; positive pulls them together.  `length` is their distance, `rate`
+    that of the length.  values: named constants, each a number or text with its unit.
+    """
+
+    type: Literal["line-expression"]
+    between: tuple[FrameName, FrameName]
+    force: str
+
+
+class PointExpression(_ByExpression):
+    """Force [N] at the origin of a frame by an expression for each component, or by one whose value is a vector.
+
+    axes: those of the world, or those of the frame, with which the force then turns.
+    force: components x, y, z, or one vector.  values: named constants, each a number or text with its unit.
+    """
+
+    type: Literal["point-expression"]
+    frame: FrameName
+    force: str | tuple[str, str, str]
+    axes: Literal["world", "frame"] = "world"
 
 
 class JointSpring(Part):
@@ -202,6 +261,9 @@ Load = Annotated[
     | PointTorque
     | SpringDamper
     | JointForce
+    | JointExpression
+    | LineExpression
+    | PointExpression
     | JointSpring
     | JointFriction
     | Bushing

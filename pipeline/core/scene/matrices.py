@@ -8,7 +8,7 @@ from typing import Annotated, Any, TypeAlias
 
 from pydantic import BeforeValidator, WithJsonSchema
 
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
 
 Matrix: TypeAlias = tuple[tuple[float, ...], ...]
 NOTHING: Matrix = ((0.0,) * 6,) * 6

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.units import unit
+from flexclear.pipeline.core.scene.units import unit
+from flexclear.pipeline.core.system.errors import InputError
 
 #: characters of a line that is worth mending
 LONGEST = 300

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from flexclear.pipeline.core.scene.fields import Part, Position, Time
-from flexclear.pipeline.core.variable import Schema, Variable
+from flexclear.pipeline.core.scene.variable import Schema, Variable
 
 
 class Gauge(Part):

@@ -22,7 +22,7 @@ from flexclear.pipeline.core.scene.fields import (
     Velocity,
 )
 from flexclear.pipeline.core.scene.joint_friction import JointFriction, require_fitting
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
 
 Positive = Field(gt=0.0)
 

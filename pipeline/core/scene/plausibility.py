@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from math import inf, pi, sqrt
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.clearance import ClearanceRevolute, ClearanceSlot, ClearanceSpherical
 from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.laws import Constant, Harmonic, Piecewise, Repeated, Spline, Step, Sum
 from flexclear.pipeline.core.scene.loads import Pid, SampledPid
 from flexclear.pipeline.core.scene.owners import turns
 from flexclear.pipeline.core.scene.parts import RigidBody
+from flexclear.pipeline.core.system.errors import InputError
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene

@@ -6,8 +6,8 @@ and ``kinetic`` belongs to the whole mechanism. The words are the names of the r
 means the first of `OWNERS` that has such a part. ``force(A1)`` is another way to write ``A1.force``.
 Expressions combine quantities and numbers with units (`pipeline.core.scene.expression`): ``force(A1) - force(A2)``,
 ``max(0, slider.position.x - 10 mm)``; ``t`` is the time, ``norm(...)`` the magnitude.
-How runs hold quantities is known to `pipeline.core.quantities`, which needs NumPy; a command that finds everything
-fresh does not.
+How runs hold quantities is known to `pipeline.core.artifacts.quantities`, which needs NumPy; a command that finds
+everything fresh does not.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-from flexclear.pipeline.core import units
-from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene import units
 from flexclear.pipeline.core.scene.expression import FUNCTIONS, SEVERAL, Reader, measure
+from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.run_schema import RUN
 
 #: dimension of a run -> what its entries are; a word that several have means the first. Sections are named by bodies
@@ -196,11 +196,11 @@ def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     owners: names of the scene's parts by `OWNERS`; of a mapping, whether each is about an axis (`owners.owners`).
     Raises ValueError that names what could have been meant.
     """
-    plain = _CALL.sub(r"\2.\1", text.strip())
+    plain = _as_owned(text)
     if _PLAIN.fullmatch(plain):
         quantity = _term(plain, owners)
     else:
-        quantity = Quantity("", EXPRESSION, steps=tuple(Reader(plain, lambda name: _term(name, owners)).whole()))
+        quantity = Quantity("", EXPRESSION, steps=tuple(read(plain, owners)))
         if not quantity.terms():
             raise ValueError(f"'{text}' is a number, and no quantity")
         _ = quantity.dim
@@ -226,8 +226,29 @@ def condition(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
 
 def _magnitude(text: str, owners: Mapping[str, Collection[str]]) -> list[Any]:
     """One side of a comparison, in postfix order."""
-    steps = Reader(_CALL.sub(r"\2.\1", text.strip()), lambda name: _term(name, owners)).whole()
+    steps = read(text, owners)
     return [*steps, "norm"] if measure(steps)[1] else steps
+
+
+def read(
+    text: str,
+    owners: Mapping[str, Collection[str]],
+    constants: Mapping[str, tuple[float, str]] | None = None,
+    local: Mapping[str, Any] | None = None,
+) -> list[Any]:
+    """An expression in postfix order (`pipeline.core.scene.expression`); ValueError as of `parse`.
+
+    constants: value and SI unit of each.  local: what further names mean.
+    """
+    known = local or {}
+    return Reader(
+        _as_owned(text), lambda name: known[name] if name in known else _term(name, owners), constants
+    ).whole()
+
+
+def _as_owned(text: str) -> str:
+    """The text with ``force(A1)`` written as ``A1.force``."""
+    return _CALL.sub(r"\2.\1", text.strip())
 
 
 def _term(name: str, owners: Mapping[str, Collection[str]]) -> Quantity:

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.system.errors import InputError
 
 #: names of the frames in the mesh recipe of this path; None where that cannot be determined
 Recipe = Callable[[str], Collection[str] | None]

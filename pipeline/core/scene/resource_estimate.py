@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flexclear.pipeline.core import machine
-from flexclear.pipeline.core.errors import ResourceError
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system import machine
+from flexclear.pipeline.core.system.errors import ResourceError
 
 #: bytes of a row of a run, fitted to runs of 1 to 24 bodies: always, of a body, joint, contact, load, coordinate
 ALWAYS, BODY, JOINT, CONTACT, LOAD, MODE = 200, 160, 100, 350, 100, 24

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.event_kinds import CHANGES, EVENT_KINDS
+from flexclear.pipeline.core.scene.event_kinds import CHANGES, EVENT_KINDS
 from flexclear.pipeline.core.scene.output import VARIABLES
-from flexclear.pipeline.core.variable import Schema, Variable
+from flexclear.pipeline.core.scene.variable import Schema, Variable
 
 _V = Variable
 

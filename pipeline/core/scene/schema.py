@@ -5,7 +5,6 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
-from flexclear.pipeline.core import portable
 from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.clearance import (
     CONTACTS,
@@ -17,6 +16,7 @@ from flexclear.pipeline.core.scene.clearance import (
 from flexclear.pipeline.core.scene.drives import Drive
 from flexclear.pipeline.core.scene.events import Event, require_possible
 from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
+from flexclear.pipeline.core.scene.formulas import check_formulas
 from flexclear.pipeline.core.scene.gears import Gear
 from flexclear.pipeline.core.scene.limits import Limits, check_members, check_rows
 from flexclear.pipeline.core.scene.loads import Gravity, Load, SampledPid
@@ -35,7 +35,8 @@ from flexclear.pipeline.core.scene.quantity import Quantity, parse, usual
 from flexclear.pipeline.core.scene.solver import NAMING, PlainIntegrator, Solver
 from flexclear.pipeline.core.scene.start import Start
 from flexclear.pipeline.core.scene.stops import Stop
-from flexclear.pipeline.core.units import any_quantity, measured, quantity
+from flexclear.pipeline.core.scene.units import any_quantity, measured, quantity
+from flexclear.pipeline.core.system import file_names
 
 Positive = Field(gt=0.0)
 #: types of joints with one freedom: driving it determines the whole relative motion
@@ -264,11 +265,11 @@ class Scene(Part):
         """Results are sent from one system to another: meshes and modes of bodies are files called by their names."""
         names: dict[str, str] = {}
         for name in self.recipes():
-            if portable.is_device(name):
+            if file_names.is_device(name):
                 raise ValueError(
                     f"body.{name}: '{name}' is a device on Windows, and files are called by this name: give it another"
                 )
-            other = names.setdefault(portable.folded(name), name)
+            other = names.setdefault(file_names.folded(name), name)
             if other != name:
                 raise ValueError(
                     f"body.{name}: is called as '{other}' but for capitals or accents, which names of files on Windows "
@@ -302,6 +303,7 @@ class Scene(Part):
         self._amounts_are_allowed()
         self._samples_can_be_made()
         self._quantities_are_there()
+        check_formulas(self)
         self._stressed_bodies_are_flexible()
         self._bodies_have_files_of_their_own()
         require_possible(self)

@@ -5,9 +5,9 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from flexclear.pipeline.core.integrators import DEFAULT, INTEGRATORS
-from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.fields import Number, Part, Time
+from flexclear.pipeline.core.scene.integrators import DEFAULT, INTEGRATORS
+from flexclear.pipeline.core.scene.registry import suggestion
 
 #: keys by which a scene says how it is integrated
 NAMING = ("integrator", "rtol", "step")

@@ -11,8 +11,8 @@ from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_vali
 from flexclear.pipeline.core.scene.fields import Part
 from flexclear.pipeline.core.scene.file_kinds import SWEEP, require_kind
 from flexclear.pipeline.core.scene.load import read_toml
+from flexclear.pipeline.core.scene.units import any_quantity
 from flexclear.pipeline.core.scene.validation_errors import input_errors
-from flexclear.pipeline.core.units import any_quantity
 
 #: points of one sweep; more are several sweeps
 MOST_POINTS = 1_000_000

@@ -11,8 +11,8 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 
-from flexclear.pipeline.core.errors import InputError, InputErrors
-from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.system.errors import InputError, InputErrors
 
 #: findings that are put into words; nobody reads more of them, and each is compared with what could have been meant
 MOST = 500

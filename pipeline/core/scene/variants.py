@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.ideal import KEPT, WITHOUT_CLEARANCE, loose, owned
 from flexclear.pipeline.core.scene.load import FAMILIES, edited
+from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 
 #: loads that are effects of the world on a mechanism, not what moves it
 OF_THE_WORLD = ("gravity", "joint-friction")

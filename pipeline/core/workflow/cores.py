@@ -9,9 +9,9 @@ from contextvars import copy_context
 from threading import Event, Thread
 from typing import TypeVar
 
-from flexclear.pipeline.core.errors import StoppedError
-from flexclear.pipeline.core.progress import Progress, silent
-from flexclear.pipeline.core.system import cores, started
+from flexclear.pipeline.core.system.errors import StoppedError
+from flexclear.pipeline.core.system.platforms import cores, started
+from flexclear.pipeline.core.system.progress import Progress, silent
 
 __all__ = ["cores", "free", "meanwhile", "side_by_side", "tell", "width"]
 

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 
-from flexclear.pipeline.core import file_dependencies, machine, threads
 from flexclear.pipeline.core.artifacts.store import Record, Store
-from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.system import file_dependencies, machine, threads
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import ARRAYS, Task, facts, in_order, key, reasons

@@ -43,13 +43,15 @@ KNOWN: Known = {}
 #: modules that only word messages, citations and validation errors: no result depends on them
 _SCENE = "flexclear.pipeline.core.scene"
 WORDING = {
-    "flexclear.pipeline.core.citations",
+    "flexclear.pipeline.core.scene.citations",
     f"{_SCENE}.key_descriptions",
     f"{_SCENE}.validation_errors",
     f"{_SCENE}.plausibility",
 }
+#: the functions that `import flexclear` offers stand above the stages: no result reaches them
+ABOVE = {"flexclear.public"}
 #: packages whose modules' docstrings are titles on pages
-TITLED = ("flexclear.pipeline.post.figures.",)
+TITLED = ("flexclear.papers.wang_wang_2019.figures.",)
 #: how often a source is parsed at most, where threads of libraries come between
 ATTEMPTS = 10
 _PARSING = Lock()
@@ -149,7 +151,7 @@ class Sources:
     def _next(self, name: str, module: Module) -> tuple[str, ...]:
         """The modules that one reaches at once: what it imports may be an attribute of a module, and no module."""
         if name not in self.next:
-            reached = sorted({*module.own, *parents(name)})  # a module before the names that it holds
+            reached = sorted({*module.own, *parents(name)} - ABOVE)  # a module before the names that it holds
             self.next[name] = tuple(other for other in reached if self.module(other) is not None)
         return self.next[name]
 

@@ -2,31 +2,36 @@
 
 A task does its work in pieces, one integration each. A piece is named by all that decides it, so that a later
 attempt at the same task asks for the same pieces, in the same order; what it finds, it need not do again. Pieces lie
-next to the artifact that shall come of them, ``cache/<stage>/<key>.<piece>.part``, each with a digest that only its
-user
-can make, and hold numbers only: arrays and JSON, no code. They go when the artifact is there.
+next to the artifact that shall come of them, ``cache/<stage>/<key>.<piece>.part``, each with a digest that only
+its user can make, and hold numbers only: arrays and JSON, no code. They go when the artifact is there.
 """
 
 from __future__ import annotations
 
 import contextlib
+import hmac
 import io
 import json
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from threading import RLock
 from typing import Any
 
-from flexclear.pipeline.core.artifacts.disk import publish, read_whole
-from flexclear.pipeline.core.artifacts.seal import same, sealed
+from flexclear.pipeline.core.artifacts.disk import publish, read_whole, temporary
+from flexclear.pipeline.core.artifacts.paths import kernel_root
+from flexclear.pipeline.core.system.platforms import replace
 
 #: how often unfinished work is written [s], and the fraction of the time that writing may take where it is slow
 EVERY, FRACTION = 20.0, 0.05
 #: what a file of a piece begins with is a digest of so many characters, and a line's end
 DIGEST = 64
+#: bytes of the secret with which digests are made
+SECRET = 32
 
 
 @dataclass(frozen=True)
@@ -176,7 +181,7 @@ class Journal:
             return None
         content = whole[DIGEST + 1 :]
         noted = whole[:DIGEST].decode(errors="replace")
-        if not same(sealed(content), noted) or digest not in (None, noted):
+        if not _same(sealed(content), noted) or digest not in (None, noted):
             return None
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             arrays = {key: file[key] for key in file.files}
@@ -216,3 +221,33 @@ def seconds() -> float:
     """Processor time of this process [s], as if the work had never been interrupted, and nothing of it were stored."""
     mine = _current.get()
     return time.process_time() + (mine.restored - mine.aside if mine is not None else 0.0)
+
+
+def sealed(content: bytes) -> str:
+    """Hexadecimal digest that only this user can make, of as many characters as that of `disk.sha256`.
+
+    What a work space holds decides where compiled code reads and writes, so work that somebody else put into a folder
+    of results must not be continued. The secret lies next to the compiled kernels, in the user's own folder.
+    """
+    return hmac.new(_secret(), content, "sha256").hexdigest()
+
+
+def _same(one: str, other: str) -> bool:
+    """Whether two digests are equal, in a time that does not depend on where they differ."""
+    return hmac.compare_digest(one.encode(), other.encode())
+
+
+@cache
+def _secret() -> bytes:
+    """The user's; where none can be stored, one of this process, whose work no other one continues with."""
+    path = kernel_root() / "seal"
+    try:
+        if not path.is_file() or path.stat().st_size != SECRET:
+            path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            with temporary(path) as made:
+                with open(os.open(made, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+                    file.write(os.urandom(SECRET))
+                replace(made, path)
+        return path.read_bytes()  # of processes that make one at once, the last one's
+    except OSError:
+        return os.urandom(SECRET)

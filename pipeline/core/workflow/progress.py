@@ -1,6 +1,6 @@
 """Progress on stderr: which scene and stage is running and how long it still takes.
 
-Lines that stay are records of the logger (`core.log`); the line that a terminal or a notebook rewrites is none.
+Lines that stay are records of the logger (`core.system.log`); the line that a terminal or a notebook rewrites is none.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TextIO
 
-from flexclear.pipeline.core.log import LOG, write_to
+from flexclear.pipeline.core.system.log import LOG, write_to
 
 #: least time between two lines of one task where lines stay on the screen [s]
 SPARSE = 10.0

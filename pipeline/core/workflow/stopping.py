@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from flexclear.pipeline.core.errors import StoppedError
+from flexclear.pipeline.core.system.errors import StoppedError
 
 #: why work stops
 INTERRUPTED = "interrupted"

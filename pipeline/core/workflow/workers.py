@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core import system
-from flexclear.pipeline.core.errors import ResourceError
+from flexclear.pipeline.core.system import platforms
+from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.workflow import cores, stopping
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ def pool(width: int, bell: Bell | None = None) -> ProcessPoolExecutor:
 
 def _begin(parent: int, bell: Bell | None) -> None:
     _follow(parent)
-    system.keep_memory()
+    platforms.keep_memory()
     if bell is not None:
         stopping.obey(bell.rung.wait, lambda: bell.why.value.decode(errors="replace"), bell.count_deaf)
 
@@ -76,12 +76,12 @@ def _follow(parent: int) -> None:
     parent: its number, as it says itself: by now the system may have given this process another one.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    system.end_with_parent()
+    platforms.end_with_parent()
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
 
 def _watch(parent: int) -> None:
-    while system.is_parent(parent):
+    while platforms.is_parent(parent):
         time.sleep(LOOK)
     os._exit(1)
 

@@ -14,6 +14,8 @@ Source: Craig & Bampton (1968), AIAA Journal 6, 1313-1319 (held shapes are fixed
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, scale
 
@@ -73,24 +75,22 @@ def deform(d):
             d.interface_x[body.c0 + j], d.interface_u[body.c0 + j] = place, rate
 
 
-@kernel
-def to_interface(d, b):
-    """What w holds of each coordinate from place b on, modes as eigenmodes: now in the interface basis."""
-    for k in range(d.n_flex):
-        place = b + d.flexes[k].c0
-        in_interface(d, k, place, d.at_modal)
-        for j in range(d.flexes[k].n_modes):
-            d.w[place + j] = d.modal[j]
+def _in_place(changed: Callable) -> Callable:
+    """Return the kernel that applies another one, which changes the basis, to what w holds of each coordinate."""
+
+    @kernel
+    def change(d, b):
+        for k in range(d.n_flex):
+            place = b + d.flexes[k].c0
+            changed(d, k, place, d.at_modal)
+            for j in range(d.flexes[k].n_modes):
+                d.w[place + j] = d.modal[j]
+
+    return change
 
 
-@kernel
-def to_modes(d, b):
-    """What w holds of each coordinate from place b on, modes in the interface basis: now as eigenmodes."""
-    for k in range(d.n_flex):
-        place = b + d.flexes[k].c0
-        in_modes(d, k, place, d.at_modal)
-        for j in range(d.flexes[k].n_modes):
-            d.w[place + j] = d.modal[j]
+#: kernels (d, b): what w holds of each coordinate from place b on, from one basis of the modes to the other
+to_interface, to_modes = _in_place(in_interface), _in_place(in_modes)
 
 
 @kernel

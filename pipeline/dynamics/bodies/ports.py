@@ -80,7 +80,7 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
 
     @kernel
     def site(d, s):
-        """Motion of a site on a flexible link, and the columns of its port."""
+        """Motion of a site on a flexible link, and the columns of its port; the way to it from the link's origin."""
         p = d.sites[s].port
         port = d.ports[p]
         body = d.flexes[port.flex]
@@ -100,6 +100,7 @@ def make_ports(shortening: Callable) -> tuple[Callable, Callable]:
             column.angular = of_body.angular if body.inboard else ZERO
             column.linear = of_body.linear if body.inboard else ZERO
         modal_columns(d, p, R, origin, theta, 1.0, port.column)
+        return arm
 
     @kernel
     def inboard(d, i, origin, R, omega, v, alpha, a):

@@ -14,8 +14,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from flexclear.pipeline.core.artifacts.disk import sweep
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.system import others_can_write
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.platforms import others_can_write
 from flexclear.pipeline.dynamics.compile.files import CODE, claimed, set_aside
 
 #: kernels that nobody fetched for so long are removed [s], and the oldest ones beyond so many bytes

@@ -53,7 +53,7 @@ ORDER = ("advance", "project", "retract", "observe", "evaluate", SPECIALISED)
 #: what is called first when a run has come to its end: without waiting where the second process is at it
 LATE = "observe"
 #: where the code of kernels is, and what they number by
-CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.event_kinds")
+CODE = ("flexclear.pipeline.dynamics", "flexclear.pipeline.core.scene.event_kinds")
 _FLOATS, _TABLE = np.zeros(0), np.zeros((0, 0))
 _PLACE, _INTEGER, _FLOAT = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
 _TABLES, _TABLE_AT = (_PLACE,) * 4, (_PLACE, _INTEGER, _INTEGER)

@@ -12,10 +12,11 @@ from dataclasses import replace
 from functools import cache
 from typing import TYPE_CHECKING
 
-from flexclear.pipeline.core import integrators
-from flexclear.pipeline.core.registry import listed
+from flexclear.pipeline.core.scene import integrators
 from flexclear.pipeline.core.scene.events import with_switched
+from flexclear.pipeline.core.scene.registry import listed
 from flexclear.pipeline.core.workflow.fingerprint import TREE, source_file
+from flexclear.pipeline.dynamics.compile import formulas
 from flexclear.pipeline.dynamics.effects import (
     FORMS,
     FRICTION_LAWS,
@@ -100,7 +101,7 @@ def specialised(parts: Parts, wiring: Wiring, lanes: int = 0) -> str:
     function = LANES if lanes > 1 else SPECIALISED
     wired = "".join(f"    {row},\n" for row in wiring)
     text = function.format(laws=laws, wiring=wired, lanes=lanes, exact=bool(lanes))
-    return _file(what, imports, "rates", maker, given, text)
+    return _file(what, imports, "rates", maker, given, text, _formulas(parts))
 
 
 def _evaluate(parts: Parts) -> str:
@@ -113,7 +114,15 @@ def _evaluate(parts: Parts) -> str:
     if parts.joint_frictions:
         given["friction"] = _joint_friction(imports, parts)
     maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
-    return _file(f"right-hand side of {', '.join(parts.joints)}", imports, "right_hand_side", maker, given, EVALUATE)
+    return _file(
+        f"right-hand side of {', '.join(parts.joints)}",
+        imports,
+        "right_hand_side",
+        maker,
+        given,
+        EVALUATE,
+        _formulas(parts),
+    )
 
 
 def _project(parts: Parts) -> str:
@@ -144,7 +153,15 @@ def _observe(parts: Parts) -> str:
     if parts.joint_frictions and parts.closures:
         given["friction"] = _import(imports, f"{DYNAMICS}.equations.joint_friction", "take_off_closures")
     maker = _import(imports, f"{DYNAMICS}.equations.observation", "make_observation")
-    return _file(f"what is recorded of {', '.join(parts.joints)}", imports, "observation", maker, given, OBSERVE)
+    return _file(
+        f"what is recorded of {', '.join(parts.joints)}",
+        imports,
+        "observation",
+        maker,
+        given,
+        OBSERVE,
+        _formulas(parts),
+    )
 
 
 def _advance(parts: Parts, scheme: Scheme) -> str:
@@ -207,9 +224,25 @@ def _forces(parts: Parts) -> tuple[dict[str, str], Imports]:
         forms = _family(imports, FORMS, parts.forms)
         given["stops"] = f"{_import(imports, f'{DYNAMICS}.contact.stops', 'make_stops')}({forms})"
     if parts.loads:
-        kinds = _family(imports, LOADS, parts.loads)
-        given["loads"] = f"{_import(imports, f'{DYNAMICS}.loads.composing', 'make_loads')}({kinds})"
+        kinds = "".join(f"{_load(imports, n, *kind.split(maxsplit=1))}, " for n, kind in enumerate(parts.loads))
+        given["loads"] = f"{_import(imports, f'{DYNAMICS}.loads.composing', 'make_loads')}(({kinds}))"
     return given, imports
+
+
+def _load(imports: Imports, number: int, name: str, formula: str = "") -> str:
+    """The module of a kind of loads, or what it makes of the kernel of an expression (`_formulas`)."""
+    module = _import(imports, LOADS, listed(LOADS, name, where="parts")[0])
+    if not formula:
+        return module
+    _import(imports, f"{DYNAMICS}.kernels", "kernel")
+    _import(imports, LOADS, "looks")
+    return f"{module}.applying(formula{number})"
+
+
+def _formulas(parts: Parts) -> str:
+    """The kernels of the expressions of loads."""
+    written = [(n, kind.split(maxsplit=1)) for n, kind in enumerate(parts.loads)]
+    return "\n\n".join(formulas.source(f"formula{n}", kind[1]) for n, kind in written if len(kind) > 1)
 
 
 def _joint_friction(imports: Imports, parts: Parts) -> str:
@@ -253,11 +286,13 @@ def _import(imports: Imports, module: str, name: str) -> str:
     return name
 
 
-def _file(what: str, imports: Imports, result: str, maker: str, given: dict[str, str], function: str) -> str:
+def _file(
+    what: str, imports: Imports, result: str, maker: str, given: dict[str, str], function: str, kernels: str = ""
+) -> str:
     lines = sorted({f"from {module} import {name}" for module, name in [CALLS, *imports]})
     arguments = [f"    {key}={value}," for key, value in given.items()]
     return "\n".join(
-        [f'"""Generated: {what}."""', *lines, "", f"{result} = {maker}(", *arguments, ")", "", "", function]
+        [f'"""Generated: {what}."""', *lines, "", kernels, f"{result} = {maker}(", *arguments, ")", "", "", function]
     )
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics.contact.law import Resolved
 
 #: above this fraction of the inner radius a contact is no longer small and Hertz's theory ends

@@ -5,8 +5,8 @@ Each module has ``pieces(law, dimension) -> Pieces`` (see `pieces`), which raise
 words, for values that are not of that dimension.
 """
 
-from flexclear.pipeline.core.registry import declared
 from flexclear.pipeline.core.scene.laws import KINDS
+from flexclear.pipeline.core.scene.registry import declared
 
 KIND = "law"
 NAMES = declared(KINDS, made="pieces")

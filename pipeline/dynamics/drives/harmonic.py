@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.laws import Harmonic
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 
 

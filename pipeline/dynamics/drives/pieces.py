@@ -17,8 +17,8 @@ from math import comb, inf, perm, pi, sin
 
 import numpy as np
 
-from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.laws import COEFFICIENTS
+from flexclear.pipeline.core.scene.registry import lookup
 
 PACKAGE = "flexclear.pipeline.dynamics.drives"
 #: times at which a piece is evaluated for its size: enough for polynomials of degree 7

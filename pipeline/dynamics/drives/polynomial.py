@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.laws import Polynomial
-from flexclear.pipeline.core.units import coefficient
+from flexclear.pipeline.core.scene.units import coefficient
 from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 
 

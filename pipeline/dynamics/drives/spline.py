@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PPoly, make_interp_spline
 
 from flexclear.pipeline.core.scene.laws import Ends, Spline
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, polynomials
 
 

@@ -9,7 +9,7 @@ Source: Wang & Wang (2019), eqs. (29) and (35).
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.laws import Step
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, polynomials
 
 

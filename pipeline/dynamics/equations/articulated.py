@@ -41,8 +41,8 @@ from flexclear.pipeline.dynamics.vectors import (
     turn_symmetric,
 )
 
-#: pivots at most this fraction of the largest that all inertia beyond could give mean a coordinate that moves no mass;
-#: rounding leaves a few times 1e-16 of it
+#: pivots at most this fraction of the largest that all inertia beyond could give in any pose mean a coordinate that
+#: moves no mass; rounding leaves a few times 1e-16 of it
 MASSLESS_PIVOT = 1e-14
 
 NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -95,23 +95,7 @@ def localise(d, k, angular, linear):
 @kernel
 def step(d, i, arm):
     """Store the way from the origin of link i's parent to its own; as a difference of positions it loses digits."""
-    d.articulated[i].arm = add(turn(d.link_frames[d.links[i].parent].axes, d.site_numbers[i - 1].origin), arm)
-
-
-@kernel
-def weigh(d, i):
-    """Return mass and polar moment about its origin of link i and all beyond, and add them to its parent's."""
-    link, own, body = d.links[i], d.own[i], d.articulated[i]
-    mass, centre, polar = own.mass, own.moment, 0.5 * (own.inertia[0] + own.inertia[1] + own.inertia[2])
-    if link.leaf == 0:
-        mass, centre, polar = mass + body.mass, add(centre, body.centre), polar + body.polar
-    if link.parent > 0:
-        above, moved = d.articulated[link.parent], add(centre, scale(mass, body.arm))
-        whole, there = mass, polar + dot(body.arm, add(centre, moved))
-        if link.first == 0:
-            whole, moved, there = whole + above.mass, add(moved, above.centre), there + above.polar
-        above.mass, above.centre, above.polar = whole, moved, there
-    return mass, polar
+    d.articulated[i].arm = arm
 
 
 @kernel
@@ -122,7 +106,7 @@ def reduce(d, i):
     whether all pivots are sound.
     """
     link, own, body, p, sound = d.links[i], d.own[i], d.articulated[i], d.link_frames[i].origin, True
-    mass, polar = weigh(d, i)
+    mass, polar = d.link_numbers[i].borne, d.link_numbers[i].reaching
     A, B, C, wrench = (
         at6(own.inertia, 0),
         skewed(own.moment),
@@ -193,14 +177,21 @@ def forward(d, b):
 
 
 @kernel
+def carried(d, i):
+    """Return the acceleration of link i with its parent, about its own origin."""
+    angular, linear = ZERO, ZERO
+    if d.links[i].parent > 0:
+        above = d.articulated[d.links[i].parent]
+        angular, linear = above.angular, add(above.linear, cross(above.angular, d.articulated[i].arm))
+    return angular, linear
+
+
+@kernel
 def backward(d, b):
     """L^-T applied to the vector in w from index b; leaves the accelerations of all links, about their origins."""
     for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
-        angular, linear = ZERO, ZERO
-        if link.parent > 0:
-            above = d.articulated[link.parent]
-            angular, linear = above.angular, add(above.linear, cross(above.angular, body.arm))
+        angular, linear = carried(d, i)
         if link.c0 < d.nv:
             for k in range(link.c0 + link.n_speeds - 1, link.c0 - 1, -1):
                 local, gain = d.local[k], d.gain[k]
@@ -248,10 +239,7 @@ def transmit(d, b, biased):
     """
     for i in range(1, d.n_links):
         link, body = d.links[i], d.articulated[i]
-        angular, linear = ZERO, ZERO
-        if link.parent > 0:
-            above = d.articulated[link.parent]
-            angular, linear = above.angular, add(above.linear, cross(above.angular, body.arm))
+        angular, linear = carried(d, i)
         if link.c0 < d.nv:
             for k in range(link.c0, link.c0 + link.n_speeds):
                 local = d.local[k]

@@ -19,7 +19,7 @@ def _store(frame, p, R, omega, v, alpha, a):
 
 @kernel
 def rigid_site(d, s):
-    """Motion of a site from that of its rigid link."""
+    """Motion of a site from that of its rigid link; the way to it from the link's origin."""
     frame, site = d.link_frames[d.sites[s].link], d.site_numbers[s]
     R, omega, alpha = frame.axes, frame.omega, frame.alpha
     arm = turn(R, site.origin)
@@ -27,11 +27,13 @@ def rigid_site(d, s):
     v = add(frame.velocity, swing)
     a = add(frame.acceleration, add(cross(alpha, arm), cross(omega, swing)))
     _store(d.site_frames[s], add(frame.origin, arm), product(R, site.axes), omega, v, alpha, a)
+    return arm
 
 
 @kernel
 def no_port(d, s):
     """No body is flexible."""
+    return ZERO
 
 
 @kernel
@@ -67,7 +69,7 @@ def make_kinematics(
     `deform` is called first, their
     `site` adds the deformation of a link to a site, their `inboard` steps from the inboard joint frame to the link's.
     localise(d, k, angular, linear): called with each column about its joint's frame.  step(d, i, arm): called for each
-    link with the way from its inboard site to its joint's frame.
+    link with the way from its parent's origin to its joint's frame.
     """
     joint_motion = choose(tuple(joint.motion for joint in joints))
     position_rate = choose(tuple(joint.position_rate for joint in joints))
@@ -76,8 +78,8 @@ def make_kinematics(
     port_site = no_port if flexible is None else flexible.site
 
     @kernel
-    def place(d, i):
-        """Link i from its inboard site, which must be up to date.
+    def place(d, i, way):
+        """Link i from its inboard site, which must be up to date; way: to there from its parent's origin.
 
         The relative twist is S u in the axes of the joint's first frame F, its rate S u' + bias.
         """
@@ -96,7 +98,7 @@ def make_kinematics(
             localise(d, c0 + k, angular, linear)
             turning, sliding = add(turning, scale(rate, angular)), add(sliding, scale(rate, linear))
             growing, speeding = add(growing, scale(second, angular)), add(speeding, scale(second, linear))
-        step(d, i, arm)
+        step(d, i, add(way, arm))
         v = add(base.velocity, add(swing, sliding))
         alpha = add(alpha_F, add(growing, cross(omega_F, turning)))
         a = add(base.acceleration, add(cross(alpha_F, arm), cross(omega_F, swing)))
@@ -108,11 +110,8 @@ def make_kinematics(
 
     @kernel
     def locate(d, s):
-        """Site s from its link."""
-        if d.sites[s].port >= 0:
-            port_site(d, s)
-        else:
-            rigid_site(d, s)
+        """Site s from its link; the way to it from the link's origin."""
+        return port_site(d, s) if d.sites[s].port >= 0 else rigid_site(d, s)
 
     @kernel
     def kinematics(d):
@@ -125,8 +124,7 @@ def make_kinematics(
         ground.acceleration = scale(-1.0, d.gravity[0].acceleration)
         deform(d)
         for i in range(1, d.n_links):
-            locate(d, i - 1)
-            place(d, i)
+            place(d, i, locate(d, i - 1))
         for s in range(d.n_links - 1, d.n_sites):
             locate(d, s)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import LOADS

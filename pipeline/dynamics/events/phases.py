@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
-from flexclear.pipeline.core.errors import InputError, SolverError, StoppedError
-from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.events import Event
 from flexclear.pipeline.core.scene.quantity import Quantity, condition
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError, StoppedError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.events.carried import carry, closed
 from flexclear.pipeline.dynamics.events.changes import driven, exchanged, freed, prescribed, rates, released

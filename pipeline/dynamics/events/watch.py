@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Blocks, by_name
 from flexclear.pipeline.dynamics.events.impulse import rows as rows_of

@@ -23,7 +23,7 @@ from math import factorial
 
 import numpy as np
 
-from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import modal_basis, phi_functions
 from flexclear.pipeline.dynamics.integrate.method import Method, slope

@@ -85,8 +85,10 @@ def beyond(d, g):
 
 @kernel
 def closeness(d, g):
-    """Return how far from its level guard g counts as there."""
+    """Return how far from its level guard g counts as there; of one without a scale, by what the step changes."""
     numbers, bearing = d.guard_numbers[g], d.guards[g].bearing
+    if bearing < 0 and numbers.scale == 0.0:
+        return CLOSE * np.sqrt(d.rtol) * length(sub(d.guarded[g].end, d.guarded[g].start))
     return CLOSE * np.sqrt(d.rtol) * (d.bearing[bearing].load if bearing >= 0 else numbers.scale)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.integrators import Traits
+from flexclear.pipeline.core.scene.integrators import Traits
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
 

@@ -14,7 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite
 from flexclear.pipeline.dynamics.integrate.method import Method, slope

@@ -15,8 +15,8 @@ and one class, `RotationVector` for 'rotation-vector', with
 - ``coordinates(R, p)``: joint positions of a relative pose, for the start.
 """
 
-from flexclear.pipeline.core.registry import module_name
 from flexclear.pipeline.core.scene.parts import IDEAL
+from flexclear.pipeline.core.scene.registry import module_name
 
 KIND = "joint type"
 #: a class in a module of the same name; paths alone make a joint that no scene can name

@@ -18,10 +18,10 @@ import xarray as xr
 from scipy.optimize import linear_sum_assignment
 
 from flexclear.pipeline.core.artifacts.schema import CAMPBELL, conform
-from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.linear.bench import Bench, hold, observe, set_drives, state
 from flexclear.pipeline.dynamics.linear.dataset import equilibrium, motions
 from flexclear.pipeline.dynamics.linear.equilibrium import Equilibrium

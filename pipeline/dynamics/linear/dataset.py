@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import first_largest
 from flexclear.pipeline.core.artifacts.schema import EQUILIBRIUM, LINEAR, conform
+from flexclear.pipeline.core.numerics.rotations import first_largest
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.linear.bench import Bench, observe, rows, state

@@ -16,7 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 
 #: each step is this many times shorter than the one before; 22 of them span nine orders of magnitude
 FACTOR, LEVELS = 2.5, 22

@@ -17,9 +17,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.linear.bench import Bench, closed, hold
 from flexclear.pipeline.dynamics.linear.tangent import Tangent, magnitude, stiffness, tangent
 from flexclear.pipeline.dynamics.model.model import Model

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.linear.bench import Bench, balance, closed, hold, set_drives
 from flexclear.pipeline.dynamics.linear.equilibrium import BALANCED, LONGEST, SHORT, Equilibrium, descend, residual

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics.linear.bench import Bench, balance, displacement_map, set_drives
 from flexclear.pipeline.dynamics.linear.differences import Rounding, derivative
 

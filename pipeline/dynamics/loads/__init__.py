@@ -6,8 +6,8 @@ Each module but that of gravity, which is a field, holds a class, called like it
 - ``apply(d, k)``: kernel that applies load k by `fields.act`.
 """
 
-from flexclear.pipeline.core.registry import declared
 from flexclear.pipeline.core.scene.loads import KINDS
+from flexclear.pipeline.core.scene.registry import declared
 
 KIND = "load"
 NAMES = declared(KINDS) | {"gravity": "gravity:field"}

@@ -7,7 +7,7 @@ regularised coefficient.
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import JointFriction as Declared
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.contact.friction.modified_coulomb import coefficient
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -20,8 +20,8 @@ from flexclear.pipeline.dynamics.vectors import scale
 def apply(d, k):
     """Apply load k."""
     value, rate, moment, force = measure(d, k)
-    speeds, speed = d.load_speeds[k], abs(rate)
-    speeds.now = rate
+    bend, speed = d.load_bends[d.loads[k].bend0], abs(rate)
+    bend.now = rate
     p = (number(d, k, 1), number(d, k, 2), number(d, k, 3), number(d, k, 4))
     dry = coefficient(speed, p)
     size = -number(d, k, 0) * rate - (dry if rate >= 0.0 else -dry)
@@ -39,7 +39,7 @@ class JointFriction:
         viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
         if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
             raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")
-        dry, kinks = (0.0, 0.0, 1.0, 2.0), (0.0, 0.0)
+        dry, kinks = (0.0, 0.0, 1.0, 2.0), ()
         if load.coulomb is not None:
             speed, c = "angular velocity" if coordinate.turning else "velocity", load.coulomb
             forces = (quantity(c.static, coordinate.force), quantity(c.dynamic, coordinate.force))
@@ -55,4 +55,4 @@ class JointFriction:
                     "coulomb: v_static must be positive and below v_dynamic; "
                     f"v_static = {dry[2]:.6g}, v_dynamic = {dry[3]:.6g}"
                 )
-        return Row(joint=load.joint, numbers=(viscous, *dry), kinks=kinks)
+        return Row(joint=load.joint, numbers=(viscous, *dry), bends=(kinks,))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import JointSpring as Declared
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, measure, number

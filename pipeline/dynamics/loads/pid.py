@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import Any
 
 from flexclear.pipeline.core.scene.loads import Pid as Declared
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.gauge import counted, internal_rate
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel

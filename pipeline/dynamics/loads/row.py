@@ -5,6 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from flexclear.pipeline.core.scene.formulas import Formula
+from flexclear.pipeline.core.scene.laws import Polynomial
+
+#: the time itself, as a law
+TIME = Polynomial(type="polynomial", coefficients=(0.0, 1.0))
+
 
 @dataclass(frozen=True)
 class Row:
@@ -12,8 +18,10 @@ class Row:
 
     laws: law, dimension and path of each.  numbers: as many as it needs.  follows: whether it turns with
     its frame.  counts_turns: whether it needs its angle beyond half a turn.  states: number of internal states.
-    kinks: speeds along its joint coordinate at which its slope or curvature jumps, or 0; its kernel keeps the speed in
-    LOAD_SPEEDS, and its parameters say by `bends` that steps end there.
+    bends: of each number that its kernel keeps in LOAD_BENDS, the magnitudes at which its slope or curvature jumps, as
+    speeds; 0.0: where it changes its sign; none: nowhere. Its parameters say by `bends` that steps end there.
+    reads: sort and name of what an expression reads (`formulas.Formula`).  located: whether the kernels' origin, from
+    which positions are measured, comes before its numbers.
     """
 
     frames: tuple[str, ...] = ()
@@ -23,4 +31,12 @@ class Row:
     follows: bool = False
     counts_turns: bool = False
     states: int = 0
-    kinks: tuple[float, float] = (0.0, 0.0)
+    bends: tuple[tuple[float, ...], ...] = ()
+    reads: tuple[tuple[str, str], ...] = ()
+    located: bool = False
+
+
+def by_formula(formula: Formula, path: str, **acts: Any) -> Row:
+    """The row of a load by an expression.  acts: what it acts on."""
+    bends, laws = ((0.0,),) * formula.bends, ((TIME, "time", path),)
+    return Row(laws=laws, numbers=formula.numbers, bends=bends, reads=formula.reads, located=True, **acts)

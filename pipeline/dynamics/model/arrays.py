@@ -170,7 +170,7 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
         m.TOUCH: contacts,
         m.LAW: int(h[m.N_LAWS]),
         m.LOAD: int(h[m.N_LOADS]),
-        m.LOAD_SPEEDS: int(h[m.N_LOADS]),
+        m.LOAD_BENDS: int(h[m.N_LOAD_BENDS]),
         m.WATCH: contacts,
         m.BEARING: bearings,
         m.BENDS: bearings,

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.model import fitting, given_start
 from flexclear.pipeline.dynamics.model.chain import path_positions

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix, skew
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix, skew
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.constraints import Constraint, demands, prescribed
 from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.clearance import Clearance
+from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_LAWS, Parts
 from flexclear.pipeline.dynamics.model.gauges import Gauges

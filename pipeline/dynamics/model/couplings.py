@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.units import quantity
+from flexclear.pipeline.core.scene.units import quantity
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.driving import named_coordinate

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.dynamics.model.flexible_bodies import bow, frame_shapes, shift
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, Site
 from flexclear.pipeline.dynamics.model.merge import Placement

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import lookup, suggestion
 from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.scene.registry import lookup, suggestion
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.effects import JOINTS
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import matrix_to_quaternion, rotation_vector_to_matrix, skew
+from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion, rotation_vector_to_matrix, skew
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.model.closing import close

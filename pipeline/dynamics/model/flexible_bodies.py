@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode, Rayleigh
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.interface_basis import (
     NEGLIGIBLE,

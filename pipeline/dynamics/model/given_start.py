@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import matrix_to_quaternion, rotation_between, rotation_vector_to_matrix
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion, rotation_between, rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.model.chain import path_positions
 from flexclear.pipeline.dynamics.model.constraints import Constraint, prescribed

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import FRICTION_LAWS
 from flexclear.pipeline.dynamics.joints.bearings import BEARINGS
@@ -58,5 +58,6 @@ def _of_bearings(mechanism: Mechanism) -> Iterator[Guard]:
 
 
 def _of_loads(loaded: Loaded) -> Iterator[Guard]:
-    for k, levels in enumerate(loaded.kinks):
-        yield from _speeds(m.LOAD_SPEEDS, k * m.LOAD_SPEEDS.size, 1, levels)
+    for k, levels in enumerate(loaded.bends):
+        for level in levels:
+            yield (m.LOAD_BENDS.place, k * m.LOAD_BENDS.size, 1, -1, -1), level, level

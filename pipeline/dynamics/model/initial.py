@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.loads import SpringDamper
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
 from flexclear.pipeline.dynamics.model.bushings import rotations

@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.parts import IdealJoint
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import FRICTION_LAWS
 from flexclear.pipeline.dynamics.joints.bearings import BEARINGS, SLIDER

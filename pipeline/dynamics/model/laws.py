@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, covers, jump, pieces_of
 from flexclear.pipeline.dynamics.model.driving import prescribed

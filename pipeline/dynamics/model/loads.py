@@ -8,19 +8,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.formulas import formula
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.effects import LOADS
+from flexclear.pipeline.dynamics.effects import LOADS, load_kind
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.model.driving import coordinate_of, named_coordinate
 from flexclear.pipeline.dynamics.model.gauges import Gauges
 from flexclear.pipeline.dynamics.model.laws import checked_law
-from flexclear.pipeline.dynamics.model.mechanism import Mechanism
-from flexclear.pipeline.dynamics.model.merge import find_frame
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism, Site
+from flexclear.pipeline.dynamics.model.merge import Placement, find_frame
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 #: what loads add to the ledger, before the turns that they count: work done, energy lost
@@ -38,13 +39,13 @@ class Load(NamedTuple):
 class Loaded:
     """Tables of the loads, kind after kind; `laws` are theirs.
 
-    kinks: of each load, speeds along its joint coordinate at which its friction bends, or 0.
+    bends: of each row of LOAD_BENDS, the levels at which it bends a load (`loads.row`).
     """
 
     kinds: tuple[str, ...]
     loads: tuple[Load, ...]
     tables: dict[Any, Any]
-    kinks: list[tuple[float, ...]]
+    bends: list[tuple[float, ...]]
     laws: list[Pieces] = field(default_factory=list)
 
 
@@ -62,11 +63,12 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
     gauges: take those of the loads and their internal states.
     """
     scene, forces = mechanism.scene, mechanism.scene.forces()
-    names = sorted(forces, key=lambda name: forces[name].type)  # stable: within a kind as the scene has them
-    kinds = tuple(sorted({load.type for load in forces.values()}))
+    kind_of = {name: load_kind(scene, name) for name in forces}
+    names = sorted(forces, key=kind_of.__getitem__)  # stable: within a kind as the scene has them
+    kinds = tuple(sorted(set(kind_of.values())))
     loads: list[Load] = []
     rows: list[tuple[int, ...]] = []
-    kinks = list[tuple[float, ...]]()
+    bends, looks = list[tuple[float, ...]](), list[int]()
     numbers, laws = list[float](), list[Pieces]()
     for name in names:
         row, coordinate, measured = _describe(scene, name)
@@ -86,17 +88,33 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
             laws.append(given[f"load.{name}"])
         else:
             laws += [checked_law(scene, law, dimension, path) for law, dimension, path in row.laws]
-        rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows)))
-        numbers += row.numbers
-        kinks.append(row.kinks)
-    counts = [sum(forces[n].type == kind for n in names) for kind in kinds]
+        rows.append((a, b, first, len(numbers), gauge, look, internal, int(row.follows), len(looks), len(bends)))
+        numbers += [*(mechanism.origin if row.located else ()), *row.numbers]
+        looks += [_look(mechanism, numbering, gauges, *one) for one in row.reads]
+        bends += row.bends
+    counts = [list(kind_of.values()).count(kind) for kind in kinds]
     starts = np.concatenate([[0], np.cumsum(counts)]).astype(int)
     tables = {
         m.LOADS: rows,
         m.LOAD_KINDS: [(int(s), c) for s, c in zip(starts, counts, strict=False)],
         m.LOAD_NUMBERS: numbers,
+        m.LOOKS: looks,
     }
-    return Loaded(kinds, tuple(loads), tables, kinks, laws)
+    return Loaded(kinds, tuple(loads), tables, bends, laws)
+
+
+def _look(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort: str, name: str) -> int:
+    """Number of the site, or of the gauge, at which an expression reads."""
+    scene = mechanism.scene
+    if sort == "coordinate":
+        joint, coordinate = named_coordinate(scene, name, "[load]")
+        a, b = (numbering.site(mechanism.site(frame)) for frame in scene.joint[joint].between)
+        return gauges.add(a, b, coordinate, counts=True)
+    if sort == "frame":
+        return numbering.site(mechanism.site(name))
+    i = mechanism.link_of[name]
+    place = mechanism.links[i].places[name].of(Placement(np.array(scene.rigid()[name].com)))
+    return numbering.site(Site(i, place, None))
 
 
 def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None, tuple[str, Coordinate] | None]:
@@ -115,7 +133,12 @@ def _describe(scene: Scene, name: str) -> tuple[Row, Coordinate | None, tuple[st
         measured = load.joint, coordinate
         if load.measured is not None:
             measured = named_coordinate(scene, load.measured, f"[load.{name}.measured]")
-    given = [*([coordinate] if coordinate else []), *([measured[1]] if measured else [])]
+    written = formula(scene, name)
+    given: list[Any] = [
+        *([written] if written else []),
+        *([coordinate] if coordinate else []),
+        *([measured[1]] if measured else []),
+    ]
     try:
         row: Row = part.row(load, path, *given)
     except ValueError as error:

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.chain import InboardJoint, chain
 from flexclear.pipeline.dynamics.model.components import Components, components
 from flexclear.pipeline.dynamics.model.driving import prescribed

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.assembly import settled
 from flexclear.pipeline.dynamics.model.closing import LEAST_GYRATION, close

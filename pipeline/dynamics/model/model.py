@@ -131,6 +131,7 @@ def filled(
             m.N_DRIVES: numbering.known,
             m.N_INTERNAL: gauges.internal,
             m.N_COUPLINGS: len(coupled),
+            m.N_LOAD_BENDS: len(loaded.bends),
             m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
             m.LOAD_SLOT: contact_ledger,
             m.RUBBING_SLOT: contact_ledger + ledger,
@@ -138,7 +139,7 @@ def filled(
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
         {
-            m.LINK_NUMBERS: [_link_numbers(link) for link in mechanism.links],
+            m.LINK_NUMBERS: [_link_numbers(*one) for one in zip(mechanism.links, _borne(mechanism), strict=True)],
             **(_wired(numbering, parts, books) | looped if like is None else {t: like.arrays.rows(t) for t in WIRED}),
             **contacts,
             **laws.fill([*in_tree, *loaded.laws]),
@@ -209,7 +210,7 @@ def _symmetric(J: np.ndarray) -> list[float]:
 
 #: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted, up to
 #: which the mass matrix is factored as a matrix: beyond it, articulated inertias take less time (docs/engine.md)
-DEEP = 9.0
+DEEP = 8.0
 #: tables that follow from links, joints, frames and flexible bodies alone
 WIRED = (
     *(
@@ -313,12 +314,29 @@ def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
     return rows
 
 
-def _link_numbers(link: Link) -> np.ndarray:
+def _link_numbers(link: Link, borne: np.ndarray) -> np.ndarray:
     """Row of the table LINK_NUMBERS; flexible links have their numbers elsewhere."""
-    if link.inertia is None:
-        return np.zeros(m.LINK_NUMBERS.size)
-    mass, com, J = link.inertia
-    return np.array([mass, *com, *_symmetric(J)])
+    mass, com, J = link.inertia or (0.0, np.zeros(3), np.zeros((3, 3)))
+    return np.array([mass, *com, *_symmetric(J), *borne])
+
+
+def _borne(mechanism: Mechanism) -> np.ndarray:
+    """Mass of each link and all beyond, and a bound of their polar moment about its origin; shape (links, 2).
+
+    In any pose: as if everything were in one line, and what slides as far out as the mechanism is large.
+    """
+    sums, links = np.zeros((len(mechanism.links), 3)), mechanism.links  # mass, its first and second moment
+    for i in range(len(links) - 1, 0, -1):
+        link, above = links[i], links[links[i].branch.parent]
+        if link.undeformed is not None:
+            mass, com, J = link.undeformed
+            sums[i] += mass, mass * np.linalg.norm(com), mass * com @ com + 0.5 * np.trace(J)
+        mass, first, second = sums[i]
+        a = float(np.linalg.norm(link.start.p - above.start.p))
+        if "t" in joint_class(link.kind).SPEEDS:
+            a = max(a, mechanism.length)
+        sums[link.branch.parent] += mass, first + mass * a, second + a * (2.0 * first + mass * a)
+    return sums[:, ::2]
 
 
 class Book(NamedTuple):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import rotation_vector_to_matrix
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.dynamics.model.closing import close, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint
 from flexclear.pipeline.dynamics.model.driving import joint_class

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.stops import STOP, End

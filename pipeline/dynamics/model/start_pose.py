@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import matrix_to_quaternion
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model import given_start
 from flexclear.pipeline.dynamics.model.assembly import assembled, settled
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.joints import HELD
 from flexclear.pipeline.dynamics.model.driving import joint_class, joint_drives
 from flexclear.pipeline.dynamics.model.merge import Frame, Group, find_frame

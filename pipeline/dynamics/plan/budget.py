@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from flexclear.pipeline.core.decisions import PILOT, Decision
-from flexclear.pipeline.core.effect_size import Influence
+from flexclear.pipeline.core.artifacts.effect_size import Influence
+from flexclear.pipeline.core.scene.plan_decisions import PILOT, Decision
 from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE
 from flexclear.pipeline.dynamics.plan.screening_runs import Pilots

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.decisions import Mesh
+from flexclear.pipeline.core.scene.plan_decisions import Mesh
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled

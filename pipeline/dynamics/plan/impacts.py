@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.effect_size import Influence
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
 from flexclear.pipeline.dynamics.plan.screening_runs import MEMBERS

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from flexclear.pipeline.core import effect_size
+from flexclear.pipeline.core.artifacts import effect_size
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.quantity import KINDS, OF_CLEARANCE, Quantity
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 
 #: peaks of forces between flexible bodies are at least this fraction of those between rigid ones
 SOFTER = 0.5

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.effect_size import Influence, influence, recorded, with_members
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.effect_size import Influence, influence, recorded, with_members
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect, with_modes, without
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.point import Runner

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.dynamics.record.dataset import dataset
 from flexclear.pipeline.dynamics.run.engine import Engine, another

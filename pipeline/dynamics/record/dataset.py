@@ -12,13 +12,13 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.coordinates import motion
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled
+from flexclear.pipeline.core.artifacts.quantities import PERTURBATION
 from flexclear.pipeline.core.artifacts.schema import RUN, conformed
-from flexclear.pipeline.core.citations import cited, docstring
-from flexclear.pipeline.core.event_kinds import EVENT_KINDS
-from flexclear.pipeline.core.quantities import PERTURBATION
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.citations import cited, docstring
+from flexclear.pipeline.core.scene.event_kinds import EVENT_KINDS
 from flexclear.pipeline.core.scene.output import VARIABLES
 from flexclear.pipeline.core.scene.quantity import KINDS, Quantity
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics.compile.sources import named
@@ -69,7 +69,7 @@ def recorded(run: Run) -> LabelledArrays:
 
 
 def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np.ndarray) -> LabelledArrays:
-    """What of a run these quantities are read from (`core.quantities.series`), and little else.
+    """What of a run these quantities are read from (`core.artifacts.quantities.series`), and little else.
 
     terms: no expressions, but what they consist of.  time: of the rows [s].
     """

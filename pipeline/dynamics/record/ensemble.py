@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.quantities import IMPACT
 from flexclear.pipeline.core.artifacts.schema import ENSEMBLE, conform
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.event_kinds import CLOSING
-from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.quantities import IMPACT
+from flexclear.pipeline.core.scene.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import side_by_side, width
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import continued, cross, turned
+from flexclear.pipeline.core.numerics.rotations import continued, cross, turned
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift
@@ -22,7 +22,7 @@ class Motion:
     """Motion of a point of a body and of the body's axes, over time; world axes, kernels' origin.
 
     p, v, a, omega, alpha: shape (time, 3); R: rotation body -> world, shape (time, 3, 3).  In Fortran's order, see
-    `core.algebra.cross`.
+    `core.numerics.rotations.cross`.
     """
 
     p: np.ndarray

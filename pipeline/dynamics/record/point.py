@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.points import Point, Values
-from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.event_kinds import CLOSING
-from flexclear.pipeline.core.progress import Progress, silent
-from flexclear.pipeline.core.quantities import IMPACT, SAME_TIME, of_impacts, reduced, regular_times
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.artifacts.quantities import IMPACT, SAME_TIME, of_impacts, reduced, regular_times
+from flexclear.pipeline.core.scene.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.load import with_numbers
 from flexclear.pipeline.core.scene.quantity import MAGNITUDES, Recorded
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import EVENTS
 from flexclear.pipeline.dynamics.equations.observation import Observed

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.quantities import IMPACT
 from flexclear.pipeline.core.artifacts.schema import SECTIONS, conform
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.quantities import IMPACT
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.loads import SampledPid
 from flexclear.pipeline.core.scene.schema import Scene, Sections
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.journal import Journal, State
 from flexclear.pipeline.dynamics import memory as m

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import skew, von_mises
+from flexclear.pipeline.core.numerics.rotations import skew, von_mises
 from flexclear.pipeline.dynamics.record.body_loads import Motion
 
 if TYPE_CHECKING:

@@ -19,8 +19,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import components, first_largest, matrices, principal, skew, von_mises
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import components, first_largest, matrices, principal, skew, von_mises
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.record.body_loads import Motion, motion_and_loads
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.solid_stress import factors, gauge_nodes, largest

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import cross
+from flexclear.pipeline.core.numerics.rotations import cross
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed

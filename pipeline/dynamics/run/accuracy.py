@@ -19,12 +19,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.quantity import Quantity, parse
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.progress import Progress
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.method_selection import Suit

@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING
 
-from flexclear.pipeline.core.progress import silent
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.effects import scheme_of
 from flexclear.pipeline.dynamics.model.refill import refilled
 from flexclear.pipeline.dynamics.run.engine import Engine, assemble

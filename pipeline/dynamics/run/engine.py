@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.loads import SampledPid
+from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.effects import INTEGRATORS, scheme_of

@@ -21,9 +21,9 @@ from threading import Condition
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import SolverError, StoppedError
-from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.quantities import LASTING, PERTURBATION, SEPARATED, lasting
+from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
+from flexclear.pipeline.core.system.errors import SolverError, StoppedError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import TICK
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.engine import Engine, another

@@ -23,12 +23,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.linalg import null_space, qr
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.drives import JointDrive, PathDrive
 from flexclear.pipeline.core.scene.laws import Constant
 from flexclear.pipeline.core.scene.loads import JointForce
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces
 from flexclear.pipeline.dynamics.equations.observation import Observed

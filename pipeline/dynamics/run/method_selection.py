@@ -17,11 +17,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.integrators import DEFAULT, STIFF, VIBRATING, by_need
-from flexclear.pipeline.core.progress import silent
+from flexclear.pipeline.core.scene.integrators import DEFAULT, STIFF, VIBRATING, by_need
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import refusal
 from flexclear.pipeline.dynamics.run.engine import Engine

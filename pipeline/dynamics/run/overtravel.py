@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.contact.validity import SHALLOW
 from flexclear.pipeline.dynamics.run.engine import Engine

@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.integrators import DEFAULT, STIFF
+from flexclear.pipeline.core.scene.integrators import DEFAULT, STIFF
 from flexclear.pipeline.core.scene.load import with_numbers
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import refusal
 from flexclear.pipeline.dynamics.run.engine import Engine

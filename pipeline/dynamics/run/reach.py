@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run import singular

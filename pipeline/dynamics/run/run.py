@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import SolverError, StoppedError
-from flexclear.pipeline.core.progress import Progress
-from flexclear.pipeline.core.registry import lookup, module_of
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.registry import lookup, module_of
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import SolverError, StoppedError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import meanwhile
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.registry import lookup
 from flexclear.pipeline.core.scene.loads import SampledPid
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import LOADS
 from flexclear.pipeline.dynamics.model.gauges import values

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.start import Branch
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.driving import coordinate_of
 from flexclear.pipeline.dynamics.run import branches, singular

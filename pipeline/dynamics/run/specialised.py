@@ -18,7 +18,7 @@ from threading import Lock
 
 import numpy as np
 
-from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions, stacks
 from flexclear.pipeline.dynamics.effects import Parts

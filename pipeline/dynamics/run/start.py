@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError, SolverError
 from flexclear.pipeline.core.scene.drives import PathDrive
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model.given_start import moved

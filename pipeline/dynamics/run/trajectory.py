@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import SolverError, StoppedError
-from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.loads import SampledPid
+from flexclear.pipeline.core.system.errors import SolverError, StoppedError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE

@@ -32,7 +32,8 @@ INTRINSICS = {
 #: operations of a way that several states compute even where none of them goes it; for how many a call counts
 SHORT, CALL = 12, 40
 _NUMBER = ir.IntType(32)
-LIBRARY = {"sin": "sin", "cos": "cos", "exp": "exp", "tanh": "tanh", "arctan2": "atan2", "pow": "pow"}
+LIBRARY = {"sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "tanh": "tanh"}
+LIBRARY |= {"arctan2": "atan2", "pow": "pow"}
 
 
 @dataclass(frozen=True)

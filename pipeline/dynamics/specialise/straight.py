@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 #: operations beyond which straight code is no faster than loops: it no longer fits the processor's first caches
 LONGEST = 80_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
-KEPT = {m.TOUCH.place, m.LOAD_SPEEDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
+KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
 _INTEGER = ir.IntType(64)
 
 

@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics.kernels import Kernel
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
 
 #: of NumPy, that kernels apply
-FUNCTIONS = ("sqrt", "sin", "cos", "exp", "tanh", "arctan2", "round", "copysign")
+FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh", "arctan2", "round", "copysign")
 
 
 class Memory:

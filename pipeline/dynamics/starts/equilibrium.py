@@ -9,11 +9,11 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 
-from flexclear.pipeline.core.progress import Progress
 from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.laws import Constant
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import JointStart, Start
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.linear.bench import state
 from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium
 from flexclear.pipeline.dynamics.model.driving import joint_drives

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import matrix_to_quaternion
+from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import JointStart, ModalStart, Start
-from flexclear.pipeline.core.units import LARGEST
+from flexclear.pipeline.core.scene.units import LARGEST
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.initial import centre_of
 from flexclear.pipeline.dynamics.run.engine import Engine

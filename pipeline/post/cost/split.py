@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.cost.statistics import relative_error
 from flexclear.pipeline.post.cost.study import Point, believed, relative

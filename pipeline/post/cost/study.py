@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.errors import SolverError
-from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.system.errors import SolverError
 
 #: groups of points and the factors that span each
 GROUPS: dict[str, tuple[str, ...]] = {

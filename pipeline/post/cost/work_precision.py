@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from flexclear.pipeline.core.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.post.cost.study import GROUPS, MARGIN, recording, resolved
 from flexclear.pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, style
 

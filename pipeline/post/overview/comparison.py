@@ -13,13 +13,13 @@ from functools import reduce
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
-from flexclear.pipeline.core.errors import InputError
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.horizon import sentence
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.overview.curves import curves, measured, rounded, scaled
 from flexclear.pipeline.post.plotting.table import Table
+from flexclear.pipeline.post.single_run.horizon import sentence
 
 #: what a run reports of its cost, by its attribute
 COSTS = {"evaluations": "evaluations", "steps": "steps", "rejected_steps": "rejected steps"}

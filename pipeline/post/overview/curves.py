@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core import quantities
-from flexclear.pipeline.core.algebra import first_largest
+from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.numerics.angles import Turning, turning
+from flexclear.pipeline.core.numerics.rotations import first_largest
 from flexclear.pipeline.core.scene.quantity import KINDS, Quantity
-from flexclear.pipeline.post.rotations import Turning, turning
 
 #: factor and unit of smaller and larger values, largest first
 PREFIXES = {

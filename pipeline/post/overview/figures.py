@@ -9,12 +9,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.scene.quantity import OF_CONTACTS, Quantity
 from flexclear.pipeline.post.overview.curves import by_unit, curves, impacts, measured, turned_by, without_noise
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.series import derive, parameters
+from flexclear.pipeline.post.single_run.series import derive, parameters
 
 #: kinds of quantities that other figures show
 ELSEWHERE = ("position", "orientation", "velocity", "force", "drive_force", *OF_CONTACTS)

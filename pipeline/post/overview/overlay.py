@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core import quantities
+from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, scaled
 from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.series import derive, parameters
+from flexclear.pipeline.post.single_run.series import derive, parameters
 
 #: of the runs, the reference first: distinguished by colour-blind readers, too
 COLORS = ("#111111", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

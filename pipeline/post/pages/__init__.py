@@ -8,7 +8,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from flexclear.pipeline.core.file_dependencies import note
+from flexclear.pipeline.core.system.file_dependencies import note
 
 
 def asset(name: str) -> str:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post.body_shape import surface
 from flexclear.pipeline.post.render.mechanism import Flexible
+from flexclear.pipeline.post.shapes.body_shape import surface
 
 #: a small step of a coordinate, in which a skin moves linearly
 SMALL = 1e-6

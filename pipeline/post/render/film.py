@@ -10,9 +10,8 @@ import numpy as np
 import pyvista as pv
 import xarray as xr
 
-from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.body_shape import faces
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import pace
 from flexclear.pipeline.post.render.mechanism import (
@@ -39,6 +38,7 @@ from flexclear.pipeline.post.render.stage import SOFT, image, plotter, polydata,
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import ANGLE, eye
 from flexclear.pipeline.post.render.writing import RATE, write
+from flexclear.pipeline.post.shapes.body_shape import faces
 
 VIEW, SIDE, HEIGHT = 656, 304, 540
 #: colour of the bar: red, green, blue

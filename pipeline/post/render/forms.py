@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.post.render import shape_files, surfaces
 from flexclear.pipeline.post.render.solids import Solid

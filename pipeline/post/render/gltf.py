@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import matrix_to_quaternion
-from flexclear.pipeline.post.body_shape import faces, surface
+from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.fields import field, hertz, linear_fields
 from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose
 from flexclear.pipeline.post.render.surfaces import Surface
+from flexclear.pipeline.post.shapes.body_shape import faces, surface
 
 FLOAT, WHOLE, ARRAY, INDICES = 5126, 5125, 34962, 34963
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}

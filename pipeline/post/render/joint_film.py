@@ -13,7 +13,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from flexclear.pipeline.post.overview.figures import centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import pace
-from flexclear.pipeline.post.series import derive
+from flexclear.pipeline.post.single_run.series import derive
 
 #: size of a picture in hundreds of pixels, and length of the trail as a fraction of the run
 SIZE, TRAIL = (9.6, 5.4), 0.02

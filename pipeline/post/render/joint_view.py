@@ -10,7 +10,7 @@ import xarray as xr
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View
-from flexclear.pipeline.post.series import parameters
+from flexclear.pipeline.post.single_run.series import parameters
 
 #: colour of a path, as in the plots of orbits; most points of it that are drawn
 PATH_COLOR, PLACES = "#009E73", 1500

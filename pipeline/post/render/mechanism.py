@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.fields import Pose
-from flexclear.pipeline.post import body_stress
-from flexclear.pipeline.post.body_shape import faces, has_edges, scale_to, surface
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.render import forms, surfaces
 from flexclear.pipeline.post.render.forms import Seat
 from flexclear.pipeline.post.render.solids import Solid, equivalent
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View, view
 from flexclear.pipeline.post.render.wheels import Wheel, wheels
-from flexclear.pipeline.post.series import parameters
+from flexclear.pipeline.post.shapes import body_stress
+from flexclear.pipeline.post.shapes.body_shape import faces, has_edges, scale_to, surface
+from flexclear.pipeline.post.single_run.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
 COLORS = ("#5b7fa6", "#c9a66b", "#8a9a5b", "#7d6b91", "#6fa8a0", "#a0736b", "#9aa5b1")

@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from flexclear.pipeline.post.impacts import impacts
+from flexclear.pipeline.post.single_run.impacts import impacts
 
 #: length of a film [s], and how much slower it runs around impacts
 SECONDS, SLOWER = 3.75, 8.0

@@ -13,11 +13,11 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post.body_shape import faces, surface
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.mechanism import Mechanism, part_pose, placed
 from flexclear.pipeline.post.render.surfaces import Surface
-from flexclear.pipeline.post.series import parameters
+from flexclear.pipeline.post.shapes.body_shape import faces, surface
+from flexclear.pipeline.post.single_run.series import parameters
 
 #: longest arrow, and thickness of arrows, as fractions of the mechanism's size
 LONGEST, THICK = 0.3, 0.006

@@ -10,15 +10,15 @@ from typing import Any, cast
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.progress import Progress, silent
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.overview.page import media, viewer_page
 from flexclear.pipeline.post.pages import viewer
 from flexclear.pipeline.post.plotting import mode_sheet
 from flexclear.pipeline.post.render import gl, gltf, joint_view, pace, paraview, player, vibrations
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
-from flexclear.pipeline.post.series import derive
+from flexclear.pipeline.post.single_run.series import derive
 
 #: outputs of a series for ParaView, and of a glTF file
 SERIES, KEYS = 100, 240

@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import matrix_to_quaternion
-from flexclear.pipeline.post import body_stress
-from flexclear.pipeline.post.body_shape import box, faces, scale_to, surface
+from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.post.overview.curves import scaled
 from flexclear.pipeline.post.render import joint_view, pace, surfaces
 from flexclear.pipeline.post.render.fields import field, hertz, linear_fields
@@ -30,6 +28,8 @@ from flexclear.pipeline.post.render.mechanism import (
 )
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.view import View, eye
+from flexclear.pipeline.post.shapes import body_stress
+from flexclear.pipeline.post.shapes.body_shape import box, faces, scale_to, surface
 
 #: frames of a motion, and width over height of a picture that is neither wide nor narrow
 FRAMES, ASPECT = 240, 1.2

@@ -10,7 +10,7 @@ from flexclear.pipeline.post.overview.curves import rounded, scaled
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render.mechanism import SOCKET, Mechanism
 from flexclear.pipeline.post.render.view import ANGLE, eye
-from flexclear.pipeline.post.series import parameters
+from flexclear.pipeline.post.single_run.series import parameters
 
 #: longest bar [pixels]
 LONGEST = 190.0

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.external_files import read_mesh
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.external_files import read_mesh
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.surfaces import Surface
 

@@ -9,8 +9,8 @@ import pyvista as pv
 import xarray as xr
 from vtkmodules.vtkCommonCore import vtkLogger
 
-from flexclear.pipeline.post.body_shape import has_edges
 from flexclear.pipeline.post.render.surfaces import Surface
+from flexclear.pipeline.post.shapes.body_shape import has_edges
 
 BACKGROUND, BACKGROUND_TOP = "#ffffff", "#e6ecf2"
 SOFT = "#5b6570"

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
-from flexclear.pipeline.post.body_shape import faces, has_edges, surface
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.post.render import forms, player, surfaces
 from flexclear.pipeline.post.render.mechanism import (
     COLORS,
@@ -28,7 +27,8 @@ from flexclear.pipeline.post.render.mechanism import (
 from flexclear.pipeline.post.render.ruler import exaggeration, words
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import flat
-from flexclear.pipeline.post.series import parameters
+from flexclear.pipeline.post.shapes.body_shape import faces, has_edges, surface
+from flexclear.pipeline.post.single_run.series import parameters
 
 BODY, JOINT, FRAME, DRIVE, LOAD = "#1f2937", "#3b4754", "#6b7280", "#0072B2", "#7a4a00"
 CLEARANCE, GAP = "#a35f00", "#c4161c"

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pyvista as pv
 
-from flexclear.pipeline.core.progress import Progress, silent
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.render.film import look, solid
 from flexclear.pipeline.post.render.mechanism import Mechanism
 from flexclear.pipeline.post.render.pace import Caption

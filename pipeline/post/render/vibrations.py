@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post.body_shape import faces, surface
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.fields import hertz, linear_fields
 from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose
+from flexclear.pipeline.post.shapes.body_shape import faces, surface
 
 #: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size
 FRACTION = 0.12

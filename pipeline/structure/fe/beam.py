@@ -24,7 +24,7 @@ import scipy.sparse as sp
 import xarray as xr
 from skfem import Basis, BilinearForm, ElementComposite, MeshLine
 
-from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.numerics.rotations import skew
 from flexclear.pipeline.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
 from flexclear.pipeline.structure.fe.model import rigid_motions, symmetric
 from flexclear.pipeline.structure.fe.quadrature import POINTS, WEIGHTS

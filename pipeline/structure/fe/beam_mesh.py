@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
 from flexclear.pipeline.core.artifacts.schema import MESH, conform
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import section_recipe
 from flexclear.pipeline.structure.fe.beam_recipe import (
     SAME_PLACE,

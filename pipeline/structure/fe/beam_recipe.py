@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.algebra import axes_to_matrix, axis_to_matrix
+from flexclear.pipeline.core.numerics.rotations import axes_to_matrix, axis_to_matrix
 from flexclear.pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, given_once
 from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, check_interfaces
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection

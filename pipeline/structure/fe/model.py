@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.numerics.rotations import skew
 
 #: directions of a frame's motion, in the order of every six
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")

@@ -8,11 +8,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.file_kinds import RECIPE, require_kind
 from flexclear.pipeline.core.scene.load import read_toml
+from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.validation_errors import input_errors
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.beam_recipe import SegmentedBeamRecipe, StraightBeamRecipe
 from flexclear.pipeline.structure.fe.exchange.recipe import MatricesRecipe
 from flexclear.pipeline.structure.fe.solid.recipe import SolidRecipe

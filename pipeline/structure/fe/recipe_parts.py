@@ -7,8 +7,8 @@ from typing import Annotated
 
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.registry import suggestion
 from flexclear.pipeline.core.scene.fields import Density, Direction, Number, Part, Pose, Pressure, given_once
+from flexclear.pipeline.core.scene.registry import suggestion
 
 Positive = Field(gt=0.0)
 

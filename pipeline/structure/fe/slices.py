@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.numerics.rotations import skew
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam, at_points, per_point
 
 Maps = tuple[sp.csr_array, sp.csr_array, sp.csr_array]

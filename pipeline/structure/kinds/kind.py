@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.kinds import SHAPES
 

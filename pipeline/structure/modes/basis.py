@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.structure.fe.model import Interface, Model
 from flexclear.pipeline.structure.modes import compliance, eigen, normal, select
 from flexclear.pipeline.structure.modes.condition import Condition

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import DIRECTIONS, Interface, Model, own_dofs
 
 WHERE = "modes.reference"

@@ -33,7 +33,7 @@ import scipy.linalg
 import scipy.sparse as sp
 
 from flexclear.pipeline.core.artifacts.compliance import fractions
-from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model
 from flexclear.pipeline.structure.modes import compliance, eigen, normal
 from flexclear.pipeline.structure.modes.statics import Flexibility

@@ -9,7 +9,7 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
-from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 
 #: up to here the dense solver is as quick, finds every multiple root, and gives complete bases
 DENSE_LIMIT = 900

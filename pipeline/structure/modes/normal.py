@@ -10,8 +10,8 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
-from flexclear.pipeline.core.errors import InputError, SolverError
-from flexclear.pipeline.core.progress import Progress
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.structure.fe.model import Model, own_dofs
 from flexclear.pipeline.structure.modes import eigen, select
 from flexclear.pipeline.structure.modes.statics import Flexibility, border

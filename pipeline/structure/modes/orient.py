@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.algebra import first_largest
+from flexclear.pipeline.core.numerics.rotations import first_largest
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.modes.select import clusters
 

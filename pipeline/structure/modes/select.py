@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.structure.modes.eigen import EQUAL, frequency
 
 WHERE = "modes.count"

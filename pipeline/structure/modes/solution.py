@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.schema import MODES, conform
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.progress import Progress, silent
-from flexclear.pipeline.core.registry import lookup, suggestion
+from flexclear.pipeline.core.scene.registry import lookup, suggestion
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.structure.fe.model import Interface, Model
 from flexclear.pipeline.structure.kinds.kind import Kind, of_mesh
 from flexclear.pipeline.structure.modes import basis, deficits, eigen, orient, select

@@ -18,7 +18,7 @@ import numpy as np
 import scipy.linalg
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.structure.fe.model import Model, own_dofs
 from flexclear.pipeline.structure.sparse.multifrontal import Factor, cholesky
 

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas, lapack
 
-from flexclear.pipeline.core.errors import SolverError
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.structure.sparse.dissection import Tree, dissect
 
 Tell = Callable[[float], None]

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import beam as beams
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
 from flexclear.pipeline.structure.fe.quadrature import POINTS

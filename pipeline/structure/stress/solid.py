@@ -25,8 +25,8 @@ import scipy.sparse as sp
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.coordinates import AXES
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import DIRECTIONS, Model, rows
 from flexclear.pipeline.structure.fe.solid import elasticity
 from flexclear.pipeline.structure.fe.solid.elasticity import Solid

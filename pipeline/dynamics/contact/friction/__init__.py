@@ -13,8 +13,8 @@ Each module has a class, called like its parameters, with
 A joint without friction names none.
 """
 
-from flexclear.pipeline.core.registry import declared
 from flexclear.pipeline.core.scene.clearance import FRICTIONS
+from flexclear.pipeline.core.scene.registry import declared
 
 KIND = "friction law"
 NAMES = declared(FRICTIONS, key="law")

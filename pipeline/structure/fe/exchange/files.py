@@ -16,9 +16,9 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from flexclear.pipeline.core import machine
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.external_files import reading, require_file
+from flexclear.pipeline.core.system import machine
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.external_files import reading, require_file
 from flexclear.pipeline.structure.fe.model import Model
 
 COMPONENTS = ("ux", "uy", "uz", "rx", "ry", "rz", "internal")

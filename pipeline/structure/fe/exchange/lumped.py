@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.algebra import skew
+from flexclear.pipeline.core.numerics.rotations import skew
 from flexclear.pipeline.structure.fe.slices import Slices, carried
 
 #: entries that differ by less than this fraction of the mass (times a length, where they do) are the same

@@ -9,9 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
 from flexclear.pipeline.core.artifacts.schema import MATRICES, conform
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS, Contents, Table
 from flexclear.pipeline.structure.fe.exchange.recipe import Matrices, MatricesRecipe

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 import scipy.sparse.csgraph
 import xarray as xr
 
-from flexclear.pipeline.core.errors import InputError, SolverError
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.structure.fe.exchange import lumped
 from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS
 from flexclear.pipeline.structure.fe.inertia_integrals import integrate

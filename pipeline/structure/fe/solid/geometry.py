@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.csgraph
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.solid import lattice
 from flexclear.pipeline.structure.fe.solid.elasticity import check_cells
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.external_files import read_mesh
-from flexclear.pipeline.core.units import UNITS
+from flexclear.pipeline.core.scene.units import UNITS
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.external_files import read_mesh
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.algebra import quaternion_to_matrix
 from flexclear.pipeline.core.artifacts.schema import SOLID, conform
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.solid import geometry as geometries
 from flexclear.pipeline.structure.fe.solid import imported, ties
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS

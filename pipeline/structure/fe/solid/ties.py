@@ -15,9 +15,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.algebra import skew
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import suggestion
+from flexclear.pipeline.core.numerics.rotations import skew
+from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.solid.elements import on_face
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry, boundary, boundary_nodes, face_nodes
 from flexclear.pipeline.structure.fe.solid.recipe import On

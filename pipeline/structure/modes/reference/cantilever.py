@@ -5,7 +5,7 @@ Source: Shabana, *Dynamics of Multibody Systems*, ch. 5 (reference conditions of
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.modes.condition import Condition, Given, holding
 

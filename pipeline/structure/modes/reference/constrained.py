@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import scipy.sparse as sp
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.modes.condition import Condition, Given, functional, holding
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model, rows
 from flexclear.pipeline.structure.modes.condition import Condition, Given, different, holding
 

@@ -8,7 +8,7 @@ Source: Craig & Chang (1977), NASA CR-2731; Craig & Kurdila (2006), ch. 17.
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model, rows
 from flexclear.pipeline.structure.modes.condition import Condition, Given, different, floating
 

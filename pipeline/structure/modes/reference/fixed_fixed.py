@@ -6,7 +6,7 @@ Source: Wang & Wang (2019), eq. (6), sec. 3.4 and Table 4.
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.errors import InputError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model, rows
 from flexclear.pipeline.structure.modes.condition import WHERE, Condition, Given, holding
 

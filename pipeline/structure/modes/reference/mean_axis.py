@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from flexclear.pipeline.core.errors import InputError
-from flexclear.pipeline.core.registry import lookup
+from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model
 from flexclear.pipeline.structure.modes.condition import Condition, Given
 

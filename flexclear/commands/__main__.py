@@ -1,0 +1,151 @@
+"""The command ``flexclear``.
+
+Exit codes: 0 done; 2 wrong input; 3 the solver gave up; 4 a limit of the machine, of time or of `[limits]`;
+130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import atexit
+import gc
+import os
+import signal
+import sys
+from collections.abc import Collection
+from importlib import import_module
+from types import FrameType
+from typing import NoReturn
+
+from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.system.errors import INTERRUPTED, FlexclearError, InputError, ResourceError, shown
+from flexclear.pipeline.core.system.platforms import plain_output, reader_has_gone
+from flexclear.pipeline.core.workflow import workers
+
+CLOSED_PIPE = 141
+#: new objects before Python searches for garbage: a short command makes hardly any, and spent a tenth of its time
+#: looking
+GARBAGE = 200_000
+#: verb -> what it does. The module of the same name has `arguments(parser)`, what it takes, and `command(options)`
+COMMANDS = {
+    "new": "a commented scene of one's own to start from",
+    "show": "the start pose with all names, in seconds; nothing is run",
+    "check": "every mistake of scenes and recipes at once; nothing is run",
+    "run": "bring scenes up to date",
+    "why": "for each stage: fresh, or why it would run again",
+    "sweep": "many points of one scene: a dataset and a figure",
+    "cost": "what accuracy costs: errors against cost, and where they come from",
+    "render": "pictures, film and interactive page of scenes",
+    "compare": "scenes next to each other or their ideal mechanisms: differences, errors, events, costs",
+    "plan": "which effects, modes and tolerance the requested accuracy calls for",
+    "effects": "what each part does to each quantity, alone and in pairs",
+    "sections": "is a repeated motion periodic, quasi-periodic or chaotic",
+    "frequencies": "equilibrium in a pose, and natural frequencies there",
+    "report": "the page of scenes; without scenes, all figures and tables of the paper",
+    "schema": "JSON schema of scene files",
+    "cite": "sources of the methods and data that a scene uses",
+    "completion": "completion for bash and zsh",
+    "cache": "stored results: size, check, explain, prune",
+    "doctor": "is all here that is needed, and does it compute; one file to repeat a failure",
+}
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command and return its exit code; mistakes of the user are reported without a traceback."""
+    plain_output()
+    own = arguments is None  # whether this process is the command's
+    if own:
+        signal.signal(signal.SIGTERM, _as_interrupt)
+        gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
+        # at its end Python searches for garbage in all that there is, several times: a sixth of the time of a short
+        # command, half a second where something was compiled; nobody gains by it, since the system takes all back
+        atexit.register(gc.freeze)
+    # pydantic would look through all that is installed for plugins of its own
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    try:
+        options = parser(sys.argv[1:] if arguments is None else arguments).parse_args(arguments)
+        if own:  # what is imported stays: neither now nor at the end is it garbage
+            gc.freeze()
+        with workers.reused():
+            return int(options.command(options) or 0)
+    except FlexclearError as error:
+        print(f"flexclear: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("\nflexclear: interrupted; finished results are stored", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        if not reader_has_gone():
+            print(f"flexclear: {workers.LOST}", file=sys.stderr)
+            return ResourceError.exit_code
+        # the reader (`| head`) has gone; keep the interpreter from complaining about it at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return CLOSED_PIPE
+    except (OSError, MemoryError) as error:  # of the machine, and nobody knew better words for it
+        print(f"flexclear: {shown(str(error)) or 'there is not enough memory'}", file=sys.stderr)
+        return ResourceError.exit_code
+
+
+def _as_interrupt(number: int, frame: FrameType | None) -> None:
+    """Stop as Ctrl-C does: schedulers of clusters and services send SIGTERM, and workers are to end in good order."""
+    handler = signal.getsignal(signal.SIGINT)
+    if not callable(handler):  # of a command in the background, Ctrl-C is ignored
+        raise KeyboardInterrupt
+    handler(number, frame)
+
+
+class Parser(argparse.ArgumentParser):
+    """Answers a misspelt command or option by the nearest one."""
+
+    options: Collection[str] = ()
+
+    def error(self, message: str) -> NoReturn:
+        """Raise InputError with a suggestion where there is one; exit code 2 in any case."""
+        unknown = message.removeprefix("unrecognized arguments: ").split()
+        if unknown[0].startswith("-") and message.startswith("unrecognized"):
+            name = unknown[0].partition("=")[0]
+            raise InputError(name, "there is no such option", suggestion(name, sorted(self.options)))
+        super().error(message)
+
+
+def require_command(name: str) -> None:
+    """InputError for a word that is no command."""
+    if name in COMMANDS or name.startswith("-"):
+        return
+    if name.endswith(".toml"):
+        raise InputError(name, "is no command", f"a command comes first, as in: flexclear check {name}")
+    raise InputError(name, "there is no such command", suggestion(name, COMMANDS))
+
+
+class Version(argparse.Action):
+    """Prints the version, which is searched for when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
+        """Print it and end."""
+        from flexclear.pipeline.core.system.version import version
+
+        print(f"flexclear {version()}")
+        parser.exit()
+
+
+def parser(arguments: list[str]) -> argparse.ArgumentParser:
+    """The command line: one sub-command per verb; the module of the one that `arguments` ask for is imported."""
+    if arguments:
+        require_command(arguments[0])
+    top = Parser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
+    top.add_argument("--version", action=Version, nargs=0, help="say the version")
+    verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    asked = [verb for verb in COMMANDS if verb in arguments[:1]]
+    for verb in asked or COMMANDS:  # all of them only where their list is reported
+        text = COMMANDS[verb]
+        below = verbs.add_parser(verb, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        if asked:
+            module = import_module(f"flexclear.commands.{verb}")
+            module.arguments(below)
+            below.set_defaults(command=module.command)
+            top.options = [option for action in below._actions for option in action.option_strings]
+    return top
+
+
+if __name__ == "__main__":
+    sys.exit(main())

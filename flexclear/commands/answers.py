@@ -1,0 +1,294 @@
+"""Three answers about a scene: what accuracy costs, whether it is stable, which effects matter.
+
+Each is made of runs within a budget of processor time, of which half goes to the costs of accuracy and half to the
+effects; stability is read from the run and from what the costs of accuracy were measured with.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flexclear.commands import cost
+from flexclear.pipeline.core.artifacts.store import Record
+from flexclear.pipeline.core.scene import variants
+from flexclear.pipeline.core.scene.ideal import loose
+from flexclear.pipeline.core.scene.integrators import DEFAULT, VIBRATING
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import effect_ranking, kernels, limit, watched_quantities
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import Workplace, check
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.points import Point
+    from flexclear.pipeline.core.scene.quantity import Quantity
+    from flexclear.pipeline.core.scene.schema import Scene
+
+#: without a budget the answers may take so many times the run's own processor time, and at least so long [s]
+TIMES, LEAST = 3.0, 40.0
+#: variants are run and compiled so many at a time
+AT_ONCE = 2.0
+#: tolerance of members with contacts, at most so tight: they start a thousandth of the clearance apart
+MEANS = 1e-7
+#: members with which effects are compared: more of them until the difference is decided or the budget is used
+MEMBERS = (4, 8, 16, 32)
+#: the effect that represents all clearances and flexible bodies; that of `post.answers.matters`
+IDEAL = "clearance and flexibility"
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One answer: its task, its record and where its files are."""
+
+    task: Task
+    record: Record
+    workplace: Workplace
+
+    def dataset(self) -> xr.Dataset:
+        """Its numbers."""
+        return self.workplace.store.load(self.record)
+
+    def file(self, name: str) -> Path | None:
+        """One of its files, in the store; None where there is none."""
+        return self.workplace.store.path(self.task.stage, self.record.key, name) if name in self.record.files else None
+
+    def text(self, name: str) -> str:
+        """One of its files that are text."""
+        return self.workplace.store.path(self.task.stage, self.record.key, name).read_text(encoding="utf-8")
+
+
+@dataclass(frozen=True)
+class Said:
+    """What is shown of an answer: heading, the answer in words, its picture with a caption, and a table as HTML."""
+
+    heading: str
+    text: str
+    picture: str
+    caption: str
+    table: str = ""
+
+
+def said(name: str, answer: Answer, scene: Scene) -> Said:
+    """What is shown of the answer called accuracy, stability or matters."""
+    from flexclear.pipeline.post.answers import matters
+    from flexclear.pipeline.post.cost.answer import sentences
+    from flexclear.pipeline.post.overview.page import prose
+    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
+
+    data = answer.dataset()
+    if name == "accuracy":
+        caption = "Error against processor time; the star is this scene"
+        return Said("What accuracy costs", sentences(data), "accuracy.png", caption)
+    if name == "stability":
+        columns = ("value", "limit", "verdict", "remedy")
+        rows = [[str(c), *(str(data[n].sel(check=c).item()) for n in columns)] for c in data["check"].values]
+        caption = "Errors of energy and loops over time, and their limits"
+        table = prose(("check", *columns), rows)
+        return Said("Is it stable", data.attrs["answer"], "stability.png", caption, table)
+    asked = scene.accuracy.quantities if scene.accuracy is not None else {}
+    requested = {n: w.absolute for n, w in asked.items() if w.absolute is not None}
+    table = as_html(from_markdown(answer.text("matters.md")))
+    caption = "Change of each quantity without the effect"
+    return Said("Which effects matter", matters.sentence(data, requested), "matters.png", caption, table)
+
+
+def dataset(name: str, scene: Scene, workplace: Workplace, budget: str | float | None) -> xr.Dataset:
+    """One of the three answers as a dataset that shows the answer in a notebook.
+
+    budget: processor time [s], or text such as "2min".  Raises InputError for a scene that has nothing to answer.
+    """
+    from flexclear.pipeline.post.answers.answered import answered
+
+    # in this process: workers would run a caller's script again from its top
+    answer = getattr(Answers(scene, replace(workplace, jobs=1), seconds(budget), questions=1), name)
+    if answer is None:
+        raise InputError(str(scene.path or scene.name), "has no effect that could be taken away, or watches nothing")
+    words = said(name, answer, scene)
+    picture = answer.file(words.picture)
+    return answered(answer.dataset(), words.text, None if picture is None else picture.read_bytes(), words.table)
+
+
+def seconds(budget: str | float | None) -> float | None:
+    """A budget [s], which may be text such as "2min"; InputError for what is no time."""
+    return limit.seconds(budget, "budget") if isinstance(budget, str) else budget
+
+
+def _brought(task: Task, workplace: Workplace) -> Answer:
+    outcome = workplace.bring([task])
+    check(outcome)
+    return Answer(task, outcome.records[id(task)], workplace)
+
+
+@dataclass(frozen=True)
+class Answers:
+    """The three answers about a scene, each made when it is asked for.
+
+    seconds: of processor that the runs may take; without it TIMES the scene's own run, and at least LEAST.
+    questions: among which it is divided, the costs of accuracy and the effects.
+    """
+
+    scene: Scene
+    workplace: Workplace
+    seconds: float | None = None
+    questions: int = 2
+
+    @cached_property
+    def _begun(self) -> cost.Study:
+        """The scene's own run, measured, and the budget that follows from it."""
+        study = cost.Study(self.scene, self.workplace, (self.seconds or LEAST) / self.questions)
+        study.begin()
+        if self.seconds is None:
+            study.seconds = max(LEAST, TIMES * study.own * study.pace) / self.questions
+        return study
+
+    @cached_property
+    def _study(self) -> cost.Study:
+        """The points about the scene's own setting."""
+        study = self._begun
+        study.first()
+        study.neighbourhood()
+        return study
+
+    @cached_property
+    def accuracy(self) -> Answer:
+        """What accuracy costs (`stages.cost_study`); SolverError where no run could be made."""
+        return _brought(self._study.task(), self.workplace)
+
+    @cached_property
+    def stability(self) -> Answer:
+        """Whether the run is stable (`stages.stability_checks`), with what the costs of accuracy were measured with."""
+        try:
+            study = {"study": self._study.task()}
+        except SolverError:
+            study = {}
+        graph = Graph(self.scene, shown=False)
+        members = {"post": graph.post} if graph.ensemble else {}
+        task = Task(
+            stage="stability",
+            scene=self.scene.name,
+            run="flexclear.stages.stability_checks:run",
+            params={},
+            inputs={"run": graph.simulate, **study, **members},
+            folder=f"stability/{self.scene.name.replace('/', '_')}",
+            names={"nc": "stability.nc"},
+        )
+        return _brought(task, self.workplace)
+
+    @cached_property
+    def matters(self) -> Answer | None:
+        """Which effects matter (`stages.effect_ranking`); None for a scene without effects, or which watches
+        nothing."""
+        effects, chosen = variants.effects(self.scene), self.scene.watched()
+        if not effects or not chosen:
+            return None
+        return _brought(_Comparison(self.scene, self.workplace, effects, chosen, self._begun).task(), self.workplace)
+
+
+@dataclass
+class _Comparison:
+    """The scene against the scene without each effect, with more members where it is not decided yet."""
+
+    scene: Scene
+    workplace: Workplace
+    effects: Sequence[Effect]
+    chosen: Sequence[Quantity]
+    study: cost.Study
+    tasks: dict[str, dict[int, Task]] = field(default_factory=dict)
+    spent: float = 0.0
+
+    def task(self) -> Task:
+        """The task of the answer, its points made."""
+        from flexclear.pipeline.post.answers.matters import Pair, undecided
+
+        names, undone = self._affordable()
+        pairs = dict.fromkeys(names, 0)
+        waiting, levels = names, MEMBERS if self._touching("") else (0,)
+        for members in levels:
+            if members != levels[0] and not self._affords(waiting, members):
+                break
+            self._bring(["", *waiting], members)
+            pairs |= dict.fromkeys(waiting, members)
+            full = self._point("", members)
+            waiting = [n for n in waiting if undecided(Pair(full, self._point(n, members), members), self.chosen)]
+            if not waiting:
+                break
+        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: IDEAL}
+        made = {name: (self._variant(name), self.tasks[name]) for name in ("", *names)}
+        left = [words[name] for name in undone]
+        return effect_ranking.task(self.scene, self.chosen, words, made, pairs, left)
+
+    def _affordable(self) -> tuple[list[str], list[str]]:
+        """Effects in the order in which they are examined, and those that the budget does not reach."""
+        names = list(self._gone)
+        most, cost_of_one = self.study.seconds, self._seconds("", MEMBERS[0])
+        taken, total = list[str](), cost_of_one
+        for name in names:
+            total += cost_of_one + self._compiling(name)
+            if taken and total > most:
+                break
+            taken.append(name)
+        return taken, names[len(taken) :]
+
+    @cached_property
+    def _gone(self) -> Mapping[str, frozenset[str]]:
+        """What goes with each effect: first all clearances and flexible bodies, then each alone."""
+        alone = {e.name: self._closed({e.name}) for e in self.effects}
+        ideal = self._closed({e.name for e in self.effects if e.kind in (CLEARANCE, FLEXIBILITY)})
+        # an effect by itself that is all of them need not be looked at twice
+        both = {IDEAL: ideal} if ideal and (loose(self.scene) or self.scene.flexible()) else {}
+        order = sorted(alone, key=lambda name: _kind(self.effects, name) not in (CLEARANCE, FLEXIBILITY))
+        return both | {name: alone[name] for name in order}
+
+    def _closed(self, names: set[str]) -> frozenset[str]:
+        """With the effects that are nothing without one that is gone."""
+        return frozenset(names | {e.name for e in self.effects if e.within in names})
+
+    def _variant(self, name: str) -> Scene:
+        gone = self._gone[name] if name else frozenset()
+        variant, setting = variants.without(self.scene, [e for e in self.effects if e.name in gone]), self.study.setting
+        if setting.step is not None:
+            return variant
+        rigid = setting.integrator == VIBRATING and not variant.flexible()
+        rtol = max(setting.rtol, MEANS) if variant.contacts() or variant.stop else setting.rtol
+        return edited(variant, {"solver.integrator": DEFAULT if rigid else setting.integrator, "solver.rtol": rtol})
+
+    def _touching(self, name: str) -> bool:
+        scene = self._variant(name)
+        return bool(scene.contacts() or scene.stop)
+
+    def _seconds(self, name: str, members: int) -> float:
+        runs = members if self._touching(name) else 1
+        return (runs * self.study.own * self.study.pace + cost.POINT) / AT_ONCE
+
+    def _compiling(self, name: str) -> float:
+        known = {kernels.shared(design.scene) for design in self.study.points}
+        return (
+            0.0 if kernels.shared(watched_quantities.plain(self._variant(name))) in known else cost.COMPILING / AT_ONCE
+        )
+
+    def _affords(self, names: Sequence[str], members: int) -> bool:
+        return self.spent + sum(self._seconds(name, members) for name in ("", *names)) <= self.study.seconds
+
+    def _bring(self, names: Sequence[str], members: int) -> None:
+        made = {name: watched_quantities.task(self._variant(name), self.chosen, members) for name in names}
+        check(self.workplace.bring(list(made.values())))
+        for name, task in made.items():
+            self.tasks.setdefault(name, {})[members] = task
+            self.spent += self._seconds(name, members)
+
+    def _point(self, name: str, members: int) -> Point:
+        task = self.tasks[name][members]
+        stored = self.workplace.store.load(self.workplace.bring([task]).records[id(task)])
+        return watched_quantities.point(stored, self._variant(name), self.chosen)
+
+
+def _kind(effects: Sequence[Effect], name: str) -> str:
+    return next(effect.kind for effect in effects if effect.name == name)

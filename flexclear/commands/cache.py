@@ -1,0 +1,140 @@
+"""``flexclear cache``: how large the caches are, whether they are whole, what an artifact was made from; pruning."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from stat import S_ISREG
+
+from flexclear.pipeline.core.artifacts import upkeep
+from flexclear.pipeline.core.artifacts.paths import kernel_root
+from flexclear.pipeline.core.system.errors import InputError, ResourceError, shown
+from flexclear.stages.workplace import open_workplace
+
+ACTIONS = {
+    "size": "stored bytes by stage",
+    "check": "read everything and compare it with its digest; exit code 4 when something is damaged",
+    "explain": "what an artifact was made from",
+    "prune": "remove what is damaged and what nothing shows any more",
+}
+#: artifacts that nothing shows are stored for so many days: going back to an earlier value costs nothing then
+KEPT = 30.0
+#: faults that `check` lists one by one
+SHOWN = 20
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    actions = parser.add_subparsers(dest="action", metavar="ACTION", required=True)
+    for name, text in ACTIONS.items():
+        below = actions.add_parser(name, help=text, description=f"{text[0].upper()}{text[1:]}.")
+        if name == "explain":
+            below.add_argument("what", metavar="FILE|KEY", help="a shown file, or a key or its beginning")
+        if name == "prune":
+            below.add_argument("--days", type=float, default=KEPT, help=f"keep what is younger (default {KEPT:g})")
+            below.add_argument("--dry-run", action="store_true", help="only say what would be removed")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Do it."""
+    {"size": _size, "check": _check, "explain": _explain, "prune": _prune}[options.action](options)
+
+
+def _size(options: argparse.Namespace) -> None:
+    store = open_workplace().store
+    inventory = upkeep.inventory(store, whole=False)
+    sizes: dict[str, list[int]] = {}
+    for artifact in inventory.artifacts:
+        sizes.setdefault(artifact.record.stage.partition("/")[0], []).append(artifact.size)
+    for stage, each in sorted(sizes.items()):
+        print(f"{stage:<12} {len(each):>6} artifacts {_megabytes(sum(each))}")
+    shown = [path for path in store.root.rglob("*") if (store.root / "cache") not in path.parents]
+    for name, paths in (("kernels", kernel_root().rglob("*")), ("shown", shown), ("orphans", inventory.orphans)):
+        sizes_there = _sizes(paths)
+        print(f"{name:<12} {len(sizes_there):>6} files     {_megabytes(sum(sizes_there))}")
+    print(f"results in {store.root}, kernels in {kernel_root()}")
+
+
+def _sizes(paths: Iterable[Path]) -> list[int]:
+    """Sizes of those that are files [bytes]; what others remove meanwhile, as locks, is none any more."""
+    lines = []
+    for path in paths:
+        with suppress(FileNotFoundError):
+            facts = path.stat()
+            if S_ISREG(facts.st_mode):
+                lines.append(facts.st_size)
+    return lines
+
+
+def _check(options: argparse.Namespace) -> None:
+    from flexclear.pipeline.dynamics.compile import files
+
+    store = open_workplace().store
+    inventory = upkeep.inventory(store, whole=True)
+    # one without a sum has not been compiled yet, or is about to be
+    kernels = [path for path in kernel_root().glob("*/flexclear_*.py") if path.with_suffix(".sum").is_file()]
+    others = {path for path in kernels if files.of_another_build(path)}
+    damaged = [path for path in kernels if path not in others and not files.compiled(path)]
+    faults = [*inventory.damaged, *upkeep.shown_faults(store, store.root), *(f"{path} is damaged" for path in damaged)]
+    for fault in faults[:SHOWN]:
+        print(shown(fault))
+    if len(faults) > SHOWN:
+        print(f"... and {len(faults) - SHOWN} more")
+    text = (
+        f"{len(inventory.artifacts)} artifacts, {len(faults)} faults, {len(inventory.orphans)} files without a record"
+    )
+    unused = f", {len(others)} of another build, which nothing uses" if others else ""
+    print(f"{text}; {len(kernels)} compiled kernels{unused}")
+    if faults:
+        raise ResourceError(
+            "damaged files are never used: what needs them makes them again; `cache prune` removes them"
+        )
+
+
+def _explain(options: argparse.Namespace) -> None:
+    store = open_workplace().store
+    record = upkeep.find(store, options.what)
+    if record is None:
+        raise InputError(options.what, "is neither a shown file nor the beginning of one key", "see results/runs")
+    print(f"{record.stage} {record.key}")
+    for name, digest in record.files.items():
+        print(shown(f"  holds {name}: sha256 {digest}"))
+    for fact, value in record.computed_by.items():
+        print(shown(f"  computed by {fact}: {value}"))
+    for fact, value in record.facts.items():
+        print(shown(f"  {fact}: {value}"))
+
+
+def _prune(options: argparse.Namespace) -> None:
+    if not options.days >= 0.0:
+        raise InputError(f"--days {options.days}", "must not be negative", "0 removes all that nothing shows")
+    store = open_workplace().store
+    inventory = upkeep.inventory(store, whole=True)
+    chosen = upkeep.prunable(store, inventory, options.days * upkeep.DAY)
+    broken = [a for a in inventory.artifacts if store.fault(a.record) is not None]
+    chosen += [artifact for artifact in broken if artifact not in chosen]
+    size = sum(artifact.size for artifact in chosen) + sum(path.stat().st_size for path in inventory.orphans)
+    kernels = 0
+    if not options.dry_run:
+        store.sweep()
+        for artifact in chosen:
+            upkeep.remove(store, artifact)
+        for path in (*inventory.orphans, *inventory.unreadable):
+            upkeep.take_away(path)
+        kernels = _prune_kernels()
+    verb = "would remove" if options.dry_run else "removed"
+    print(f"{verb} {len(chosen)} artifacts and {len(inventory.orphans)} files without a record,{_megabytes(size)}")
+    if kernels:
+        print(f"removed {kernels} compiled kernels")
+
+
+def _prune_kernels() -> int:
+    from flexclear.pipeline.dynamics.compile.folder import prune
+
+    return sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
+
+
+def _megabytes(size: int) -> str:
+    return f"{size / 1e6:>10.1f} MB"

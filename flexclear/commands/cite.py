@@ -1,0 +1,106 @@
+"""``flexclear cite``: sources of the methods and data that a scene uses, from the modules that it reaches.
+
+What every run of the scene imports is apart from what functions import where they need it: another integrator where the
+scene's own is too slow, singular poses, accuracies, frequencies.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+from collections.abc import Collection, Iterator
+from importlib import import_module
+
+from flexclear.commands import scenes
+from flexclear.pipeline.core.scene.citations import cited
+from flexclear.pipeline.core.scene.integrators import INTEGRATORS
+from flexclear.pipeline.core.scene.registry import module_name
+from flexclear.pipeline.core.workflow.fingerprint import Sources, imported, parents, source_file
+from flexclear.pipeline.core.workflow.task import in_order
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import add_options, open_workplace
+
+INTEGRATE, COMPILE = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.compile"
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    parser.add_argument("scene", metavar="SCENE", help="a scene file, or a name below scenes/")
+    add_options(parser, "set", "said")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Print them."""
+    (graph,) = scenes.graphs([options.scene], options.set)
+    print(text(graph, open_workplace().sources), end="")
+
+
+def text(graph: Graph, sources: Sources) -> str:
+    """Three lists: methods, those that may be needed (module: source), and data (part of the scene: source)."""
+    scene = graph.scene
+    used, always = list(methods(graph, sources)), _at_once(graph, sources)
+    lines = [f"Methods of {scene.name}"]
+    lines += [f"  {module}: {source}" for module, source in used if module in always] or ["  (none is named)"]
+    lines.append("Methods that are used where a run or a command needs them")
+    lines += [f"  {module}: {source}" for module, source in used if module not in always] or ["  (none is named)"]
+    lines.append(f"Data of {scene.name}")
+    lines += [f"  {where}: {source}" for where, source in scene.sources().items()] or ["  (none is named)"]
+    return "\n".join(lines) + "\n"
+
+
+def methods(graph: Graph, sources: Sources) -> Iterator[tuple[str, str]]:
+    """Module and source text, modules in alphabetical order, each pair once."""
+    tasks = in_order(graph.up_to("post"))
+    roots = {task.run.partition(":")[0] for task in tasks} | {name for task in tasks for name in task.modules}
+    reached = sources.closure(roots)
+    parts = {name for task in tasks for name in task.modules}
+    for name in sorted(reached.keys() - set(_unused(reached, parts))):
+        if name.startswith(f"{COMPILE}."):  # how code is made is no method
+            continue
+        path = source_file(sources.root, name)
+        assert path is not None  # else it would not be in the closure
+        for key in dict.fromkeys(named(path.read_text(encoding="utf-8"))):
+            yield name, key
+
+
+def _at_once(graph: Graph, sources: Sources) -> set[str]:
+    """Modules that a run of the scene imports whatever it meets: not those that functions import where they need them,
+    nor the integrators that may take over."""
+    tasks = in_order(graph.up_to("post"))
+    own = module_name(graph.scene.solver.integrator)
+    others = {f"{INTEGRATE}.{module_name(name)}" for name in INTEGRATORS} - {f"{INTEGRATE}.{own}"}
+    waiting = [task.run.partition(":")[0] for task in tasks] + [name for task in tasks for name in task.modules]
+    seen = set[str]()
+    while waiting:
+        name = waiting.pop()
+        path = source_file(sources.root, name)
+        if name in seen or name in others or path is None:
+            continue
+        seen.add(name)
+        waiting += [*imported(path.read_bytes(), name, path.name == "__init__.py", deep=False)[0], *parents(name)]
+    return seen
+
+
+def _unused(reached: Collection[str], parts: Collection[str]) -> Iterator[str]:
+    """Modules of families that the scene names no part of, and of parts that it does not name.
+
+    They are imported for their types, or by each other, and do nothing for the scene.
+    """
+    for family in reached:
+        listed = getattr(import_module(family), "NAMES", None) if _is_package(family, reached) else None
+        if listed is None:
+            continue
+        inside = {name for name in reached if name.startswith(f"{family}.")}
+        those = {f"{family}.{where.partition(':')[0]}" for where in listed.values()}
+        yield from (inside & those) - set(parts) if inside & set(parts) else inside
+
+
+def _is_package(name: str, reached: Collection[str]) -> bool:
+    return any(other.startswith(f"{name}.") for other in reached)
+
+
+def named(source: str) -> Iterator[str]:
+    """Texts after ``Source:`` in all docstrings of a module, each on one line."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, (ast.Module, ast.ClassDef, ast.FunctionDef)):
+            yield from cited(ast.get_docstring(node))

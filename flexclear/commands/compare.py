@@ -1,0 +1,173 @@
+"""``flexclear compare``: scenes next to each other or their ideal mechanisms: differences, and each run's own error."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flexclear.commands import as_json
+from flexclear.commands.scenes import graphs, joined, print_files, scene_arguments
+from flexclear.pipeline.core.artifacts.store import Record, publish
+from flexclear.pipeline.core.scene.ideal import EFFECTS, ideal, loose
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import Workplace, check, open_workplace
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.post.overview.page import Part
+
+#: what `--ideal` takes away: everything at once, one effect, or one after the other
+IDEAL = ("both", *EFFECTS, "each")
+#: files of a comparison that its page shows: pictures with their captions, then tables
+PICTURES = {
+    "compare.png": "Watched quantities, and their distance from the reference",
+    "compare_contacts.png": "Orbits",
+}
+TABLES = ("differences.md", "costs.md")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    scene_arguments(parser, "json")
+    parser.add_argument(
+        "--ideal",
+        nargs="?",
+        choices=IDEAL,
+        const="both",
+        metavar="WHAT",
+        help="compare with the scene without clearance and flexibility (both), without one of them "
+        f"({', '.join(EFFECTS)}), or with each of these (each)",
+    )
+
+
+def command(options: argparse.Namespace) -> None:
+    """Bring the comparison up to date, print its tables and say where it is."""
+    workplace = open_workplace(options)
+    scenes = [graph.scene for graph in graphs(options.scenes, options.set)]
+    comparison = bring(scenes, workplace, options.ideal)
+    if options.json:
+        print(as_json.as_json(comparison.dataset()))
+        return
+    print(*(comparison.file(name).read_text(encoding="utf-8") for name in TABLES), sep="\n")
+    print_files(comparison.folder, {"index.html": "the page", "compare.nc": "all series", "compare.png": "the figure"})
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A comparison that is up to date: its task, its record, and where its files are."""
+
+    task: Task
+    record: Record
+    workplace: Workplace
+
+    @property
+    def folder(self) -> Path:
+        """Where its files are shown."""
+        return self.workplace.store.root / self.task.folder
+
+    def dataset(self) -> xr.Dataset:
+        """All series, differences, errors, events and costs."""
+        return self.workplace.store.load(self.record)
+
+    def file(self, name: str) -> Path:
+        """One of its files, in the store."""
+        return self.workplace.store.path(self.task.stage, self.record.key, name)
+
+
+def bring(scenes: list[Scene], workplace: Workplace, without: str | None = None) -> Comparison:
+    """Runs of the scenes, of their ideal mechanisms, and of all at tighter tolerances, compared; and the page of it.
+
+    without: one of IDEAL, or None for the scenes alone.  Raises InputError for what cannot be compared.
+    """
+    sides = [side for scene in scenes for side in (*ideal_scenes(scene, without), scene)] if without else scenes
+    if len(sides) < 2:
+        raise InputError(
+            sides[0].name if sides else "compare",
+            "one scene alone is compared with nothing",
+            "name several, or compare it with its ideal mechanism: --ideal",
+        )
+    graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(_labels(sides), sides, strict=True)}
+    made = workplace.bring([graph.simulate for graph in graphs.values()])
+    check(made)
+    # their kernels are there now, so that these do not compile side by side what the first ones did
+    tight = {
+        label: graph.tighter(workplace.store.load(made.records[id(graph.simulate)]).attrs)
+        for label, graph in graphs.items()
+        if graph.has_tighter
+    }
+    outcome = workplace.bring(list(tight.values()))
+    for failure in outcome.failures:
+        workplace.monitor.say(f"no error can be determined: {failure.message}")
+    task = _task(graphs, {label: task for label, task in tight.items() if id(task) in outcome.records})
+    done = workplace.bring([task])
+    check(done)
+    comparison = Comparison(task, done.records[id(task)], workplace)
+    publish(comparison.folder / "index.html", page(comparison, ", ".join(graphs)))
+    return comparison
+
+
+def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
+    """The scene without what `without` says, the most ideal one first; InputError when there is nothing to take."""
+    sets = {"both": (tuple(EFFECTS),), "each": (tuple(EFFECTS), *((effect,) for effect in EFFECTS))}
+    ideals: list[Scene] = []
+    for effects in sets.get(without, ((without,),)):
+        there = [e for e in effects if (loose(scene) if e == "clearance" else scene.flexible())]
+        if there or not ideals:
+            made = ideal(scene, effects)
+            same = any(made.model_dump() == other.model_dump() for other in ideals)
+            made._name = f"{scene.name} {'ideal' if len(effects) == len(EFFECTS) else EFFECTS[effects[0]]}"
+            ideals += [] if same else [made]
+    return ideals
+
+
+def page(comparison: Comparison, title: str) -> bytes:
+    """The page of a comparison, all pictures inside."""
+    from flexclear.pipeline.post.overview.page import page as written
+
+    return written(f"Compared: {title}", "The first run is the reference.", parts(comparison))
+
+
+def parts(comparison: Comparison) -> list[Part]:
+    """What a page shows of a comparison."""
+    from flexclear.pipeline.post.overview.page import Part, media
+    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
+
+    tables = "".join(as_html(from_markdown(comparison.file(name).read_text(encoding="utf-8"))) for name in TABLES)
+    pictures = [
+        media(name, comparison.file(name).read_bytes(), text)
+        for name, text in PICTURES.items()
+        if _there(comparison, name)
+    ]
+    return [Part("differences", "Differences and errors", tables), Part("runs", "Side by side", "".join(pictures))]
+
+
+def _there(comparison: Comparison, name: str) -> bool:
+    return name in comparison.record.files
+
+
+def _labels(sides: list[Scene]) -> list[str]:
+    names = [side.name for side in sides]
+    return [name if names.count(name) == 1 else f"{name} ({k + 1})" for k, name in enumerate(names)]
+
+
+def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
+    quantities = {q.name: q.written() for graph in graphs.values() for q in graph.scene.watched()}
+    labels = list(graphs)
+    inputs = {f"run{k}": graphs[label].simulate for k, label in enumerate(labels)}
+    inputs |= {f"tight{k}": tight[label] for k, label in enumerate(labels) if label in tight}
+    return Task(
+        stage="comparison",
+        scene=labels[-1],
+        run="flexclear.stages.run_comparison:run",
+        params={"labels": labels, "quantities": list(quantities.values())},
+        inputs=inputs,
+        folder=f"compare/{joined(labels)}",
+        names={"nc": "compare.nc"},
+    )

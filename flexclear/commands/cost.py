@@ -1,0 +1,361 @@
+"""``flexclear cost``: error against cost of a scene, point by point from the cache, and its price list."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flexclear.commands import as_json, cost_design, cost_peers, scenes
+from flexclear.commands.cost_peers import Track
+from flexclear.commands.scenes import Workplace, bundles, check
+from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.scene.solver import of_run
+from flexclear.pipeline.core.system.errors import FlexclearError, SolverError
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import kernels, limit, simulation
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import open_workplace, relative
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.post.cost.page import Studied
+
+#: tolerances at which ensembles are compared, where a scene has one
+ENSEMBLES = (1e-6, 1e-8, 1e-10)
+#: processor time that a study's runs may take [s]; what one takes besides its integration, and a new set of kernels
+BUDGET, POINT, COMPILING = 100.0, 0.6, 8.0
+#: a point may take so many times the evaluations of the scene's own run, or this fraction of the budget if that is more
+MOST = 10.0
+#: of runs that were left undone, so many are named
+LISTED = 6
+#: tables of a study, in the order in which they are printed
+PRINTED = ("price.md", "quantities.md", "causes.md", "statistics.md")
+#: figures of a study and their titles
+FIGURES = {
+    "work_precision": "Error against cost",
+    "causes": "Causes of the error",
+    "statistics": "Error of ensemble means against cost",
+}
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
+    parser.add_argument("--page", type=Path, metavar="FILE.md", help="write what the studies say as a page")
+    parser.add_argument("--peer", type=Path, metavar="FILE.json", help="runs of another program, drawn next to ours")
+    parser.add_argument(
+        "--integrators", nargs="+", default=(), metavar="NAME", help="compare only these (default: all)"
+    )
+    parser.add_argument("--models", action="store_true", help="also other meshes, mode sets and beam theories")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Bring the studies up to date and print their tables."""
+    if options.page is not None:
+        scenes.check_target(options.page, "--page")
+    peers = {} if options.peer is None else cost_peers.read(options.peer)
+    workplace, studies = open_workplace(options), {}
+    seconds = limit.seconds(options.budget, "--budget")
+
+    def first(folder: Path) -> None:
+        if not options.json:
+            text = (folder / PRINTED[0]).read_text(encoding="utf-8")
+            print(text, f"{relative(folder)}: first answer; going on\n", sep="\n", flush=True)
+
+    for graph in scenes.graphs(options.scenes, options.set):
+        scene, others = graph.scene, peers.get(graph.scene.name, ())
+        studies[scene.name] = _, folder = bring(
+            scene, workplace, others, options.integrators, seconds=seconds, models=options.models, answered=first
+        )
+        if not options.json:
+            print(
+                *((folder / name).read_text(encoding="utf-8") for name in PRINTED if (folder / name).is_file()),
+                sep="\n",
+            )
+            print(f"figures and data: {folder}\n")
+    if options.json:
+        print(as_json.as_json({name: one for name, (one, _) in studies.items()}))
+    if options.page is not None:
+        said = f" --peer {options.peer.as_posix()}" if options.peer else ""
+        said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
+        said += f" --budget {options.budget}{' --models' if options.models else ''}"
+        write_page(studies, options.page, said)
+
+
+@dataclass
+class Study:
+    """A cost study while its points are made, each from the cache where it is there.
+
+    seconds: of processor that the points may take; a point counts what it took when it was made.  models: whether
+    other meshes, mode sets and beam theories are among them.
+    """
+
+    scene: Scene
+    workplace: Workplace
+    seconds: float = BUDGET
+    integrators: Collection[str] = ()
+    models: bool = False
+    peers: Sequence[Track] = ()
+    runs: dict[str, Task] = field(default_factory=dict)
+    points: list[cost_design.Design] = field(default_factory=list)
+    undone: list[cost_design.Design] = field(default_factory=list)
+    spent: float = 0.0
+    evaluations: dict[str, dict[float, float]] = field(default_factory=dict)
+    own: float = 0.0
+    pace: float = 0.0
+
+    def begin(self) -> None:
+        """Make the scene's own run, which tells what others will take.
+
+        Raises FailedTasksError or SolverError where it cannot be made.
+        """
+        if self.points:
+            return
+        record = self._made(self._near[0])
+        if "refused" in record.attrs:
+            raise SolverError(f"{self.scene.name}: {record.attrs['refused']}")
+        self.own = float(record.attrs["evaluations"])
+        self.pace = max(float(record["cpu_repeat"].median()) / self.own, 1e-9)
+
+    def first(self) -> None:
+        """Make a few points about the scene's own setting."""
+        self.begin()
+        self._queue(self._near[1 : cost_design.FIRST])
+
+    def neighbourhood(self) -> None:
+        """Make the other points about the scene's own setting, as far as the budget goes."""
+        self._queue(self._near[cost_design.FIRST :])
+
+    def beyond(self) -> None:
+        """Make the points farther away, the cheapest first, as far as the budget goes."""
+        scene, more = self.scene, cost_design.wide(self.scene, self.integrators)
+        if self.models and scene.flexible():
+            more += cost_design.models(scene, self.setting, _highest(scene, self.workplace))
+        there = {design.key for design in (*self.points, *self.undone)}
+        more = [design for design in more if design.key not in there]
+        self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
+        self._complete = True
+
+    @cached_property
+    def _near(self) -> list[cost_design.Design]:
+        return cost_design.neighbours(self.scene, self.setting)
+
+    @cached_property
+    def setting(self) -> cost_design.Setting:
+        """How the scene's own run is integrated, as the run says where the scene leaves it open."""
+        graph = Graph(self.scene, shown=False)
+        outcome = self.workplace.bring([graph.simulate])
+        check(outcome)
+        text = self.workplace.store.load(outcome.records[id(graph.simulate)]).attrs
+        return cost_design.Setting(*of_run(self.scene.solver, self.scene.by_need(), text), self.scene.solver.step)
+
+    def task(self) -> Task:
+        """The task of the study of all points that there are."""
+        chosen = self.scene.requested()
+        listed = [
+            {"key": d.key, "group": d.group, "factors": dict(d.factors), "input": f"point{k}"}
+            for k, d in enumerate(self.points)
+        ]
+        inputs = {f"point{k}": self.runs[d.key] for k, d in enumerate(self.points)}
+        return Task(
+            stage="cost",
+            scene=self.scene.name,
+            run="flexclear.stages.cost_study:run",
+            params={
+                "points": listed,
+                "quantities": [q.written() for q in chosen],
+                "title": self.scene.title,
+                "own": self.setting.attributes | {"flexible": int(bool(self.scene.flexible()))},
+                "complete": self._complete and not self.undone,
+                "undone": _listed([design.key for design in self.undone]),
+                "peers": list(self.peers),
+            },
+            inputs=inputs | self._ensembles,
+            folder=f"cost/{self.scene.name}",
+            names={"nc": "cost.nc"},
+        )
+
+    def drawn(self) -> tuple[xr.Dataset, Path]:
+        """The dataset of the points so far, and the folder with its tables and figures."""
+        task = self.task()
+        outcome = self.workplace.bring([task])
+        check(outcome)
+        return self.workplace.store.load(outcome.records[id(task)]), self.workplace.store.root / task.folder
+
+    def ensembles(self) -> None:
+        """Ensembles at several tolerances, of a scene that has one, as far as the budget goes."""
+        names, ensemble = [q.name for q in self.scene.requested()], self.scene.ensemble
+        for rtol in ENSEMBLES if ensemble is not None else ():
+            change = edited(self.scene, {"solver.rtol": rtol, "accuracy": None})
+            design = cost_design.Design(f"ensemble, rtol {rtol:g}", "ensemble", {}, change)
+            if self.spent + self.own * self.pace * (ensemble.members if ensemble else 1) > self.seconds:
+                self.undone.append(design)
+                continue
+            task = _measured(design, "run_ensemble", {"quantities": names}, self._kernels(design))
+            check(self.workplace.bring([task]))
+            self._ensembles[f"ensemble:rtol {rtol:g}"] = task
+
+    def __post_init__(self) -> None:
+        self._complete = False
+        self._ensembles: dict[str, Task] = {}
+        self._compiled: dict[tuple[str, ...], Task] = {}
+
+    def _queue(self, designs: Sequence[cost_design.Design]) -> None:
+        """Make points in this order; those that the budget no longer holds are left undone."""
+        for design in designs:
+            seconds = design.evaluations(self.evaluations, self.own) * self.pace + POINT
+            compiling = COMPILING if kernels.shared(design.scene) not in self._compiled else 0.0
+            if self.spent + seconds + compiling > self.seconds:
+                self.undone.append(design)
+            else:
+                self._made(design)
+
+    def _made(self, design: cost_design.Design) -> xr.Dataset:
+        """One point, brought up to date."""
+        if self.own:
+            limit = min(self.scene.solver.evaluations, self._most())
+            design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
+        names, first = [q.name for q in self.scene.requested()], kernels.shared(design.scene) not in self._compiled
+        compiled = self._kernels(design)
+        task = _measured(design, "run", {"quantities": names, "brief": bool(self.points)}, compiled)
+        outcome = self.workplace.bring([task, compiled] if first else [task])
+        check(outcome)
+        record = self.workplace.store.load(outcome.records[id(task)])
+        if first:
+            self.spent += float(self.workplace.store.load(outcome.records[id(compiled)]).attrs["compile_seconds"])
+        self.runs[design.key] = task
+        self.points.append(design)
+        solver = design.scene.solver
+        if "refused" in record.attrs:
+            self.spent += POINT + (self._most() * self.pace if "evaluations" in record.attrs["refused"] else 0.0)
+        else:
+            self.spent += POINT + float(record["cpu_repeat"].sum()) + float(record.attrs["recording_seconds"])
+            if solver.step is None and design.group in ("tolerance", "sampling"):
+                known = self.evaluations.setdefault(solver.integrator, {})
+                known[solver.rtol] = float(record.attrs["evaluations"])
+        return record
+
+    def _most(self) -> int:
+        """Evaluations that a point may take: a power of ten, so that its key does not change with each budget."""
+        affordable = max(MOST * self.own, self.seconds / self.pace / MOST, 1e5)
+        return int(10.0 ** math.ceil(math.log10(affordable)))
+
+    def _kernels(self, design: cost_design.Design) -> Task:
+        shared = kernels.shared(design.scene)
+        if shared not in self._compiled:
+            self._compiled[shared] = kernels.task(design.scene, _bundles(design))
+        return self._compiled[shared]
+
+
+def bring(
+    scene: Scene,
+    workplace: Workplace,
+    peers: Sequence[Track] = (),
+    integrators: Collection[str] = (),
+    *,
+    seconds: float = BUDGET,
+    models: bool = False,
+    answered: Callable[[Path], None] = lambda folder: None,
+) -> tuple[xr.Dataset, Path]:
+    """The study's dataset, brought up to date as far as the budget goes, and the folder with its tables and figures.
+
+    peers: runs of other programs, see `flexclear.commands.cost_peers`.  integrators: see `cost_design.wide`.  seconds,
+    models: of the `Study`.  answered: called with the folder when the first answer is there.
+    Raises InputError when the scene has nothing to measure.  Work that is interrupted leaves the answer so far.
+    """
+    study = Study(scene, workplace, seconds, integrators, models, peers)
+    study.first()
+    _, folder = study.drawn()
+    answered(folder)
+    try:
+        study.neighbourhood()
+        study.beyond()
+        study.ensembles()
+    except (KeyboardInterrupt, FlexclearError):
+        with suppress(FlexclearError):
+            study.drawn()
+        raise
+    return study.drawn()
+
+
+def dataset(scene: Scene, workplace: Workplace, budget: str | float | None = None, models: bool = False) -> xr.Dataset:
+    """The study as a dataset that shows its answer in a notebook; budget: [s], or text such as "2min"."""
+    from flexclear.pipeline.post.answers.answered import answered
+    from flexclear.pipeline.post.cost.answer import sentences
+
+    given = limit.seconds(budget, "budget") if isinstance(budget, str) else budget
+    # in this process: workers would run a caller's script again from its top
+    result, folder = bring(scene, replace(workplace, jobs=1), seconds=BUDGET if given is None else given, models=models)
+    return answered(result, sentences(result), (folder / "accuracy.png").read_bytes())
+
+
+def figures_and_tables(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:
+    """What a page says of a scene, and the files of its pictures, by path relative to the page.
+
+    study, folder: as `bring` returned them.  pictures: folder for them next to the page.
+    """
+    from flexclear.pipeline.post.cost.page import Studied, advice
+
+    tables = tuple((folder / file).read_text(encoding="utf-8") for file in PRINTED if (folder / file).is_file())
+    files = {stem: folder / f"{stem}.png" for stem in FIGURES}
+    shown = {stem: f"{pictures}/{name.replace('/', '_')}_{stem}.png" for stem, file in files.items() if file.is_file()}
+    said = Studied(name, advice(study, tables), tables, {FIGURES[stem]: path for stem, path in shown.items()})
+    return said, {path: files[stem] for stem, path in shown.items()}
+
+
+def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, options: str = "") -> None:
+    """The page on accuracy, with its pictures in a folder of its name next to it.
+
+    studies: what `bring` returned, by scene.  options: the command's other options.
+    """
+    from flexclear.pipeline.post.cost.page import markdown
+
+    sections = []
+    with disk_limits(page.parent):
+        (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
+        for name, (study, folder) in studies.items():
+            said, pictures = figures_and_tables(name, study, folder, page.stem)
+            sections.append(said)
+            for path, file in pictures.items():
+                publish(page.parent / path, file.read_bytes())
+        publish(page, markdown(tuple(sections), f"{page.as_posix()}{options}").encode())
+
+
+def _highest(scene: Scene, workplace: Workplace) -> float:
+    """The highest frequency in the bundles of a scene with flexible bodies [Hz]; they are made first."""
+    return max(float(bundle["frequency"].max()) for bundle in bundles(scene, workplace, jobs=None).values())
+
+
+def _listed(keys: Sequence[str]) -> str:
+    """The first of many, and how many more there are."""
+    more = f" and {len(keys) - LISTED} more" if len(keys) > LISTED else ""
+    return "; ".join(keys[:LISTED]) + more
+
+
+def _bundles(design: cost_design.Design) -> dict[str, Task]:
+    return Graph(design.scene, shown=False, recipe=design.recipe).bodies()
+
+
+def _measured(design: cost_design.Design, function: str, more: Mapping[str, object], compiled: Task) -> Task:
+    """A task of `stages.cost_point` on a design's scene."""
+    ensemble = design.scene.ensemble is not None
+    return Task(
+        stage="cost-ensemble" if ensemble else "cost-point",
+        scene=design.scene.name,
+        part=design.key,
+        run=f"flexclear.stages.cost_point:{function}",
+        params={"simulate": simulation.params(design.scene, ensemble=ensemble), **more},
+        inputs={**_bundles(design), "kernels": compiled},
+        modules=simulation.modules(design.scene),
+        folder="",
+        exclusive=True,
+    )

@@ -1,0 +1,196 @@
+"""Which runs a cost study makes of a scene: the factors, how dear each is foreseen to be, and in which order.
+
+First the neighbourhood of the scene's own setting: looser and tighter tolerances, another family of methods, denser
+output. Then, cheapest first, all methods over all their tolerances and steps. No run is a reference by itself: the
+study takes the tightest that was made (`pipeline.post.cost.study.reference_of`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from flexclear.papers.wang_wang_2019.timing import paper_solver
+from flexclear.pipeline.core.scene.integrators import DEFAULT, INTEGRATORS, STIFF, VIBRATING
+from flexclear.pipeline.core.scene.load import edited, read_toml
+from flexclear.pipeline.core.scene.registry import suggestion
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.solver import NAMING
+from flexclear.pipeline.core.system.errors import InputError
+
+#: the scene's own tolerance and step times these, in this order; half and a tenth show whether tighter runs agree
+TOLERANCES, STEPS = (0.1, 10.0, 1.0, 0.5, 0.01, 100.0), (0.5, 2.0, 1.0, 0.25, 4.0)
+#: the same of another family of methods, by which the tightest is confirmed; with fixed steps at these tolerances
+CONFIRMING, CONFIRMING_STEPS = (0.1, 0.01), (1e-6, 1e-8)
+#: so many of the neighbourhood give a first answer
+FIRST = 4
+#: tolerances that make a difference: tighter ones drown in rounding
+TIGHTEST, LOOSEST = 1e-14, 1e-2
+#: mode sets that are compared, limits of their frequencies as multiples of the scene's own, and refinements of its mesh
+MODE_SETS = ("craig-bampton", "free-free", "fixed-fixed")
+LIMITS = (0.25, 0.5, 1.0, 2.0)
+REFINEMENTS = (1, 2, 4)
+FINER_OUTPUT = 10.0
+#: what no point of a study has
+PLAIN: Mapping[str, None] = {"accuracy": None, "ensemble": None}
+#: what a method is foreseen to take of which no run is known, in evaluations of the scene's own run
+UNSEEN = 3.0
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How the scene's own run is integrated; step: of fixed steps, else None."""
+
+    integrator: str
+    rtol: float
+    step: float | None = None
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """As attributes of a study."""
+        setting = {"own_rtol": self.rtol} if self.step is None else {"own_step": self.step}
+        return {"own_integrator": self.integrator, **setting}
+
+
+@dataclass(frozen=True)
+class Design:
+    """One run: its group and factors (see `pipeline.post.cost.study`), the edited scene and edits of its recipes."""
+
+    key: str
+    group: str
+    factors: Mapping[str, Any]
+    scene: Scene
+    recipe: Mapping[str, Any] = field(default_factory=dict)
+
+    def evaluations(self, seen: Mapping[str, Mapping[float, float]], own: float) -> float:
+        """Foreseen evaluations of the right-hand side.
+
+        seen: those of runs with chosen steps, by integrator and tolerance.  own: those of the scene as it is.
+        """
+        solver = self.scene.solver
+        order = INTEGRATORS[solver.integrator].order
+        if solver.step is not None:
+            return (self.scene.time.end - self.scene.time.start) / solver.step * order
+        known = seen.get(solver.integrator)
+        if self.group not in ("tolerance", "sampling"):
+            return UNSEEN * own
+        if not known:
+            return UNSEEN * own * max(1.0, 1e-6 / solver.rtol) ** (1.0 / (order + 1.0))
+        at = min(known, key=lambda rtol: max(rtol / solver.rtol, solver.rtol / rtol))
+        return known[at] * (at / solver.rtol) ** (1.0 / (order + 1.0))
+
+
+def neighbours(scene: Scene, own: Setting) -> list[Design]:
+    """The scene as it is and its neighbourhood, what answers most first."""
+    asis, denser = _sampling(scene, own)
+    if own.step is not None:
+        mine = [_stepped(scene, own.integrator, own.step * factor) for factor in STEPS]
+        confirming: tuple[float, ...] = CONFIRMING_STEPS
+    else:
+        tolerances = dict.fromkeys(min(max(own.rtol * factor, TIGHTEST), LOOSEST) for factor in TOLERANCES)
+        mine = [_tolerant(scene, own.integrator, rtol) for rtol in tolerances]
+        confirming = tuple(dict.fromkeys(max(own.rtol * factor, TIGHTEST) for factor in CONFIRMING))
+    others = [_tolerant(scene, other, rtol) for rtol in confirming for other in _others(scene, own)]
+    return [asis, *mine[:2], *others[:1], *mine[2:4], denser, *others[1:], *mine[4:]]
+
+
+def _others(scene: Scene, own: Setting) -> list[str]:
+    """Methods of other families than the scene's own: an explicit one, and one for what is stiff or vibrates."""
+    implicit = VIBRATING if scene.flexible() and own.integrator != VIBRATING else STIFF
+    return [name for name in (DEFAULT, implicit) if name != own.integrator]
+
+
+def wide(scene: Scene, integrators: Collection[str] = ()) -> list[Design]:
+    """All methods over all their tolerances and steps, and the paper's choice.
+
+    integrators: those that are compared, all when empty.  Raises InputError for a method that is not compared.
+    """
+    known = [name for name, traits in INTEGRATORS.items() if traits.tolerances or traits.steps]
+    for name in integrators:
+        if name not in known:
+            raise InputError(f"--integrators {name}", "is not among those that are compared", suggestion(name, known))
+    result = list[Design]()
+    for name in integrators or known:
+        result += [_tolerant(scene, name, rtol) for rtol in INTEGRATORS[name].tolerances]
+        result += [_stepped(scene, name, step) for step in INTEGRATORS[name].steps]
+    paper = paper_solver(scene)
+    return [*result, _design(scene, "paper", paper, f"{_words(paper)}, as the paper")]
+
+
+def models(scene: Scene, own: Setting, highest: float) -> list[Design]:
+    """Mode sets by the frequencies that they reach, finer meshes, and another beam theory, with the own integrator.
+
+    highest: the highest frequency that the scene's bundles hold [Hz].
+    """
+    return list(_models(scene, own, highest))
+
+
+def _tolerant(scene: Scene, integrator: str, rtol: float) -> Design:
+    solver = {"integrator": integrator, "rtol": rtol}
+    return _design(scene, "tolerance", solver, adaptive_integrator=integrator, rtol=rtol)
+
+
+def _stepped(scene: Scene, integrator: str, step: float) -> Design:
+    solver = {"integrator": integrator, "step": step}
+    return _design(scene, "step", solver, fixed_integrator=integrator, step=step)
+
+
+def _design(scene: Scene, group: str, solver: Mapping[str, Any], key: str = "", **factors: Any) -> Design:
+    change = {"solver": _solver(scene, **solver), **PLAIN}
+    return Design(key or _words(solver), group, factors, edited(scene, change))
+
+
+def _words(solver: Mapping[str, Any]) -> str:
+    setting = f"rtol {solver['rtol']:g}" if "rtol" in solver else f"step {solver['step']:g} s"
+    return f"{solver['integrator']}, {setting}" + (", unlocated contacts" if "events" in solver else "")
+
+
+def _solver(scene: Scene, **changes: Any) -> dict[str, Any]:
+    """The scene's solver with another method; its limits stay."""
+    own = scene.solver.model_dump(mode="json", exclude_none=True, exclude={*NAMING, "events", "by_need"})
+    return own | changes
+
+
+def _own(scene: Scene, own: Setting) -> dict[str, Any]:
+    fixed = {} if own.step is None else {"step": own.step, "events": scene.solver.events}
+    return _solver(scene, integrator=own.integrator, rtol=own.rtol, **fixed)
+
+
+def _sampling(scene: Scene, own: Setting) -> Iterator[Design]:
+    """The scene as it is, and with denser output."""
+    interval, plain = scene.output.interval, {"solver": _own(scene, own), **PLAIN}
+    yield Design("as it is", "sampling", {"interval": interval}, edited(scene, plain))
+    output = scene.output.without(scene.output.stress or ())
+    finer = edited(scene, {**plain, "output": output | {"interval": interval / FINER_OUTPUT}})
+    yield Design("denser output", "sampling", {"interval": interval / FINER_OUTPUT}, finer)
+
+
+def _models(scene: Scene, own_setting: Setting, highest: float) -> Iterator[Design]:
+    recipes = [read_toml(Path(body.mesh)) for body in scene.flexible().values()]
+    own_theory = str(recipes[0].get("theory", "rayleigh"))
+    own = next(iter(scene.flexible().values())).modes.reference
+
+    def design(reference: str, limit: float, refinement: int, theory: str) -> Design:
+        modes = {"reference": reference, "up_to": limit * highest}
+        bodies = {f"body.{name}.modes": modes for name in scene.flexible()}
+        change = edited(scene, {**bodies, "solver": _own(scene, own_setting), **PLAIN})
+        elements = refinement * int(recipes[0].get("elements", 1))
+        key = f"{reference} up to {limit * highest:.4g} Hz, {elements} elements, {theory}"
+        own_one = (reference, limit, refinement, theory) == (own, 1.0, 1, own_theory)
+        factors = {"theory": theory, "mode_set": reference, "modes": limit * highest, "elements": elements}
+        factors |= {"own": own_one}
+        return Design(key, "model", factors, change, {"elements": refinement, "theory": theory})
+
+    yield design(own, 1.0, 1, own_theory)
+    for reference in dict.fromkeys((own, *MODE_SETS)):
+        for limit in LIMITS:
+            if (reference, limit) != (own, 1.0):
+                yield design(reference, limit, 1, own_theory)
+    if all("elements" in recipe for recipe in recipes):
+        for refinement in REFINEMENTS[1:]:
+            yield design(own, 1.0, refinement, own_theory)
+        for other in ("euler-bernoulli", "rayleigh", "timoshenko"):
+            if other != own_theory:
+                yield design(own, 1.0, 1, other)

@@ -1,0 +1,199 @@
+"""``flexclear doctor``: versions, graphics, caches, space, and a small run with a known answer."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+
+from flexclear.commands import reproduction
+from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
+from flexclear.pipeline.core.system import machine, platforms
+from flexclear.pipeline.core.system.errors import FlexclearError
+from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
+from flexclear.stages.workplace import add_options, open_workplace
+
+LIBRARIES = (
+    "numpy",
+    "scipy",
+    "numba",
+    "llvmlite",
+    "xarray",
+    "netCDF4",
+    "skfem",
+    "meshio",
+    "matplotlib",
+)
+#: without these only pictures of shapes are missing
+OPTIONAL = ("pyvista", "vtk", "imageio")
+#: before each line: what is right, what is wrong, and what is lacking without being needed
+LABELS = {True: "ok   ", False: "WRONG", None: "lacks"}
+#: least space that is no reason to worry [B]
+LITTLE_MEMORY, LITTLE_DISK, LITTLE_FOR_KERNELS = 1e9, 2e9, 1e8
+#: characters of the longest path below the results, but for names of scenes that are longer than usual
+DEEPEST = 130
+#: a body in free fall: after the time T [s] it has fallen by g T^2/2
+GRAVITY, T = 9.81, 0.1
+SCENE = f"""
+title = "Free fall"
+[time]
+end = {T}
+[output]
+interval = {T}
+[load.gravity]
+type = "gravity"
+acceleration = [0.0, 0.0, {-GRAVITY}]
+[body.ball]
+type = "rigid"
+mass = 2.0
+inertia = [0.1, 0.1, 0.1]
+pose = {{}}
+"""
+#: run apart, where nothing is compiled: that would take longer than all else
+RUN = """import sys
+import flexclear as fc
+from flexclear.pipeline.core.system.errors import FlexclearError
+try:
+    result = fc.run(sys.argv[1])
+except FlexclearError as error:
+    sys.exit(str(error))
+print(float(result.position.sel(body="ball", axis="z")[-1]))
+"""
+#: integration is exact to its tolerance, 1e-10 of metres
+CLOSE = 1e-9
+
+
+class UnwellError(FlexclearError):
+    """Something that this program needs is missing or wrong."""
+
+    exit_code = 4
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What it takes: nothing, what to repeat, or what to compile."""
+    either = parser.add_mutually_exclusive_group()
+    either.add_argument(
+        "--bundle", metavar="SCENE", help="run a scene and write all that is needed to repeat it into one file"
+    )
+    either.add_argument("--repeat", type=Path, metavar="FILE.zip", help="run what such a file holds")
+    either.add_argument(
+        "--compile",
+        nargs="*",
+        metavar="SCENE",
+        help="compile now what runs of these scenes call, without running them; without names what most scenes call",
+    )
+    add_options(parser, "set")
+    parser.add_argument("--out", type=Path, metavar="FILE.zip", help="where --bundle writes")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Print the findings line by line; raise UnwellError at the end when something is wrong."""
+    if options.bundle is not None:
+        path = reproduction.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
+        print(f"{path}: the scene's files, versions and what was said; flexclear doctor --repeat {path.name}")
+        return
+    if options.repeat is not None:
+        same, said = reproduction.repeat(options.repeat, (*LIBRARIES, *OPTIONAL))
+        print(said)
+        if not same:
+            raise UnwellError("it does not end here as it did there")
+        return
+    if options.compile is not None:
+        names = import_module("flexclear.commands.compile_ahead").compiled(options.compile, open_workplace())
+        print(f"compiled: all that runs of {', '.join(names)} call; {_kernels()[0]}")
+        return
+    wrong = []
+    for name, text, fine in findings():
+        print(f"{LABELS[fine]}  {name:<10} {text}", flush=True)
+        wrong += [name] if fine is False else []
+    if wrong:
+        raise UnwellError(f"not well: {', '.join(wrong)}")
+
+
+def findings() -> Iterator[tuple[str, str, bool | None]]:
+    """Name, finding, and whether that is right; None where something is lacking that only pictures need."""
+    yield (
+        "python",
+        f"{platform.python_version()} on {platform.system()} {platform.machine()}",
+        sys.version_info >= (3, 11),
+    )
+    versions = {name: library_version(name) for name in (*LIBRARIES, *OPTIONAL)}
+    missing = [name for name in LIBRARIES if versions[name] == "absent"]
+    yield "libraries", ", ".join(f"{n} {v}" for n, v in versions.items()), not missing
+    yield "memory", f"{machine.size(machine.memory())} free", machine.memory() > LITTLE_MEMORY
+    yield "results", *_results(results_root())
+    yield "kernels", *_kernels()
+    yield "graphics", *_graphics()
+    yield "self-test", *_self_test()
+
+
+def _results(root: Path) -> tuple[str, bool]:
+    """The folder of results, the space there, and what else keeps results from being written."""
+    free = machine.disk(root)
+    wrong = [f"less than {machine.size(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
+    if not os.access(next(p for p in (root, *root.parents) if p.exists()), os.W_OK):
+        wrong.append("nothing can be written there: FLEXCLEAR_RESULTS names another folder")
+    if len(str(root)) + DEEPEST > platforms.longest_path():
+        wrong.append(
+            f"longer than paths to files may be here ({platforms.longest_path()} characters with {DEEPEST} of ours)"
+        )
+    return "; ".join([f"{root}, {machine.size(free)} free", *wrong]), not wrong
+
+
+def _kernels() -> tuple[str, bool]:
+    from flexclear.pipeline.dynamics.compile.folder import writable
+
+    said: list[str] = []
+    try:
+        folder = writable(kernel_root(), said.append)
+    except FlexclearError as error:
+        return str(error), False
+    if said:
+        return f"{said[0]}: FLEXCLEAR_KERNELS names another folder", False
+    text = f"{folder}, {sum(1 for _ in folder.glob('*.sum'))} compiled"
+    if machine.disk(folder) < LITTLE_FOR_KERNELS:
+        return f"{text}; only {machine.size(machine.disk(folder))} free: FLEXCLEAR_KERNELS names another folder", False
+    return text, True
+
+
+def _graphics() -> tuple[str, bool | None]:
+    """Draw something: libraries that load may still fail. Without them only pictures of shapes are lacking."""
+    from flexclear.pipeline.post.render import gl
+
+    if gl.works():
+        return f"{gl.state()}; a picture was drawn", True
+    return f"{gl.state()}; nothing can be drawn: {gl.remedy()}", None
+
+
+def _self_test() -> tuple[str, bool]:
+    expected = -0.5 * GRAVITY * T**2
+    paths = os.pathsep.join([str(TREE), os.environ.get("PYTHONPATH", "")])  # where the libraries may be, too
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            (Path(folder) / "fall.toml").write_text(SCENE, encoding="utf-8", newline="\n")
+            # results and kernels have lines of their own
+            environment = {"FLEXCLEAR_RESULTS": folder, "FLEXCLEAR_KERNELS": str(Path(folder) / "kernels")}
+            done = subprocess.run(
+                [sys.executable, "-W", "ignore", "-c", RUN, str(Path(folder) / "fall.toml")],
+                env={**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": paths, **environment},
+                capture_output=True,
+                encoding="utf-8",
+                errors="replace",
+                check=False,
+            )
+    except OSError as error:
+        return f"a free fall cannot be computed: {error.strerror} ({error.filename})", False
+    lines = done.stdout.split()
+    if done.returncode or not lines:
+        said = done.stderr.strip().splitlines()
+        # of a traceback only the last line is for users
+        last_lines = said[-1:] if any(line.startswith("Traceback") for line in said) else said[-4:]
+        return f"a free fall cannot be computed: {' '.join(line.strip() for line in last_lines)}", False
+    fine = abs(float(lines[-1]) - expected) < CLOSE
+    return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine

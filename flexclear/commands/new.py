@@ -1,0 +1,67 @@
+"""``flexclear new``: a commented scene to start from, with its mesh recipes, in a folder of the user's."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from flexclear.pipeline.core.artifacts.paths import DATA
+from flexclear.pipeline.core.system.errors import InputError, ResourceError
+
+TEMPLATES = DATA / "stages" / "templates"
+#: kinds of mechanisms -> what they are
+KINDS = {
+    "four-bar": "planar linkage of rigid bodies with one loose pin",
+    "slider-crank": "flexible connecting rod, clearance at the crank pin",
+    "pendulum": "one rigid body on a hinge",
+    "leg": "spatial leg with a driven flexible rod and a loose ball joint",
+    "empty": "the skeleton of a scene",
+}
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    message = "; ".join(f"{name}: {text}" for name, text in KINDS.items())
+    parser.add_argument("kind", choices=list(KINDS), metavar="KIND", help=message)
+    parser.add_argument(
+        "folder", nargs="?", type=Path, default=Path(), metavar="FOLDER", help="where; default: the current folder"
+    )
+
+
+def command(options: argparse.Namespace) -> None:
+    """Write the files and say what to do next."""
+    files = write(options.kind, options.folder)
+    print(f"wrote {', '.join(str(path) for path in files)}")
+    scene = files[0]
+    print(
+        "next:",
+        f"  flexclear show {scene}        the start pose with all names; nothing is run",
+        f"  flexclear check {scene}       every mistake at once; nothing is run",
+        f"  flexclear render {scene}      film and pictures",
+        f"  flexclear report {scene}      one page with figures, and next to its ideal mechanism",
+        sep="\n",
+    )
+
+
+def write(kind: str, folder: Path) -> list[Path]:
+    """The files of a new mechanism, the scene first; InputError where one of them is there already."""
+    sources = sorted(
+        (TEMPLATES / kind.replace("-", "_")).glob("*.toml"), key=lambda p: "[body" not in p.read_text(encoding="utf-8")
+    )
+    targets = [folder / source.name for source in sources]
+    for target in targets:
+        if target.exists():
+            raise InputError(
+                str(target),
+                "is there already, and is not written over",
+                f"name another folder: flexclear new {kind} FOLDER",
+            )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for source, target in zip(sources, targets, strict=True):
+            target.write_bytes(source.read_bytes())
+    except FileExistsError:
+        raise InputError(str(folder), "is a file, not a folder", "name another folder") from None
+    except OSError as error:
+        raise ResourceError(f"{folder}: cannot be written: {error.strerror}") from None
+    return targets

@@ -1,0 +1,318 @@
+"""``flexclear plan``: which effects, modes and tolerance a scene's requested accuracy calls for, and by what
+evidence."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.commands import as_json, export, scenes
+from flexclear.pipeline.core.artifacts.store import Record, publish
+from flexclear.pipeline.core.scene import variants
+from flexclear.pipeline.core.scene.coupling import lessened
+from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import effect_plan, limit, watched_quantities
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import FailedTasksError, Workplace, check, open_workplace
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+
+#: how a planned scene's file is called, after its scene's
+SUFFIX = ".planned.toml"
+#: starts that `--verify` runs of scenes with contacts: more of them until the verdict is decided or the budget used [s]
+MEMBERS, BUDGET = (4, 8, 16, 32), 60.0
+#: accuracies that are planned for a scene without `[accuracy]`, as fractions of each watched quantity's size
+LEVELS = ("10 %", "1 %", "0.1 %")
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    scenes.scene_arguments(parser, "json", "budget", budget={"default": f"{BUDGET:g}s"})
+    parser.add_argument("--out", type=Path, metavar="FILE.toml", help="write the planned scene here, too (one scene)")
+    parser.add_argument(
+        "--verify", action="store_true", help="run the full scene and say what the plan's true error is"
+    )
+
+
+def command(options: argparse.Namespace) -> None:
+    """Plan scenes, print the decisions and say where the planned scenes are; with `--verify` their true errors."""
+    if options.out is not None:
+        if len(options.scenes) > 1:
+            raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "plan the scenes one by one")
+        export.check_format(options.out, (".toml",))
+        scenes.check_target(options.out)
+    workplace = open_workplace(options)
+    missed, plans = list[str](), dict[str, object]()
+    budget = limit.seconds(options.budget, "--budget")
+    for graph in scenes.graphs(options.scenes, options.set):
+        if graph.scene.accuracy is None and not options.verify and options.out is None:
+            plans[graph.scene.name] = table = levels(graph.scene, workplace)
+            if not options.json:
+                print(table)
+            continue
+        planned = bring(graph.scene, workplace)
+        plans[graph.scene.name] = planned.dataset() if options.json else None
+        if not options.json:
+            print(planned.text())
+        if options.out is not None:
+            publish(options.out, planned.file(options.out))
+        if options.verify:
+            missed += verify(planned, workplace, budget)
+        if not options.json:
+            planned.tell()
+    if options.json:
+        print(as_json.as_json(plans))
+    if missed:
+        raise scenes.MissedAccuracyError("\n".join(missed))
+
+
+def levels(scene: Scene, workplace: Workplace) -> str:
+    """What three accuracies of all watched quantities call for, as a table.
+
+    Raises InputError for a scene without effects, or that watches nothing.
+    """
+    from flexclear.pipeline.post.answers.plan import levels as shown
+    from flexclear.pipeline.post.plotting.table import as_markdown
+
+    plans: dict[str, xr.Dataset | str] = {}
+    for level in LEVELS:
+        try:
+            plans[level] = bring(asking(scene, level), workplace).dataset()
+        except (InputError, FailedTasksError) as error:
+            if not variants.effects(scene):
+                raise
+            plans[level] = str(error)
+    return as_markdown(shown(plans))
+
+
+def asking(scene: Scene, level: str) -> Scene:
+    """The scene with one accuracy of all its watched quantities, as a fraction of their sizes."""
+    chosen = {quantity.name: level for quantity in scene.watched()}
+    if not chosen:
+        raise InputError(str(scene.path or scene.name), "watches nothing", "name quantities in [view] watch")
+    asked = edited(scene, {"accuracy": chosen})
+    asked._name, asked._path = f"{scene.name} to {level.replace(' ', '')}", None
+    return asked
+
+
+def planned_scenes(requested: list[Graph], workplace: Workplace) -> list[Planned]:
+    """The plans of scenes, brought up to date and printed."""
+    plans = [bring(graph.scene, workplace) for graph in requested]
+    print(*(plan.text() for plan in plans), sep="\n")
+    return plans
+
+
+@dataclass(frozen=True)
+class Planned:
+    """A plan that is up to date. scene: the full one.  planned: what the plan makes of it."""
+
+    scene: Scene
+    planned: Scene
+    task: Task
+    record: Record
+    workplace: Workplace
+
+    @property
+    def folder(self) -> Path:
+        """Where its files are shown."""
+        return self.workplace.store.root / self.task.folder
+
+    @property
+    def target(self) -> Path:
+        """The planned scene's file."""
+        return self.folder / f"{self.scene.name.rpartition('/')[2]}{SUFFIX}"
+
+    def dataset(self) -> xr.Dataset:
+        """Influences, decisions and evidence (`pipeline.post.answers.plan.dataset`)."""
+        return self.workplace.store.load(self.record)
+
+    def stored(self, name: str) -> Path:
+        """One of its files, in the store."""
+        return self.workplace.store.path(self.task.stage, self.record.key, name)
+
+    def text(self) -> str:
+        """The table of decisions."""
+        return self.stored("plan.md").read_text(encoding="utf-8")
+
+    def file(self, target: Path) -> bytes:
+        """The planned scene's file for a given path; it extends the full scene's."""
+        assert self.scene.path is not None
+        head = (
+            "written by flexclear plan",
+            "what the requested accuracy of the full scene does not call for is left out",
+        )
+        base = load_scene(self.scene.path)
+        return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
+
+    def missed(self) -> list[str]:
+        """Verify the plan; see `verify`."""
+        return verify(self, self.workplace)
+
+    def tell(self) -> None:
+        """One line on what was written where."""
+        files = {"index.html": "the page", self.target.name: "the planned scene", "plan.nc": "all influences"}
+        scenes.print_files(self.folder, files)
+
+
+def _example(scene: Scene) -> str:
+    """What `[accuracy]` of this scene could say."""
+    watched = next((quantity for quantity in scene.watched() if quantity.kind == "position"), None)
+    body = watched.owner if watched is not None else next(iter(scene.rigid()), "body")
+    return f'{body}.position = "10 um"'
+
+
+def bring(scene: Scene, workplace: Workplace) -> Planned:
+    """The plan of a scene, brought up to date; the planned scene's file and the page next to it.
+
+    Raises InputError for a scene without `[accuracy]` or effects, or whose accuracy nothing meets or everything does,
+    and what its runs raise.
+    """
+    where = f"{scene.path or scene.name}"
+    if scene.accuracy is None or not scene.accuracy.quantities:
+        raise InputError(
+            f"{where} [accuracy]",
+            "the scene asks for no accuracy",
+            f"name one with what it may be off, such as {_example(scene)} in [accuracy]",
+        )
+    if not variants.effects(scene):
+        raise InputError(
+            where, "has no effect that could be left out: no clearance, flexible body, friction, gravity or stop"
+        )
+    task = effect_plan.task(scene)
+    outcome = workplace.bring([task])
+    check(outcome)
+    record = outcome.records[id(task)]
+    planned = Planned(scene, of(scene, workplace.store.load(record)), task, record, workplace)
+    if scene.path is not None:
+        publish(planned.target, planned.file(planned.target))
+        publish(planned.folder / "index.html", page(planned))
+    return planned
+
+
+def of(scene: Scene, plan: xr.Dataset) -> Scene:
+    """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities set."""
+    decided = effect_plan.from_dataset(plan)
+    bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
+    fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
+    owners = fewer.owners()
+    watch = [q.name for q in scene.watched() if q.is_there(owners)]
+    view = bare.view.model_dump(mode="json", exclude_none=True) if bare.view is not None else {}
+    solver: dict[str, Any] = {key: decided[key] for key in ("integrator", "rtol", "ledger_tolerance") if key in decided}
+    if "evaluations" in scene.solver.model_fields_set:
+        solver["evaluations"] = scene.solver.evaluations  # a limit that the scene sets itself
+    result = edited(
+        fewer,
+        {
+            "title": f"{scene.title}, as planned",
+            "accuracy": None,
+            "ensemble": None,
+            "solver": solver,
+            "view": view | {"watch": watch},
+        },
+    )
+    result._name, result._path = f"{scene.name}-planned", None
+    return result
+
+
+def page(planned: Planned) -> bytes:
+    """The page of a plan: in words, the chart, the table, the planned scene."""
+    import html
+
+    from flexclear.pipeline.post.answers.plan import words
+    from flexclear.pipeline.post.overview.page import Part, media
+    from flexclear.pipeline.post.overview.page import page as made
+    from flexclear.pipeline.post.plotting.table import as_html, from_markdown
+
+    picture = media("plan.png", planned.stored("plan.png").read_bytes(), "Estimated influence of each effect, at most")
+    text = html.escape(planned.file(planned.target).decode())
+    parts = [
+        Part("chart", "Influences", picture),
+        Part("decisions", "Decisions", as_html(from_markdown(planned.text()))),
+        Part("scene", "The planned scene", f"<figure><pre class='scroll'>{text}</pre></figure>"),
+    ]
+    return made(f"Plan: {planned.scene.title}", words(planned.dataset()), parts)
+
+
+def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> list[str]:
+    """Run the full and the planned scene, print how much they differ, and return what was missed, in words.
+
+    budget: time for members that decide the verdicts [s].
+    """
+    from flexclear.pipeline.post.answers.plan import MISSED, verdict, verified
+    from flexclear.pipeline.post.plotting.table import as_markdown
+
+    compared = errors_of(planned, workplace, budget)
+    print(as_markdown(verified(compared)))
+    requested = planned.scene.accuracy
+    columns = ("quantity", "unit", "error", "chance", "wanted")
+    over = [
+        f"{planned.scene.name}: the plan misses {name}: {error:.3g} instead of {most:.3g} {unit}"
+        for name, unit, error, chance, most in zip(*(compared[key].values for key in columns), strict=True)
+        if verdict(error, chance, most) == MISSED
+    ]
+    return over if requested is None or not requested.allow_missed else []
+
+
+def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> xr.Dataset:
+    """Distance of the planned run from the full one by quantity, each over members where it has contacts.
+
+    Members are added until every verdict is decided, as long as the next ones fit into the budget [s].
+    """
+    from flexclear.pipeline.post.answers.plan import UNDECIDED, verdict
+
+    begun, last = time.monotonic(), 0.0
+    for members in MEMBERS:
+        round_begun = time.monotonic()
+        result = _compared(planned, workplace, members)
+        last = time.monotonic() - round_begun
+        open_ = [verdict(*values) == UNDECIDED for values in _columns(result)]
+        loose = planned.scene.contacts() or planned.scene.stop
+        if not any(open_) or not loose or time.monotonic() - begun + 2.0 * last > budget:
+            break
+    return result
+
+
+def _columns(result: xr.Dataset) -> list[tuple[float, float, float]]:
+    """Error, chance and what is requested, by quantity."""
+    columns = (result[key].values for key in ("error", "chance", "wanted"))
+    return [(float(e), float(c), float(w)) for e, c, w in zip(*columns, strict=True)]
+
+
+def _compared(results: Planned, workplace: Workplace, members: int) -> xr.Dataset:
+    """Distance of the planned run from the full one over so many members."""
+    from flexclear.pipeline.core.artifacts import effect_size
+    from flexclear.pipeline.core.scene.quantity import parse
+    from flexclear.pipeline.core.system.errors import SolverError
+
+    assert results.scene.accuracy is not None
+    names = list(results.scene.accuracy.quantities)
+    chosen = [parse(name, results.scene.owners()) for name in names]
+    full = edited(results.scene, {"accuracy": None})
+    tasks = [watched_quantities.task(scene, chosen, members) for scene in (full, results.planned)]
+    outcome = workplace.bring(tasks)
+    check(outcome)
+    one, two = (
+        watched_quantities.point(workplace.store.load(outcome.records[id(task)]), scene, chosen)
+        for task, scene in zip(tasks, (full, results.planned), strict=True)
+    )
+    for point, what in ((one, "full"), (two, "planned")):
+        if point.refused:
+            raise SolverError(f"{results.scene.name}: the {what} run is refused: {point.refused}")
+    plan = results.dataset()
+    difference = [effect_size.influence(two, one, q, members) for q in chosen]
+    result = plan[["wanted"]].copy()
+    for k, q in enumerate(chosen):
+        want = results.scene.accuracy.quantities[q.name]
+        if want.relative is not None:  # what it is relative to is known now
+            result["wanted"][k] = want.relative * effect_size.size(one, q)
+    result["error"] = (("quantity",), [i.difference for i in difference])
+    result["chance"] = (("quantity",), [i.uncertainty for i in difference])
+    return result.assign_attrs(full_evaluations=one.evaluations, planned_evaluations=two.evaluations, members=members)

@@ -1,0 +1,118 @@
+"""``flexclear render``: pictures, films and pages of scenes, their modes, joints and vibrations."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flexclear.commands import as_json, scenes
+from flexclear.pipeline.core.scene.units import quantity
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages.graph import Graph
+from flexclear.stages.rendering import FORMATS
+from flexclear.stages.workplace import Workplace, check, open_workplace, relative
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.scene.schema import Scene
+
+#: what is made where nothing is asked for
+USUAL = (("motion", "png"), ("motion", "mp4"), ("motion", "html"), ("modes", "html"))
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    scenes.scene_arguments(parser, "json")
+    parser.add_argument(
+        "--what",
+        choices=FORMATS,
+        help="the motion, its stress, modes of flexible bodies, joints with clearance, or vibrations; "
+        "default: motion and modes",
+    )
+    known = list(dict.fromkeys(kind for kinds in FORMATS.values() for kind in kinds))
+    parser.add_argument(
+        "--format",
+        choices=known,
+        help="picture (png), film (gif, mp4), page to turn (html), or for other programs: gltf, pvd (ParaView); "
+        "default: what suits",
+    )
+    parser.add_argument("--at", metavar="TIME", help="of vibrations: time whose drive positions are held, e.g. '90 ms'")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Bring them up to date and say where they are."""
+    requested = _requested(options.what, options.format)
+    if options.at is not None and options.what != "vibrations":
+        raise InputError("--at", "belongs to --what vibrations")
+    try:
+        time = None if options.at is None else quantity(options.at, "time")
+    except ValueError as error:
+        raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
+    graphs, workplace = scenes.graphs(options.scenes, options.set), open_workplace(options)
+    tasks = {graph.scene.name: _tasks(graph, requested, options.what is not None, time) for graph in graphs}
+    made = [task for group in tasks.values() for task in group]
+    if len(graphs) > 1 and requested == [("modes", "html")]:
+        made.append(_beside(graphs))
+    outcome = workplace.bring(made)
+    files = dict[str, list[str]]()
+    for task in made:
+        record = outcome.records.get(id(task))
+        if record is None:
+            continue
+        files.setdefault(task.scene, []).extend(str(workplace.store.root / task.folder / name) for name in record.files)
+        if not options.json:
+            _tell(workplace, task.folder, list(record.files))
+    if options.json:
+        print(as_json.as_json(files))
+    check(outcome)
+
+
+def _requested(what: str | None, kind: str | None) -> list[tuple[str, str]]:
+    """What is to be made.  Raises InputError for what cannot be shown so."""
+    if what is None and kind is None:
+        return list(USUAL)
+    if what is None:
+        what = "motion"
+    if kind is None:
+        return [(what, next(k for k in ("mp4", "html", "png") if k in FORMATS[what]))]
+    if kind not in FORMATS[what]:
+        raise InputError(
+            f"--what {what} --format {kind}", f"{what} cannot be shown so", f"as {', '.join(FORMATS[what])}"
+        )
+    return [(what, kind)]
+
+
+def _tasks(graph: Graph, requested: list[tuple[str, str]], asked: bool, time: float | None) -> list:
+    """One task for each; of what is usual, modes only where there are some."""
+    there = [pair for pair in requested if asked or pair[0] != "modes" or graph.scene.flexible()]
+    with scenes.in_file(graph.scene.path):
+        return [graph.picture(what, kind, time) for what, kind in there]
+
+
+def _beside(graphs: list[Graph]) -> Task:
+    """The mode sets of several scenes on one page."""
+    bundles = {f"bundle/{graph.scene.name}: {body}": task for graph in graphs for body, task in graph.bundle.items()}
+    return Task(
+        stage="render",
+        scene=graphs[-1].scene.name,
+        part="modes of all",
+        run="flexclear.stages.rendering:run",
+        params={"what": "modes", "format": "html", "title": "Mode sets next to each other"},
+        inputs=bundles,
+        folder=f"compare/{scenes.joined([graph.scene.name for graph in graphs])}",
+    )
+
+
+def _tell(workplace: Workplace, folder: str, files: list[str]) -> None:
+    shown = [name for name in sorted(files) if not name.endswith(".vtp")]
+    rest = len(files) - len(shown)
+    print(f"{relative(workplace.store.root / folder)}: {', '.join(shown)}{f' and {rest} more files' if rest else ''}")
+
+
+def rendered(scene: Scene, workplace: Workplace | None = None) -> Path:
+    """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
+    workplace, requested = workplace or open_workplace(), Graph(scene)
+    scenes.require_names(scene)
+    check(workplace.bring(list(requested.render.values()), jobs=1))
+    return workplace.store.root / requested.simulate.folder

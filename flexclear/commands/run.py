@@ -1,0 +1,85 @@
+"""``flexclear run``: scenes brought up to date."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from flexclear.commands import as_json, export, shown_folders
+from flexclear.commands.plan import planned_scenes
+from flexclear.commands.scenes import (
+    FACTS,
+    check_target,
+    conclude,
+    copy_run,
+    deficits,
+    graphs,
+    print_files,
+    scene_arguments,
+)
+from flexclear.pipeline.core.scene.resource_estimate import check_run
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.workflow.schedule import Outcome
+from flexclear.stages.graph import STAGES, Graph
+from flexclear.stages.workplace import Workplace, check, open_workplace
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    scene_arguments(parser, "json")
+    parser.add_argument(
+        "--to", choices=STAGES, default="post", metavar="STAGE", help=f"last stage: {', '.join(STAGES)}"
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help=f"write the run here: {export.KNOWN}",
+    )
+    parser.add_argument(
+        "--planned", action="store_true", help="plan first, and run what the requested accuracy calls for"
+    )
+    parser.add_argument("--verify", action="store_true", help="with --planned: run the full scene, tell the true error")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Bring scenes up to date; say what their bundles lack where those were asked for."""
+    if options.out is not None and len(options.scenes) > 1:
+        raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "run the scenes one by one")
+    if options.out is not None:
+        export.check_format(options.out)
+        check_target(options.out)
+    if options.verify and not options.planned:
+        raise InputError("--verify", "reports the true error of a plan, and no plan is requested", "add --planned")
+    requested = graphs(options.scenes, options.set)
+    workplace = open_workplace(options)
+    plans = planned_scenes(requested, workplace) if options.planned else []
+    requested = [Graph(plan.planned) for plan in plans] or requested
+    for graph in requested:
+        check_run(graph.scene, workplace.store.root)
+        taken = shown_folders.claim(graph.scene, workplace.store)
+        if taken is not None:
+            workplace.monitor.say(taken)
+    outcome = workplace.bring([task for graph in requested for task in graph.up_to(options.to)])
+    check(outcome)
+    if options.to == "bundle" and not options.json:
+        print("\n\n".join(filter(None, (deficits(graph, workplace, outcome) for graph in requested))))
+    if options.out is not None:
+        copy_run(requested[0], workplace, options.out)
+    if options.json:
+        print(as_json.as_json({graph.scene.name: _result(graph, workplace, outcome) for graph in requested}))
+    for graph in requested if options.to in ("simulate", "ensemble", "post") and not options.json else ():
+        print_files(workplace.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
+    missed = [text for plan in plans if options.verify for text in plan.missed()]
+    conclude(requested, workplace, outcome, missed)
+
+
+def _result(graph: Graph, workplace: Workplace, outcome: Outcome) -> dict[str, object]:
+    """What `run --json` prints of a scene: the files that are shown, warnings, and the verdict on its accuracy."""
+    folder, record = workplace.store.root / graph.simulate.folder, outcome.records.get(id(graph.simulate))
+    said = {} if record is None else record.said
+    return {
+        "files": [str(path) for path in sorted(folder.rglob("*")) if path.is_file() and FACTS not in path.parts],
+        "warnings": [text for text in said.get("warnings", "").split("\n") if text],
+        "accuracy": said.get("accuracy_verdict"),
+    }

@@ -1,0 +1,361 @@
+"""Scenes that a command or a function of Python names: found, examined, brought up to date."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.commands import export, shown_folders
+from flexclear.pipeline.core.artifacts.disk import disk_limits, sha256
+from flexclear.pipeline.core.artifacts.paths import DATA, results_root
+from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
+from flexclear.pipeline.core.scene import lines
+from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
+from flexclear.pipeline.core.scene.references import dangling
+from flexclear.pipeline.core.system.errors import InputError, InputErrors, ResourceError, SolverError
+from flexclear.pipeline.core.system.external_files import reading, require_file
+from flexclear.pipeline.core.system.version import DISTRIBUTION
+from flexclear.pipeline.core.workflow.progress import WARNING
+from flexclear.pipeline.core.workflow.schedule import Outcome
+from flexclear.stages.derived_series import origins
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import Workplace, add_options, check, open_workplace, relative
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+#: bytes of what `--set` changes that stand in the name of a folder
+LONGEST_EDITS = 100
+#: folder below a scene's results that is not for users
+FACTS = ".facts"
+
+
+def scene_arguments(parser: argparse.ArgumentParser, *more: str, **changed: Any) -> None:
+    """What all commands take that bring scenes up to date; more, changed: as of `workplace.add_options`."""
+    parser.add_argument("scenes", nargs="+", metavar="SCENE", help="a scene file, or a name below scenes/")
+    add_options(parser, "usual", *more, **changed)
+
+
+def print_files(folder: Path, files: Mapping[str, str]) -> None:
+    """One line on what was written where, of those files that are there."""
+    there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
+    if there:
+        print(f"{relative(folder)}: {', '.join(there)}")
+
+
+def joined(names: Sequence[str]) -> str:
+    """The name of the folder of what is made of several scenes."""
+    return "+".join(name.replace("/", "_").replace(" ", "_") for name in names)
+
+
+class MissedAccuracyError(SolverError):
+    """Runs are not as accurate as their scenes ask; the runs are stored, with their verdicts."""
+
+
+def find_scene(name: str) -> Path:
+    """The file of a scene given by path or by name (``sps4/csj``). InputError names what is near."""
+    path = Path(name)
+    if path.suffix == ".toml" or is_file(path):
+        return path
+    named = DATA / "scenes" / f"{name}.toml"
+    if is_file(named):
+        return named
+    raise InputError(name, "is neither a scene file nor the name of one below scenes/", _known(name))
+
+
+def _known(name: str) -> str:
+    from flexclear.pipeline.core.scene.registry import suggestion
+
+    scenes = DATA / "scenes"
+    return suggestion(name, sorted(p.relative_to(scenes).with_suffix("").as_posix() for p in scenes.rglob("*.toml")))
+
+
+def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
+    """Dataset of the simulate stage, brought up to date; titled and named as the scene is.
+
+    An edited scene (`override`) is cached like any other but does not replace its file's
+    results under results/runs.  Raises FlexclearError.
+    """
+    examine(scene)
+    workplace = workplace or open_workplace()
+    from flexclear.pipeline.core.artifacts import modal as modal  # gives the dataset its accessor
+
+    task = Graph(scene, shown=as_in_its_file(scene)).simulate
+    # in this process: workers would run a caller's script again from its top
+    outcome = workplace.bring([task], jobs=1)
+    check(outcome)
+    from flexclear.pipeline.core.artifacts.table import recorded
+
+    made = workplace.store.load(outcome.records[id(task)])
+    return recorded(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)))
+
+
+def graph(scene: Scene) -> Graph:
+    """The tasks of a scene; an edited one does not replace its file's results under results/runs."""
+    examine(scene)
+    return Graph(scene, shown=scene.path is None or as_in_its_file(scene))
+
+
+def results(scene: Scene | str | Path) -> xr.DataTree:
+    """What there is of a scene below results/runs, or in a file with a dataset, as a tree; nothing is run.
+
+    InputError when there is nothing, or the file holds something else.
+    """
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts import modal as modal
+    from flexclear.pipeline.core.artifacts import upkeep
+
+    if str(scene).endswith(".nc"):
+        path = Path(str(scene))
+        return xr.DataTree.from_dict({path.stem: _dataset(path)}, name=path.absolute().parent.name)
+    name = scene if isinstance(scene, str) else scene_name(scene) if isinstance(scene, Path) else scene.name
+    name = scene_name(Path(name)) if name.endswith(".toml") else name
+    folder = results_root() / "runs" / name
+    files = sorted(
+        path
+        for path in folder.rglob("*.nc")
+        if len(path.relative_to(folder).parts) <= 2 and not path.stem.endswith(PARTIAL)
+    )
+    if not files:
+        raise InputError(name, f"there are no results in {relative(folder)}", f"flexclear run {name}")
+    changed = upkeep.shown_faults(Store(results_root()), folder)
+    if changed:
+        raise ResourceError(f"{changed[0]}: flexclear run {name}")
+    if _of_another_run(folder):
+        files = [path for path in files if path != folder / "post.nc"]
+    # read and closed: the garbage collector closes what stays open, inside of whatever NetCDF call runs then
+    tree = {path.relative_to(folder).with_suffix("").as_posix(): xr.load_dataset(path) for path in files}
+    return xr.DataTree.from_dict(tree, name=folder.name)
+
+
+def _dataset(path: Path) -> xr.Dataset:
+    """The dataset in a file; InputError for what is no scene's (a sweep's, another program's)."""
+    import xarray as xr
+
+    require_file(path, str(path))
+    remedy = "name a scene, or a file below results/runs such as run.nc; xarray.open_dataset opens any other"
+    with reading(path, str(path), "cannot be read as a NetCDF dataset", remedy):
+        dataset = xr.load_dataset(path, engine="netcdf4")
+    if not str(dataset.attrs.get("source")).startswith(f"{DISTRIBUTION} "):
+        why = "is a dataset, but no scene's: it has no attribute `source` that names flexclear"
+        raise InputError(str(path), why, remedy)
+    return dataset
+
+
+def _of_another_run(folder: Path) -> bool:
+    """Whether the shown post.nc was derived from another run than is shown, as after `fc.run` of a changed scene."""
+    store, where = Store(results_root()), folder.relative_to(results_root()).as_posix()
+    post, made = store.last(where, "post"), store.last(where, "simulate")
+    return post is not None and made is not None and post.facts.get("input run") != made.digest
+
+
+def bundles(scene: Scene, workplace: Workplace | None = None, jobs: int | None = 1) -> dict[str, xr.Dataset]:
+    """The reduced flexible bodies of a scene by name, brought up to date.
+
+    jobs: as of `Workplace.bring`; one is this process, since workers would run a caller's script again from its top.
+    Raises FlexclearError.
+    """
+    workplace, graph = workplace or open_workplace(), Graph(scene, shown=False)
+    outcome = workplace.bring(list(graph.bundle.values()), jobs)
+    check(outcome)
+    return _loaded(graph, workplace, outcome)
+
+
+def _loaded(graph: Graph, workplace: Workplace, outcome: Outcome) -> dict[str, xr.Dataset]:
+    return {body: workplace.store.load(outcome.records[id(task)]) for body, task in graph.bundle.items()}
+
+
+def deficits(graph: Graph, workplace: Workplace, outcome: Outcome) -> str:
+    """What the scene's bundles lack, one table for each flexible body."""
+    from flexclear.pipeline.core.artifacts.deficits import table
+
+    reduced = _loaded(graph, workplace, outcome)
+    return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
+
+
+def linear(
+    scene: Scene,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    *,
+    moving: bool = False,
+    vibrations: bool = True,
+    speeds: Sequence[float] | None = None,
+    drive: str | None = None,
+    workplace: Workplace | None = None,
+) -> xr.Dataset:
+    """Equilibrium of a scene in one pose, and the natural vibrations about it; brought up to date as `run` is."""
+    if time is not None and not scene.time.start <= time <= scene.time.end:
+        raise InputError(
+            "time", f"{time:.6g} s is outside of the scene's {scene.time.start:.6g} to {scene.time.end:.6g} s"
+        )
+    workplace = workplace or open_workplace()
+    graph = Graph(scene, shown=as_in_its_file(scene))
+    if speeds is None:
+        task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
+    else:
+        task = graph.campbell(speeds, drive, time, drives)
+    outcome = workplace.bring([task])
+    check(outcome)
+    return workplace.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
+
+
+def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
+    """Tell what the scenes' runs are to be doubted for, as the last thing that a command says.
+
+    Raises MissedAccuracyError, after that, for runs that are not as accurate as asked, and for what `plans` miss.
+    """
+    missed = [*plans]
+    for graph in graphs:
+        record = outcome.records.get(id(graph.simulate))
+        if record is None:
+            continue
+        for sentence in filter(None, record.said.get("warnings", "").split("\n")):
+            workplace.monitor.say(f"{graph.scene.name}: {WARNING}{sentence}")
+        verdict, requested = record.said.get("accuracy_verdict", "met"), graph.scene.accuracy
+        if verdict != "met":
+            text = f"{graph.scene.name} [accuracy]: missed: {verdict}; the run is stored"
+            if requested is None or requested.allow_missed:
+                workplace.monitor.say(text)
+            else:
+                missed.append(f"{text}\n  hint: ask for less, or write allow_missed = true in [accuracy]")
+    if missed:
+        raise MissedAccuracyError("\n".join(missed))
+
+
+def as_in_its_file(scene: Scene) -> bool:
+    """Whether a scene is what its file says, so that its results are shown below results/runs."""
+    return scene.path is not None and load_scene(scene.path) == scene
+
+
+def overrides(settings: Sequence[str]) -> dict[str, object]:
+    """``KEY=VALUE`` texts as edits of a scene; a value is what TOML reads, else text. InputError for other texts."""
+    changes: dict[str, object] = {}
+    for text in settings:
+        key, sign, value = text.partition("=")
+        if not sign or not key.strip():
+            raise InputError(f"--set {text}", "is no KEY=VALUE", "write --set joint.A1.clearance='0.2 mm'")
+        try:
+            changes[key.strip()] = tomllib.loads(f"value = {value}")["value"]
+        except ValueError:  # no TOML, or a number of more digits than Python reads
+            changes[key.strip()] = value.strip()
+        except RecursionError:
+            raise InputError(f"--set {text}", "nests tables or lists too deeply to be read") from None
+    return changes
+
+
+def loaded(name: str, settings: Sequence[str] = ()) -> Scene:
+    """The scene called `name` with `settings` changed; its own name then contains them, and so do its results."""
+    scene = load_scene(find_scene(name), overrides(settings))
+    scene._name = with_edits(scene.name, settings)
+    return scene
+
+
+def with_edits(name: str, settings: Sequence[str]) -> str:
+    """The name with what was changed, as a folder's name: of what is long the beginning, and a digest of the whole."""
+    if not settings:
+        return name
+    suffix = ",".join(re.sub(r"[^\w.=+-]+", "_", text) for text in settings).rstrip(".")  # which Windows leaves out
+    short = suffix if len(suffix.encode()) <= LONGEST_EDITS else f"{suffix[:40]},{sha256(suffix.encode())[:16]}"
+    return f"{name},{short}"
+
+
+def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
+    """Graphs of the scenes, each once, with `settings` (KEY=VALUE) changed; the mistakes of all are reported
+    together."""
+    by_scene: dict[Path | str, Graph] = {}
+    wrong: list[InputError] = []
+    for name in names:
+        try:
+            graph = Graph(loaded(name, settings))
+            examine(graph.scene, settings)
+            with in_file(graph.scene.path):
+                graph.up_to("post")
+            path = graph.scene.path
+            by_scene[graph.scene.name if path is None or settings else path.resolve()] = graph
+        except InputErrors as errors:
+            wrong.extend(errors.errors)
+        except InputError as error:
+            wrong.append(error)
+    if wrong:
+        messages = [lines.located(error) for error in wrong]
+        raise messages[0] if len(messages) == 1 else InputErrors(messages)
+    shown_folders.refuse_namesakes([graph.scene for graph in by_scene.values()])
+    return list(by_scene.values())
+
+
+@contextmanager
+def in_file(path: Path | None) -> Iterator[None]:
+    """Errors without a file in their location get this one."""
+    try:
+        yield
+    except InputError as error:
+        if path is None or not error.place.startswith("["):
+            raise
+        raise InputError(f"{path} {error.place}", error.problem, error.remedy) from None
+
+
+def implausibilities(scene: Scene, settings: Sequence[str] = ()) -> list[InputError]:
+    """Plausibility warnings about a scene; those about values that `settings` changed are located there."""
+    from flexclear.pipeline.core.scene.plausibility import implausible
+
+    changed = overrides(settings)
+    doubts = []
+    for doubt in implausible(scene):
+        key = doubt.place.partition("[")[2].rstrip("]")
+        place = f"--set {key}" if key in changed else doubt.place
+        doubts.append(InputError(place, doubt.problem, doubt.remedy))
+    return doubts
+
+
+def examine(scene: Scene, settings: Sequence[str] = ()) -> None:
+    """Print plausibility warnings; InputErrors for names that lead nowhere. Both before anything is computed."""
+    require_names(scene)
+    for doubt in implausibilities(scene, settings):
+        print(f"flexclear: {WARNING}{lines.located(doubt)}", file=sys.stderr)
+
+
+def require_names(scene: Scene) -> None:
+    """InputErrors for names in a scene that lead nowhere, before a mesh or a mode is computed for it."""
+    table = scene.model_dump(mode="python", exclude_none=True)
+    wrong = dangling(table, recipe_frames, str(scene.path or scene.name))
+    if wrong:
+        raise wrong[0] if len(wrong) == 1 else InputErrors(wrong)
+
+
+def recipe_frames(mesh: str) -> list[str] | None:
+    """Names of the frames in a mesh recipe; None where it cannot be read, which is reported elsewhere."""
+    try:
+        frames = read_toml(Path(mesh)).get("frames")
+    except InputError:
+        return None
+    return list(frames) if isinstance(frames, dict) else None
+
+
+def copy_run(graph: Graph, workplace: Workplace, target: Path) -> None:
+    """Write the dataset of the run to a file of the user's, titled, and atomically like any other."""
+    dataset = run(graph.scene, workplace)
+    with disk_limits(target.parent):
+        export.write(dataset, target)
+
+
+def check_target(target: Path, option: str = "--out") -> None:
+    """InputError when a file cannot be put there; asked before the work, not after it."""
+    where = f"{option} {target}"
+    try:
+        if not target.parent.is_dir():
+            raise InputError(where, "its folder does not exist", f"mkdir -p {target.parent}")
+        if target.is_dir():
+            raise InputError(where, "is a folder", "name a file in it")
+        if target.exists() and not target.is_file():  # a new file would replace a device
+            raise InputError(where, "is no ordinary file", "name a file, and look at it when it is there")
+    except OSError as error:
+        raise InputError(where, f"can be no file: {error.strerror}", "name another one") from None

@@ -1,0 +1,167 @@
+"""``flexclear show``: the start pose of scenes with all names, as a picture and a page; nothing is run or compiled."""
+
+from __future__ import annotations
+
+import argparse
+import html
+import sys
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.commands import as_json, scenes
+from flexclear.pipeline.core.scene import lines
+from flexclear.pipeline.core.system.errors import InputError, ResourceError
+from flexclear.stages import meshing, rendering, rigid_body
+from flexclear.stages.workplace import relative
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.post.render.start_view import StartView
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    scenes.scene_arguments(parser, "json")
+
+
+def command(options: argparse.Namespace) -> int:
+    """Write the picture and the page of each scene to the current folder.
+
+    Exit code 2 where a start does not fit; it is shown all the same.
+    """
+    result, made = 0, dict[str, list[str]]()
+    for name in options.scenes:
+        scene = scenes.loaded(name, options.set)
+        scenes.examine(scene, options.set)
+        files, refused = shown(scene, quiet=options.quiet or options.json)
+        made[scene.name] = [str(file) for file in files]
+        if refused is not None:
+            print(f"flexclear: {lines.located(refused)}", file=sys.stderr)
+            result = refused.exit_code
+    if options.json:
+        print(as_json.as_json(made))
+    return result
+
+
+def shown(scene: Scene, folder: Path | None = None, *, quiet: bool = False) -> tuple[list[Path], InputError | None]:
+    """Write picture and page, and print where they are; returns the files, and why the start is refused if it is."""
+    with scenes.in_file(scene.path):
+        seen, refused = viewed(scene)
+    files = files_of(scene, seen, Path.cwd() if folder is None else folder, quiet=quiet)
+    if not quiet:
+        print(f"{scene.summary()}: {', '.join(relative(file) for file in files)}")
+    for gap in seen.gaps:
+        print(f"flexclear: joint {gap.joint} does not fit at the start: {gap.said}", file=sys.stderr)
+    if refused is not None and scene.path is not None and refused.place.startswith("["):
+        refused = InputError(f"{scene.path} {refused.place}", refused.problem, refused.remedy)
+    return files, refused
+
+
+@dataclass(frozen=True)
+class Start:
+    """What `flexclear.show` returns: the view, why the start is refused, and the page."""
+
+    view: StartView
+    refused: InputError | None
+    page: bytes
+
+    @property
+    def gaps(self) -> dict[str, str]:
+        """What joints miss, by name; empty where all fit."""
+        return {gap.joint: gap.said for gap in self.view.gaps}
+
+    def _repr_html_(self) -> str:
+        """The page within a notebook, in a frame of its own so that its style stays there."""
+        text = html.escape(self.page.decode(), quote=True)
+        return f'<iframe srcdoc="{text}" width="100%" height="760" style="border:0"></iframe>'
+
+
+def start(scene: Scene, folder: Path | None = None) -> Start:
+    """The start pose of a scene; picture and page are written where a folder is given.  Raises InputError."""
+    scenes.require_names(scene)
+    with scenes.in_file(scene.path):
+        seen, refused = viewed(scene)
+    if folder is not None:
+        files_of(scene, seen, folder)
+    return Start(seen, refused, _page(scene, seen))
+
+
+def viewed(scene: Scene) -> tuple[StartView, InputError | None]:
+    """The start pose with its names, and why it is refused.  Raises InputError where there is none to be drawn."""
+    from flexclear.pipeline.dynamics.model.start_pose import start_pose
+    from flexclear.pipeline.dynamics.run.run import placed
+    from flexclear.pipeline.post.render.mechanism import Looks
+    from flexclear.pipeline.post.render.start_view import Missing, start_view
+
+    bodies = {name: _body(Path(recipe)) for name, recipe in scene.recipes().items()}
+    looks = rendering.params(scene, "motion", "pvd")
+    filled = _filled(scene, bodies, lone := _unplaced(scene))
+    pose = start_pose(placed(filled), {name: bodies[name] for name in scene.flexible()}, bodies)
+    gaps = [Missing(gap.joint, gap.start, gap.end, gap.angle) for gap in pose.gaps]
+    seen = start_view(pose.data, bodies, gaps, Looks(bodies=looks.get("bodies", {}), **looks.get("view", {})))
+    if lone:
+        note = f"drawn at the origin, since neither a pose nor a joint places them: {', '.join(lone)}"
+        seen = replace(seen, notes=(*seen.notes, note))
+    return seen, pose.refused
+
+
+def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False) -> list[Path]:
+    """Write the page, and the picture where this machine can draw.  Raises ResourceError."""
+    from flexclear.pipeline.post.render import gl
+
+    stem = Path(scene.name).name
+    content = {f"{stem}_start.html": _page(scene, seen)}
+    if gl.works():
+        from flexclear.pipeline.post.render.pictures import png
+        from flexclear.pipeline.post.render.start_picture import picture
+
+        content[f"{stem}_start.png"] = png(picture(seen, scene.title or stem))
+    elif not quiet:
+        print(f"flexclear: warning: no picture, only the page: {gl.remedy()}", file=sys.stderr)
+    try:
+        for name, data in content.items():
+            (folder / name).write_bytes(data)
+    except OSError as error:
+        raise ResourceError(f"{folder}: cannot be written: {error.strerror}") from None
+    return [folder / name for name in content]
+
+
+def _page(scene: Scene, seen: StartView) -> bytes:
+    from flexclear.pipeline.post.overview.page import viewer_page
+    from flexclear.pipeline.post.pages import viewer
+    from flexclear.pipeline.post.render.start_view import page_view
+
+    title = scene.title or Path(scene.name).name
+    return viewer_page(f"{title}: start", [viewer(page_view(seen), title)])
+
+
+def _body(recipe: Path) -> xr.Dataset:
+    """What is rigid of a mesh, and what is drawn of it."""
+    from flexclear.pipeline.structure.kinds import kind
+    from flexclear.pipeline.structure.modes import rigid
+
+    table: dict[str, Any] = meshing.params(recipe)["recipe"]
+    return rigid.drawn(kind.of_recipe(table).build(table, recipe.parent))
+
+
+def _unplaced(scene: Scene) -> list[str]:
+    """Bodies that neither a pose nor a joint places, as in scenes that are only about a body's modes."""
+    joined = {frame.partition(".")[0] for joint in scene.joint.values() for frame in joint.between}
+    paths = {drive.frame.partition(".")[0] for drive in scene.drive.values() if hasattr(drive, "frame")}
+    return [n for n, b in scene.body.items() if getattr(b, "pose", b) is None and n not in joined | paths]
+
+
+def _filled(scene: Scene, bodies: dict[str, xr.Dataset], lone: list[str]) -> Scene:
+    """The scene with numbers instead of the recipes of rigid bodies, and without deformation at the start.
+
+    lone: bodies that are put at the origin.
+    """
+    table = scene.model_dump(mode="python", exclude_none=True)
+    table["body"] = rigid_body.filled(table["body"], {f"{rigid_body.PREFIX}{n}": bodies[n] for n in scene.meshed()})
+    table.get("start", {}).pop("modal", None)
+    for name in lone:
+        table["body"][name]["pose"] = {}
+    return type(scene).model_validate(table)

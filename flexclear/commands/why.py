@@ -1,0 +1,50 @@
+"""``flexclear why``: for each stage of scenes, fresh, or why it would run again."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+
+from flexclear.commands import as_json, scenes
+from flexclear.pipeline.core.artifacts.store import Record
+from flexclear.pipeline.core.system.errors import shown
+from flexclear.pipeline.core.system.machine import instruction_set
+from flexclear.pipeline.core.workflow.execute import states
+from flexclear.stages.graph import STAGES
+from flexclear.stages.workplace import open_workplace
+
+
+def arguments(parser: argparse.ArgumentParser) -> None:
+    """What the command takes."""
+    scenes.scene_arguments(parser, "json")
+    parser.add_argument("--to", choices=STAGES, default="post", metavar="STAGE", help="last stage")
+
+
+def command(options: argparse.Namespace) -> None:
+    """Print the state of every stage."""
+    workplace, reasons, others = open_workplace(options), dict[str, dict[str, list[str]]](), dict[str, list[str]]()
+    for graph in scenes.graphs(options.scenes, options.set):
+        stages = states(graph.up_to(options.to), workplace.store, workplace.sources)
+        reasons[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
+        others[graph.scene.name] = [text for state in stages for text in elsewhere(state.task.label, state.record)]
+    print(as_json.as_json(reasons) if options.json else text(reasons, others))
+
+
+def elsewhere(label: str, record: Record | None) -> list[str]:
+    """Return what else a fresh result was computed by than this process would: its numbers differ by rounding."""
+    there = record.computed_by if record is not None else {}
+    here = instruction_set() if there else {}
+    names = [name for name in {**there, **here} if there.get(name) != here.get(name)]
+    changes = ", ".join(f"{name} {there.get(name, '(none)')}, here {here.get(name, '(none)')}" for name in names)
+    return [f"{label} was computed by other instructions, its numbers differ by rounding: {changes}"] if names else []
+
+
+def text(reasons: Mapping[str, Mapping[str, Sequence[str]]], others: Mapping[str, Sequence[str]]) -> str:
+    """For each scene its stages, why each would run again, and which others computed what is fresh."""
+    lines = []
+    for scene, stages in reasons.items():
+        lines += [scene, *(f"  note: {shown(note)}" for note in others.get(scene, ()))]
+        for label, why in stages.items():
+            first, *more = map(shown, why or ["fresh"])
+            lines += [f"  {label:<16} {first}", *(f"  {'':<16} {line}" for line in more)]
+    return "\n".join(lines)

@@ -1,0 +1,364 @@
+"""The public functions: from an FE mesh to a converged answer about a mechanism with flexible bodies and clearance.
+
+The same things that the command ``flexclear`` does, from Python::
+
+    import flexclear as fc
+
+    scene = fc.load_scene("slider_crank.toml", override={"joint.pin.clearance": "0.2 mm"})
+    run = fc.run(scene)
+    both = fc.compare(scene, ideal=True)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.errors import FlexclearError, InputError, ResourceError, SolverError
+
+__all__ = [
+    "FlexclearError",
+    "InputError",
+    "ResourceError",
+    "Scene",
+    "SolverError",
+    "compare",
+    "cost",
+    "edited",
+    "effects",
+    "equilibrium",
+    "frequencies",
+    "load_scene",
+    "open",
+    "plan",
+    "quantity",
+    "render",
+    "report",
+    "run",
+    "sections",
+    "show",
+    "stability",
+    "sweep",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """`Scene` and the errors, imported on demand, and the version."""
+    if name.endswith("Error") and name in __all__:
+        return getattr(import_module("flexclear.pipeline.core.system.errors"), name)
+    if name == "Scene":
+        return import_module("flexclear.pipeline.core.scene.schema").Scene
+    if name == "__version__":
+        from flexclear.pipeline.core.system.version import version
+
+        return version()
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def load_scene(source: str | Path | Mapping[str, Any], override: Mapping[str, object] | None = None) -> Scene:
+    """The scene in a TOML file, with everything that it extends, or in a table of the same keys.
+
+    override: dotted path -> value.  A scene may be made part by part, too: ``Scene(title=..., time=..., body=...)``.
+    Raises InputError (exit code 2 of the command) with all mistakes at once.
+
+    >>> import flexclear as fc
+    >>> fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"})
+    <Scene checks/pendulum: 1 rigid body, 1 joint, 1 load; 0 to 0.2 s>
+    """
+    from flexclear.pipeline.core.scene.load import load_scene as load
+    from flexclear.pipeline.core.scene.load import scene_of
+
+    return scene_of(source, override) if isinstance(source, Mapping) else load(source, override)
+
+
+def edited(scene: Scene, changes: Mapping[str, object]) -> Scene:
+    """A copy of a scene with dotted paths changed: ``{"joint.pin.clearance": "0.2 mm"}``, or a whole part as a table.
+
+    Raises InputError.
+
+    >>> import flexclear as fc
+    >>> fc.edited(fc.load_scene("scenes/checks/pendulum.toml"), {"body.bob.mass": "200 g"}).body["bob"].mass
+    0.2
+    """
+    from flexclear.pipeline.core.scene.load import edited as changed
+
+    return changed(scene, changes)
+
+
+def run(scene: Scene | str | Path) -> xr.Dataset:
+    """Dataset of the simulate stage (schema RUN), from the cache when fresh.
+
+    Raises FlexclearError: InputError, SolverError or ResourceError.
+
+    >>> import flexclear as fc
+    >>> run = fc.run(fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"}))
+    >>> round(float(run["joint_position"].sel(coordinate="hinge")[-1]), 4)  # [rad]
+    0.1959
+    """
+    from flexclear.commands import scenes
+
+    return scenes.run(_loaded(scene))
+
+
+def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models: bool = False) -> xr.Dataset:
+    """What accuracy costs: error against cost over integrators, tolerances and steps; cached point by point.
+
+    The quantities are those of the scene's `[accuracy]`, else the usual ones.  budget: processor time that the runs may
+    take [s], or text such as "2min"; by default that of ``flexclear cost``.  models: also other meshes and mode sets.
+    In a notebook the dataset shows the answer first.  Raises FlexclearError.
+    """
+    from flexclear.commands import cost as cost_command
+    from flexclear.stages.workplace import open_workplace
+
+    result: xr.Dataset = cost_command.dataset(_loaded(scene), open_workplace(), budget, models)
+    return result
+
+
+def stability(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
+    """Whether the run of a scene is stable: value, limit, verdict and remedy over `check`.
+
+    Energy balance, closed loops, agreement with tighter runs and with another method, rejected and stiff steps,
+    singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost.  In a notebook
+    the dataset shows the answer first.  Raises FlexclearError.
+    """
+    from flexclear.commands import answers as answers_command
+    from flexclear.stages.workplace import open_workplace
+
+    result: xr.Dataset = answers_command.dataset("stability", _loaded(scene), open_workplace(), budget)
+    return result
+
+
+def sweep(
+    scene: Scene | str | Path,
+    vary: Mapping[str, object],
+    keep: Sequence[str],
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    **more: object,
+) -> xr.Dataset:
+    """Many points of one scene, as ``flexclear sweep`` makes them; finished points come from the cache.
+
+    vary: path in the scene -> its values (a list), or what else a sweep file says of a parameter.
+    keep: what is recorded of each point, e.g. ``["platform.velocity.largest", "A1.peak_force"]``.
+    workers: processes of this machine, its cores by default; scheduler: address of a Dask cluster instead.
+    more: `set`, `combine`, `sample`, `members` and `error` of a sweep file.
+    The result has the parameters as dimensions.  Raises FlexclearError.
+
+    >>> import flexclear as fc
+    >>> where = {"load.gravity.acceleration.1": [-9.81, -1.62]}  # on the earth, and on the moon
+    >>> kept, short = ["bob.velocity.largest"], {"time.end": "0.2 s"}
+    >>> found = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
+    >>> found["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
+    [1.954, 0.324]
+    """
+    from flexclear.commands import sweep as sweep_command
+
+    given = {name: _plain(values) for name, values in vary.items()}
+    table = {"vary": given, "keep": list(keep), **more}
+    return sweep_command.of_scene(_loaded(scene), table, workers, scheduler)
+
+
+def _plain(values: Any) -> Any:
+    """Arrays as lists of Python's own numbers, which are what a sweep file can say."""
+    return values.tolist() if hasattr(values, "tolist") else values
+
+
+def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
+    """A motion that its laws repeat, sampled once in each period (schema SECTIONS), and the verdict on it.
+
+    The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
+    why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
+    """
+    from flexclear.commands import sections as sections_command
+
+    datasets: tuple[xr.Dataset, xr.Dataset] = sections_command.judge(_loaded(scene))
+    return datasets
+
+
+def quantity(run: xr.Dataset, name: str) -> xr.DataArray:
+    """A quantity of a run over time, in SI units with the attribute `units`.
+
+    name: ``slider.acceleration``, a component, ``slider.position.x``, or an expression, ``force(A1) - force(A2)``.
+    Vectors have the dimension `axis`, x y z of the world.  Quantities that contacts have per event (`peak_force`,
+    `impact_times`, `impulse`) have no time.  Raises InputError for what the run lacks, with the nearest name.
+    """
+    from flexclear.pipeline.core.artifacts.quantities import evaluate
+
+    return evaluate(run, name)
+
+
+def equilibrium(
+    scene: Scene | str | Path,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    *,
+    moving: bool = False,
+) -> xr.Dataset:
+    """Static equilibrium of a mechanism close to its start pose, the drives held (schema EQUILIBRIUM).
+
+    time: at which the drives' laws give their positions [s], the scene's start when None.
+    drives: positions [m or rad] by drive, instead of the law's.
+    moving: the drives keep the speed of that moment; the pose is then one of steady motion, as of a rotor.
+    A drive that does not hold the mechanism leaves it free to settle: a ball falls onto its socket's floor.
+    Raises FlexclearError: InputError, SolverError (also when nothing balances the loads) or ResourceError.
+
+    >>> import flexclear as fc
+    >>> rest = fc.equilibrium("scenes/checks/oscillator.toml")
+    >>> round(rest["position"].sel(body="mass", axis="z").item(), 9)  # where its spring is free [m]
+    0.25
+    """
+    return _linear(scene, time, drives, moving=moving, vibrations=False)
+
+
+def frequencies(
+    scene: Scene | str | Path,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    *,
+    moving: bool = False,
+    speeds: Sequence[float] | None = None,
+    drive: str | None = None,
+) -> xr.Dataset:
+    """Natural frequencies, damping and shapes of the assembled mechanism about `equilibrium` (schema LINEAR).
+
+    Arguments and errors as there.  speeds: of a drive [rad/s, or m/s]; the result is then a Campbell diagram, the
+    vibrations about steady motion at each of them (schema CAMPBELL).  drive: its name, where several drives move.
+
+    >>> import flexclear as fc
+    >>> found = fc.frequencies("scenes/checks/oscillator.toml")
+    >>> round(found["frequency"].item(), 4), round(found["damping_ratio"].item(), 6)  # [Hz], [-]
+    (1.5836, 0.1)
+    """
+    from flexclear.commands import scenes
+
+    if speeds is None:
+        return _linear(scene, time, drives, moving=moving, vibrations=True)
+    return scenes.linear(_loaded(scene), time, drives, speeds=speeds, drive=drive)
+
+
+def compare(
+    *scenes: Scene | str | Path, ideal: bool | Literal["both", "clearance", "flexibility", "each"] = False
+) -> xr.Dataset:
+    """Scenes next to each other, or next to their ideal mechanisms: differences, the error of each run, events and
+    costs.
+
+    ideal: compare each scene with itself without clearance and flexibility (True or "both"), without one of them, or
+    with each of these.  The first run is the reference; its variables are reported in
+    `pipeline.post.overview.comparison`. Raises FlexclearError.
+    """
+    from flexclear.commands import compare as compare_command
+    from flexclear.stages.workplace import open_workplace
+
+    without = "both" if ideal is True else ideal or None
+    comparison = compare_command.bring([_loaded(scene) for scene in scenes], open_workplace(), without)
+    return comparison.dataset()
+
+
+def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
+    """What each effect of a scene does to each quantity, taken away and put in, alone and in pairs.
+
+    Variables and meanings: `pipeline.post.answers.effect_sizes`.  The quantities are those of `[view] watch`, else of
+    `[accuracy]`, else the usual ones.  budget: as of `cost`; with it each effect is taken away alone, the most
+    important ones first, with as many members as decide the change (`pipeline.post.answers.matters`); a notebook shows
+    the answer first.  Raises FlexclearError.
+    """
+    from flexclear.commands import answers as answers_command
+    from flexclear.commands import effects as effects_command
+    from flexclear.stages.workplace import open_workplace
+
+    if budget is not None:
+        some: xr.Dataset = answers_command.dataset("matters", _loaded(scene), open_workplace(), budget)
+        return some
+    dataset: xr.Dataset = effects_command.dataset(_loaded(scene), open_workplace())
+    return dataset
+
+
+def plan(scene: Scene | str | Path) -> tuple[Scene, xr.Dataset]:
+    """Which of a scene's effects the accuracy that it wants calls for: the planned scene, and the evidence.
+
+    The dataset (`pipeline.post.answers.plan.dataset`) holds the estimated influence of each effect on each quantity of
+    `[accuracy]`, what was decided, and why.  Raises FlexclearError.
+    """
+    from flexclear.commands import plan as plan_command
+    from flexclear.stages.workplace import open_workplace
+
+    planned = plan_command.bring(_loaded(scene), open_workplace())
+    return planned.planned, planned.dataset()
+
+
+def render(scene: Scene | str | Path) -> Path:
+    """The folder with the scene's pictures, film and mode shapes, brought up to date.  Raises FlexclearError."""
+    from flexclear.commands import render as render_command
+
+    return render_command.rendered(_loaded(scene))
+
+
+def show(scene: Scene | str | Path, folder: str | Path | None = None) -> Any:
+    """The start pose of a scene with all names, in seconds: nothing is run or compiled.
+
+    folder: also write picture and page there, as ``flexclear show`` does.  In a notebook the result shows the page
+    that turns; `gaps` lists the joints that do not fit, `refused` says why (None where all fit).  Raises InputError
+    where no pose can be drawn.
+
+    >>> import flexclear as fc
+    >>> seen = fc.show("scenes/checks/pendulum.toml")
+    >>> [mark.text for mark in seen.view.marks], seen.refused
+    (['bob', 'hinge'], None)
+    """
+    from flexclear.commands import show as show_command
+
+    return show_command.start(_loaded(scene), None if folder is None else Path(folder))
+
+
+def report(scene: Scene | str | Path, budget: str | float | None = None, *, answers: bool = True) -> Path:
+    """The page with everything about a scene, one file, brought up to date.
+
+    budget: of what accuracy costs, whether the run is stable and which effects matter, as of `stability`; answers:
+    whether these are there.  Raises FlexclearError.
+    """
+    from flexclear.commands import answers as answers_command
+    from flexclear.commands import scene_report, scenes
+    from flexclear.stages.workplace import open_workplace
+
+    seconds = answers_command.seconds(budget)
+    graph, where = scenes.graph(_loaded(scene)), open_workplace()
+    return scene_report.make(graph, where, seconds=seconds, answers=answers)
+
+
+def open(scene: Scene | str | Path) -> xr.DataTree:
+    """What there is of a scene below results/runs, as a tree: mesh, modes, bundle by body; run, post, ensemble.
+
+    `post` is left out while it is derived from another run than `run`, which `fc.run` of a changed scene makes alone.
+    The path of a dataset (``results/runs/checks/pendulum/run.nc``) gives a tree with that one, under the file's name.
+    Nothing is run.  Raises InputError when there is nothing yet, or the file is no dataset of a scene.
+    """
+    from flexclear.commands import scenes
+
+    return scenes.results(scene)
+
+
+def _linear(
+    scene: Scene | str | Path,
+    time: float | None,
+    drives: Mapping[str, float] | None,
+    *,
+    moving: bool,
+    vibrations: bool,
+) -> xr.Dataset:
+    from flexclear.commands import scenes
+
+    return scenes.linear(_loaded(scene), time, drives, moving=moving, vibrations=vibrations)
+
+
+def _loaded(scene: Scene | str | Path) -> Scene:
+    """A scene, or the one in a file, or of a name below scenes/."""
+    from flexclear.commands import scenes
+
+    return load_scene(scenes.find_scene(str(scene))) if isinstance(scene, (str, Path)) else scene

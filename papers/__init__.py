@@ -1,0 +1,1 @@
+"""Papers that this program reproduces, one folder each."""

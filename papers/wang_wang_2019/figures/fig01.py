@@ -1,0 +1,146 @@
+"""Figure 1: structure of the 4-SPS/PS mechanism, with the names of its parts and the joint coordinates in use."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+
+from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CB, IDEAL, JOINT
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.plotting.drawing import View, shell, triad, tube, view
+from flexclear.pipeline.post.single_run.series import parameters
+
+NEEDS = ("sps4/ideal:run",)
+
+LEGS = (1, 2, 3, 4)
+TOWARDS, UP = np.array([0.75, -1.35, 0.55]), np.array([0.0, 0.0, 1.0])
+#: radii of the parts that Table 1 decodes into [m]
+CYLINDER, ROD, BALL = 0.02, 0.01, 0.02
+#: where the legs' names are next to the middle of their cylinders on the paper [m]
+LABELS = {1: (0.07, 0.0), 2: (-0.065, 0.0), 3: (-0.055, 0.04), 4: (-0.07, 0.0)}
+STEEL, ALUMINIUM, PLATE, BASE = "#5b7fa6", "#b9c2cc", "#c9a66b", "#dfe5ec"
+
+
+def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
+    """fig01.png and fig01.svg: the mechanism at its start, drawn to scale, and its joints seen from above."""
+    run = data[f"{IDEAL.scene}:run"]
+    points = {str(name): run.frame_position.values[0, k] for k, name in enumerate(run.frame.values)}
+    with style.style():
+        figure, axes = style.grid(1, 2, (12.4, 7.4), width_ratios=[1.25, 1])
+        _mechanism(axes[0, 0], view(TOWARDS, UP), points, plate(run))
+        axes[0, 0].set_title("(a) parts and joints at the start, to scale")
+        _from_above(axes[0, 1], points, plate(run))
+        axes[0, 1].set_title("(b) joint centres from above (mm)")
+        style.heading(
+            figure,
+            "Figure 1: four SPS legs and a central PS chain carry the platform; "
+            "rod 1 is flexible, joint A1 has clearance",
+            "the paper prints neither the joint coordinates nor the start height: those shown are fitted to Table 8, "
+            "or assumed",
+        )
+        return style.files("fig01", figure)
+
+
+def plate(run: xr.Dataset) -> np.ndarray:
+    """Corners of the square plate that has the platform's inertia, platform axes, at the start, world [m], (5, 3).
+
+    Table 1's moments are those of a square plate 200 x 200 x 1 mm about its centre: m a^2/6 about the normal.
+    """
+    platform = parameters(run)["body"]["platform"]
+    inertia = np.array(platform["inertia"])
+    half = 0.5 * np.sqrt(6.0 * inertia.max() / platform["mass"])
+    around = half * np.array([[1, 1, 0], [1, -1, 0], [-1, -1, 0], [-1, 1, 0], [1, 1, 0]])
+    return around + run.position.sel(body="platform").values[0]
+
+
+def _mechanism(axes: Axes, seen: View, at: dict[str, np.ndarray], corners: np.ndarray) -> None:
+    feet = [at[f"ground.B{k}"] for k in (1, 2, 4, 3)]
+    axes.fill(*seen.project(np.array(feet)).T, color=BASE, zorder=0)
+    nearest_last = sorted(LEGS, key=lambda k: float(seen.depth(at[f"ground.B{k}"])))
+    for order, k in enumerate(nearest_last):
+        _leg(axes, seen, at, k, 2.0 + order)
+    # the plate above all legs' upper ends
+    _centre(axes, seen, at, 3.4)
+    axes.fill(*seen.project(corners).T, facecolor=PLATE, edgecolor="#7a6236", alpha=0.82, lw=1.0, zorder=7)
+    for k in LEGS:
+        clear = f"A{k}" == JOINT
+        _ball(axes, seen, at[f"platform.A{k}"], CSJ.color if clear else "#3b4754", 8.0)
+        _name(axes, seen, at[f"platform.A{k}"], f"A{k}" + (" (clearance)" if clear else ""), (0.012, 0.024))
+        # B3 is behind leg 2, and its name next to that
+        _name(axes, seen, at[f"ground.B{k}"], f"B{k}", (0.052, 0.0) if k == 3 else (0.018, -0.036))
+    _ball(axes, seen, at["platform.C"], "#3b4754", 8.0)
+    _name(axes, seen, at["platform.C"], "C", (0.012, 0.022))
+    axes.plot(*seen.project(at["ground.Z"]), "s", color=style.INK, ms=4, zorder=9)
+    _name(axes, seen, at["ground.Z"], "Z", (0.02, 0.0))
+    triad(axes, seen, np.zeros(3), 0.075, ("x0", "y0", "z0"))
+    axes.autoscale_view()
+    axes.set_aspect("equal")
+    axes.margins(0.06)
+    axes.set_axis_off()
+
+
+def _leg(axes: Axes, seen: View, at: dict[str, np.ndarray], k: int, zorder: float) -> None:
+    foot, top = at[f"ground.B{k}"], at[f"platform.A{k}"]
+    axis = (top - foot) / np.linalg.norm(top - foot)
+    rod = at[f"rod{k}.bottom"], at[f"rod{k}.top"]
+    for a, b, radius, color in (
+        (rod[1], top, ROD, "#3b4754"),
+        (*rod, ROD, FAR_CB.color if k == 1 else ALUMINIUM),
+        (at[f"cylinder{k}.bottom"], at[f"cylinder{k}.bottom"] + 0.212 * axis, CYLINDER, STEEL),
+        (foot, at[f"cylinder{k}.bottom"], ROD, "#3b4754"),
+    ):
+        shell(axes, seen, tube(a, b, radius), None, color, zorder=zorder)
+    _ball(axes, seen, foot, "#3b4754", zorder + 0.5)
+    middle = at[f"cylinder{k}.bottom"] + 0.106 * axis
+    _name(axes, seen, middle, f"leg {k}\n" + ("driven" if k < 3 else "held"), LABELS[k])
+    if k == 1:
+        _name(axes, seen, rod[1] - 0.035 * axis, "rod 1\n(flexible)", (0.07, 0.0))
+
+
+def _centre(axes: Axes, seen: View, at: dict[str, np.ndarray], zorder: float) -> None:
+    """Rod, stem and base cylinder of the central chain."""
+    shell(
+        axes, seen, tube(at["ground.Z"] - [0, 0, 0.07], at["ground.Z"] + [0, 0, 0.13], 0.02), None, STEEL, zorder=zorder
+    )
+    shell(axes, seen, tube(at["central_rod.Z"], at["platform.C"], ROD), None, ALUMINIUM, zorder=zorder - 0.1)
+
+
+def _ball(axes: Axes, seen: View, centre: np.ndarray, color: str, zorder: float) -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 61)
+    point = seen.project(centre)
+    axes.fill(point[0] + BALL * np.cos(turn), point[1] + BALL * np.sin(turn), color=color, lw=0, zorder=zorder)
+
+
+def _name(axes: Axes, seen: View, point: np.ndarray, text: str, shift: tuple[float, float]) -> None:
+    x, y = seen.project(point) + shift
+    axes.annotate(
+        text, (x, y), ha="center", va="center", fontsize=8.6, color=style.INK, zorder=10,
+        bbox={"boxstyle": "round,pad=0.12", "fc": "white", "ec": "none", "alpha": 0.78},
+    )  # fmt: skip
+
+
+def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> None:
+    axes.fill(*1e3 * corners[:, :2].T, facecolor=PLATE, edgecolor="#7a6236", alpha=0.35, lw=1.0)
+    for k in LEGS:
+        top, foot = 1e3 * at[f"platform.A{k}"], 1e3 * at[f"ground.B{k}"]
+        axes.plot([foot[0], top[0]], [foot[1], top[1]], color=FAR_CB.color if k == 1 else STEEL, lw=2.2)
+        axes.plot(*foot[:2], "s", color="#3b4754", ms=7)
+        axes.plot(*top[:2], "o", color=CSJ.color if f"A{k}" == JOINT else "#3b4754", ms=8)
+        up = 1.0 if foot[1] > 0.0 else -1.0
+        for point, name, way in ((foot, f"B{k}", up), (top, f"A{k}", -up)):
+            text = f"{name}\n({point[0]:.1f}, {point[1]:.1f})"
+            axes.annotate(
+                text, (point[0], point[1]), (0.0, 8.0 * way), textcoords="offset points", ha="center",
+                va="bottom" if way > 0.0 else "top", fontsize=8.2,
+            )  # fmt: skip
+    axes.plot(0.0, 0.0, "o", color="#3b4754", ms=8)
+    axes.annotate("C, Z", (0.0, 0.0), (8.0, 0.0), textcoords="offset points", va="center", fontsize=8.2)
+    length = np.linalg.norm(at["platform.A1"] - at["ground.B1"])
+    height = at["platform.A1"][2]
+    text = f"height of A1..A4 at the start {1e3 * height:.1f} mm; legs between ball centres {1e3 * length:.1f} mm"
+    axes.set_xlabel(f"x0 (mm)\n{text}")
+    axes.set_ylabel("y0 (mm)")
+    reach = 1e3 * np.abs([at[f"ground.B{k}"][:2] for k in LEGS]).max(axis=0)
+    axes.set(xlim=(-1.25 * reach[0] - 40.0, 1.25 * reach[0] + 40.0), ylim=(-1.2 * reach[1], 1.2 * reach[1]))
+    axes.set_aspect("equal")

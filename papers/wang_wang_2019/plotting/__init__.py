@@ -1,0 +1,1 @@
+"""Panels, overlays and tables that several figures of the paper share."""

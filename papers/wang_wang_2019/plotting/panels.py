@@ -1,0 +1,273 @@
+"""The six panels of figures 11-13: angle, z, vz, az, reaction at A1, deviation of the ball's centre."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from flexclear.papers.wang_wang_2019.models import PLATFORM, Motion
+from flexclear.pipeline.core.artifacts.quantities import common_times
+from flexclear.pipeline.post.plotting import style
+
+#: alpha of a curve inside its horizon, of one that the paper does not have, and beyond the horizon
+FIRM, ADDED, PALE = 0.95, 0.4, 0.28
+#: what the paper does not have is drawn as the band that it fills, in so many stretches of time: a rod that rings would
+#: cover the paper's own curves
+STRETCHES = 120
+#: differences whose sizes are further apart than this are drawn on a logarithmic scale around zero
+SEPARATION = 20.0
+#: differences below this fraction of the largest are rounding
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class Quantity:
+    """One panel over time. `jumps`: impacts drive it far out of the ideal model's range."""
+
+    title: str
+    unit: str
+    values: Callable[[Motion], np.ndarray]
+    jumps: bool
+    ensemble: tuple[str, float] | None = None  #: variable of the post artifact, factor to the unit
+
+
+ANGLE = Quantity("angle about y0", "rad", lambda m: m.angle, False, ensemble=("rotation_y", 1.0))
+DISPLACEMENT = Quantity("displacement along z0", "mm", lambda m: m.displacement, False, ensemble=("displacement", 1e3))
+VELOCITY = Quantity("velocity along z0", "mm/s", lambda m: m.velocity, False, ensemble=("velocity", 1e3))
+ACCELERATION = Quantity(
+    "acceleration along z0", "10³ mm/s²", lambda m: 1e-3 * m.acceleration, True, ensemble=("acceleration", 1.0)
+)
+REACTION = Quantity("reaction force at A1", "N", lambda m: m.reaction, True, ensemble=("normal_force", 1.0))
+QUANTITIES = (ANGLE, DISPLACEMENT, VELOCITY, ACCELERATION, REACTION)
+LETTERS = "abcdef"
+
+
+def six_panels(
+    reference: Motion,
+    others: Sequence[Motion],
+    posts: Sequence[xr.Dataset] = (),
+    *,
+    impacts: bool,
+    clearance: float = 0.0,
+) -> tuple[Figure, Axes]:
+    """Figure with the paper's six panels, each with a slim one below; returns it and the axes that hold labels.
+
+    reference: the ideal model.  others: the models compared with it, drawn in this order.
+    posts: post artifacts whose ensemble's quantiles are drawn as a band, one per model of `others`.
+    impacts: with them the slim panels of acceleration and reaction zoom to the ideal model's range;
+    all others show the difference from the ideal model.
+    clearance: of joint A1 [mm], drawn as a circle where there is one.
+    """
+    figure, axes = style.grid(6, 2, (11.0, 12.2), height_ratios=[3, 1.15] * 3, sharex=False)
+    for k, quantity in enumerate(QUANTITIES):
+        main, strip = axes[2 * (k // 2), k % 2], axes[2 * (k // 2) + 1, k % 2]
+        over_time(main, quantity, reference, others, posts)
+        main.set_title(f"({LETTERS[k]}) {quantity.title}")
+        main.tick_params(labelbottom=False)
+        if impacts and quantity.jumps:
+            zoomed(strip, quantity, reference, others)
+        else:
+            difference(strip, quantity, reference, others, posts)
+    for motion in others:
+        _peaks(axes[4, 0], motion)
+    ball_deviation(axes[4, 1], reference, others, clearance)
+    axes[4, 1].set_title("(f) centre of ball A1, minus ideal, global frame")
+    ball_distance(axes[5, 1], reference, others)
+    for panel in axes.flat:
+        # the same position in every panel; aligning by the tick labels' sizes takes seconds
+        panel.yaxis.set_label_coords(-0.105, 0.5)
+    return figure, axes[0, 0]
+
+
+def over_time(
+    axes: Axes, quantity: Quantity, reference: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset] = ()
+) -> None:
+    """One quantity of all models over time; pale beyond the horizon, with the ensembles' bands."""
+    for motion, post in zip(others, posts, strict=bool(posts)):
+        _band(axes, quantity, motion, post)
+    for motion in others:
+        _curve(axes, motion, quantity.values(motion), _width(quantity))
+    axes.plot(
+        reference.time,
+        quantity.values(reference),
+        color=reference.model.color,
+        lw=1.1,
+        ls=(0, (5, 2)),
+        label=reference.model.label,
+        zorder=2.4,
+    )
+    axes.set_ylabel(quantity.unit)
+    axes.set_xlim(reference.time[0], reference.time[-1])
+
+
+def zoomed(axes: Axes, quantity: Quantity, reference: Motion, others: Sequence[Motion]) -> None:
+    """The slim panel with the same curves in the ideal model's range."""
+    over_time(axes, quantity, reference, others)
+    axes.set_ylim(*_range(quantity.values(reference)))
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel(f"zoom\n{quantity.unit}")
+
+
+def difference(
+    axes: Axes, quantity: Quantity, reference: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset] = ()
+) -> None:
+    """The slim panel with what differs from the ideal model."""
+    axes.margins(y=0.12)
+    for motion, post in zip(others, posts, strict=bool(posts)):
+        _band(axes, quantity, motion, post, reference)
+    differences = {motion.model.scene: deviation(quantity, motion, reference) for motion in others}
+    for motion in others:
+        time, values = differences[motion.model.scene]
+        _curve(axes, motion, values, 0.9, time)
+    axes.set_xlim(reference.time[0], reference.time[-1])
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel(f"minus ideal\n{quantity.unit}")
+    _scale(axes, [float(np.abs(values).max()) for _, values in differences.values()])
+
+
+def _scale(axes: Axes, sizes: Sequence[float]) -> None:
+    """A scale on which all differences are seen, of whatever size."""
+    largest = max(sizes, default=0.0)
+    smallest = min((size for size in sizes if size > ROUNDING * largest), default=largest)
+    if largest <= SEPARATION * smallest:
+        axes.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
+        return
+    linear = 10.0 ** np.floor(np.log10(smallest))
+    axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
+    top = 10.0 ** np.ceil(np.log10(largest))
+    axes.set_ylim(-top, top)
+    axes.set_yticks([-top, 0.0, top])
+    axes.minorticks_off()
+    text = f"linear within ±{linear:g}, logarithmic beyond"
+    axes.text(0.995, 0.03, text, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
+
+
+def deviation(quantity: Quantity, motion: Motion, reference: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Common times and the quantity minus the reference's there."""
+    i, j = common_times(motion.time, reference.time)
+    return motion.time[i], quantity.values(motion)[i] - quantity.values(reference)[j]
+
+
+def ball_deviation(axes: Axes, reference: Motion, others: Sequence[Motion], clearance: float = 0.0) -> None:
+    """Where the ball's centre is relative to its position in the ideal model, x-z plane of the world, equal scales.
+
+    The path itself is 60 mm long: nothing is seen on it.
+    """
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)
+    paths = {motion.model.scene: _ball_apart(motion, reference) for motion in others}
+    factor, unit = _short(clearance, paths.values())
+    if clearance > 0.0:
+        edge = factor * clearance
+        axes.plot(edge * np.cos(turn), edge * np.sin(turn), color=style.SOFT, lw=0.9, ls=":")
+        axes.annotate("clearance", (0.0, edge), ha="center", va="bottom", fontsize=7.6, color=style.SOFT)
+    for motion in sorted(others, key=lambda m: not m.model.ours):
+        time, deviation_of_ball = paths[motion.model.scene]
+        x, _, z = factor * deviation_of_ball.T
+        inside = time <= motion.horizon
+        axes.plot(x, z, color=motion.model.color, lw=0.6, alpha=PALE)
+        axes.plot(x[inside], z[inside], color=motion.model.color, lw=1.1, alpha=FIRM)
+    axes.plot(0.0, 0.0, "+", color=reference.model.color, ms=8, mew=1.4, zorder=4)
+    axes.set_xlabel(f"x minus ideal ({unit})")
+    axes.set_ylabel(f"z minus ideal ({unit})")
+    axes.locator_params(nbins=6)
+    axes.set_aspect("equal", adjustable="datalim")
+
+
+def ball_distance(axes: Axes, reference: Motion, others: Sequence[Motion]) -> None:
+    """Distance of the ball's centre from where the ideal model has it, over time."""
+    paths = [_ball_apart(motion, reference) for motion in others]
+    factor, unit = _short(0.0, paths)
+    for motion, (time, deviation_of_ball) in zip(others, paths, strict=True):
+        _curve(axes, motion, factor * np.linalg.norm(deviation_of_ball, axis=1), 0.9, time)
+    axes.set_xlim(reference.time[0], reference.time[-1])
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel(f"from ideal\n{unit}")
+
+
+def _ball_apart(motion: Motion, reference: Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Common times, and where the ball's centre is minus where the reference has it [mm], (t, 3)."""
+    i, j = common_times(motion.time, reference.time)
+    return motion.time[i], motion.ball[i] - reference.ball[j]
+
+
+def _short(least: float, paths: Iterable[tuple[np.ndarray, np.ndarray]]) -> tuple[float, str]:
+    """Factor and unit of lengths [mm] that are drawn: micrometres where all are below a tenth of a millimetre."""
+    largest = max([least, *(float(np.abs(deviation_of_ball).max()) for _, deviation_of_ball in paths)])
+    return (1e3, "µm") if largest < 0.1 else (1.0, "mm")
+
+
+def _curve(axes: Axes, motion: Motion, values: np.ndarray, width: float, time: np.ndarray | None = None) -> None:
+    """Firm inside the horizon, pale beyond it; what the paper does not have lies below what it has."""
+    time = motion.time if time is None else time
+    inside = time <= motion.horizon
+    if motion.model.ours:
+        _envelope(axes, motion, values, time)
+        return
+    look: dict[str, Any] = {"color": motion.model.color, "lw": width, "zorder": 2.2}
+    if not inside.all():
+        axes.plot(time[~inside], values[~inside], alpha=PALE, **look)
+    axes.plot(time[inside], values[inside], alpha=FIRM, label=motion.model.label, **look)
+
+
+def _envelope(axes: Axes, motion: Motion, values: np.ndarray, time: np.ndarray) -> None:
+    """The band that a curve fills, from stretch to stretch, paler beyond the horizon."""
+    edges = np.linspace(time[0], time[-1], STRETCHES + 1)
+    first = np.searchsorted(time, edges[:-1])
+    first = first[np.append(np.diff(first) > 0, first[-1] < len(time))]
+    low, high = np.minimum.reduceat(values, first), np.maximum.reduceat(values, first)
+    middle = np.append(0.5 * (time[first[:-1]] + time[first[1:]]), time[-1])
+    middle[0] = time[0]
+    for part, alpha in ((middle <= motion.horizon, ADDED), (middle >= motion.horizon, PALE)):
+        look: dict[str, Any] = {"color": motion.model.color, "alpha": alpha, "lw": 0.8, "zorder": 1.8}
+        axes.fill_between(middle[part], low[part], high[part], **look)
+    axes.plot([], [], color=motion.model.color, lw=1.6, label=motion.model.label)
+
+
+def _peaks(axes: Axes, motion: Motion) -> None:
+    """Largest force of each impact inside the horizon; the outputs in between may miss it."""
+    inside = motion.impacts[:, 0] <= motion.horizon
+    axes.plot(*motion.impacts[inside].T, "o", ms=2.2, color=motion.model.color)
+
+
+def _band(axes: Axes, quantity: Quantity, motion: Motion, post: xr.Dataset, reference: Motion | None = None) -> None:
+    """Middle nine tenths of the ensemble and its median, beyond the horizon only; less the reference where given.
+
+    Quantiles, as forces are not negative and most of their values are zero: a mean minus a deviation would be.
+    """
+    if quantity.ensemble is None or "ensemble_time" not in post.sizes:
+        return
+    name, factor = quantity.ensemble
+    low, middle, high = (_column(post[f"{name}_quantile"].sel(quantile=q)) * factor for q in (0.05, 0.5, 0.95))
+    time = post.ensemble_time.values
+    if reference is not None:
+        i, j = common_times(time, reference.time)
+        ideal = quantity.values(reference)[j]
+        time, low, middle, high = time[i], low[i] - ideal, middle[i] - ideal, high[i] - ideal
+    beyond = time >= motion.horizon
+    axes.fill_between(time[beyond], low[beyond], high[beyond], color=motion.model.color, alpha=0.22, lw=0)
+    axes.plot(time[beyond], middle[beyond], color=motion.model.color, lw=0.8)
+
+
+def _column(variable: xr.DataArray) -> np.ndarray:
+    if "ensemble_body" in variable.dims:
+        variable = variable.sel(ensemble_body=PLATFORM)
+    if "axis" in variable.dims:
+        variable = variable.sel(axis="z")
+    return variable.values.reshape(variable.sizes["ensemble_time"], -1)[:, 0]
+
+
+def _width(quantity: Quantity) -> float:
+    return 0.8 if quantity.jumps else 1.6
+
+
+def _range(values: np.ndarray) -> tuple[float, float]:
+    low, high = float(values.min()), float(values.max())
+    margin = 0.35 * (high - low)
+    return (low - margin, high + margin) if low < 0.0 else (-0.05 * (high - low), high + margin)

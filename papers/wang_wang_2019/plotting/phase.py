@@ -1,0 +1,104 @@
+"""Figures 14-16: the phase plots that the paper calls Poincare maps, and the states at impacts below them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter
+
+from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion
+from flexclear.pipeline.core.artifacts.quantities import common_times
+from flexclear.pipeline.post.plotting import style
+
+Values = Callable[[Motion], np.ndarray]
+#: of an axis that is logarithmic on both sides
+SPIKE_TICKS = [sign * size for size in (20.0, 50.0, 100.0, 200.0, 500.0) for sign in (-1.0, 1.0)] + [0.0]
+
+
+@dataclass(frozen=True, slots=True)
+class Plane:
+    """The two quantities of a phase plane and their axis labels.
+
+    spikes: impacts drive y far out of the ideal model's range; it is then linear inside that range
+    and logarithmic outside.
+    """
+
+    x: Values
+    y: Values
+    x_label: str
+    y_label: str
+    spikes: bool = False
+
+
+def maps(plane: Plane, data: dict[str, xr.Dataset]) -> Figure:
+    """First row: phase plots, one per model; second row: the same states at the impacts only."""
+    models = (IDEAL, CSJ, *FAR_CSJ)
+    motions = [motion(model, data) for model in models]
+    figure, axes = style.grid(2, len(models), (13.2, 5.9), sharex=True, sharey="row")
+    for column, (model, run) in enumerate(zip(models, motions, strict=True)):
+        trajectory(axes[0, column], plane, run)
+        axes[0, column].set_title(_short(model), fontsize=8.4)
+        at_impacts(axes[1, column], plane, run, motions[0], data[f"{model.scene}:post"])
+        axes[1, column].set_xlabel(plane.x_label)
+    _say(axes[1, 0], "no impacts")
+    if plane.spikes:
+        reach = 1.3 * float(np.abs(plane.y(motions[0])).max())
+        for panel in axes.flat:
+            panel.set_yscale("symlog", linthresh=reach, linscale=1.2)
+            panel.yaxis.set_major_locator(FixedLocator(SPIKE_TICKS))
+            panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            panel.yaxis.set_minor_locator(FixedLocator([]))
+            panel.axhspan(-reach, reach, color="#f4f6f8", zorder=0, lw=0)
+    axes[0, 0].set_ylabel(f"phase plot\n{plane.y_label}")
+    axes[1, 0].set_ylabel(f"section\n{plane.y_label}")
+    return figure
+
+
+def off_ideal(values: Values, data: dict[str, xr.Dataset]) -> float:
+    """Largest difference of the model with clearance alone from the ideal one, over that one's largest value."""
+    clear, ideal = motion(CSJ, data), motion(IDEAL, data)
+    i, j = common_times(clear.time, ideal.time)
+    return float(np.abs(values(clear)[i] - values(ideal)[j]).max() / np.abs(values(ideal)).max())
+
+
+def trajectory(axes: Axes, plane: Plane, run: Motion) -> None:
+    """The whole trajectory, pale beyond its horizon."""
+    inside = run.time <= run.horizon
+    x, y = plane.x(run), plane.y(run)
+    axes.plot(x, y, color=run.model.color, lw=0.6, alpha=0.3)
+    axes.plot(x[inside], y[inside], color=run.model.color, lw=1.0)
+
+
+def at_impacts(axes: Axes, plane: Plane, run: Motion, ideal: Motion, post: xr.Dataset) -> None:
+    """States at the instants at which an impact begins, over the ideal trajectory."""
+    axes.plot(plane.x(ideal), plane.y(ideal), color="#c9c9c9", lw=0.8, zorder=1)
+    if "impact_time" not in post or post.sizes.get("impact", 0) == 0:
+        return
+    when, x, y = at_times(run.time, post.impact_time.values, run.time, plane.x(run), plane.y(run))
+    inside = when <= run.horizon
+    axes.scatter(x[inside], y[inside], s=11, color=run.model.color, zorder=3, lw=0)
+    axes.scatter(x[~inside], y[~inside], s=11, facecolors="none", edgecolors=run.model.color, lw=0.7, zorder=3)
+    _say(axes, f"at {when.size} impacts")
+
+
+def _say(axes: Axes, text: str) -> None:
+    axes.set_title(text, fontsize=8.0, fontweight="normal", color=style.SOFT)
+
+
+def _short(model: Model) -> str:
+    return model.label.replace(" modes", "").replace("Craig-Bampton (added)", "CB (added)")
+
+
+def at_times(time: np.ndarray, requested: np.ndarray, *values: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Each of `values` (first dimension time) at the output times that equal the requested ones.
+
+    Requested times that are no output times (to 1 ns) are left out: nothing is interpolated.
+    """
+    nearest = np.clip(np.searchsorted(time, requested - 1e-9), 0, time.size - 1)
+    index = nearest[np.abs(time[nearest] - requested) <= 1e-9]
+    return tuple(value[index] for value in values)

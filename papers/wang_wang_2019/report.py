@@ -1,0 +1,187 @@
+"""The report page and docs/paper.md, out of what the other stages have made."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import xarray as xr
+
+from flexclear.papers.wang_wang_2019 import figures
+from flexclear.papers.wang_wang_2019.discrepancies import DISCREPANCIES
+from flexclear.papers.wang_wang_2019.documents import section
+from flexclear.papers.wang_wang_2019.page import Content, html_page
+from flexclear.papers.wang_wang_2019.published import CITATION
+from flexclear.pipeline.core.system.file_dependencies import note
+from flexclear.pipeline.post.pages import figures_of
+from flexclear.pipeline.post.plotting.table import Table, from_markdown
+
+#: what the page shows of the project's own pages: file, sections, endings of the pictures
+DOCUMENTS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
+    "accuracy": (
+        "accuracy.md",
+        ("What to choose", "sps4/csj", "sps4/far_csj_cb"),
+        ("work_precision.png",),
+    ),
+    "stability": ("stability.md", ("", "One parameter at a time"), ("sweeps.png",)),
+    "chaos": ("chaos.md", ("", "sps4/csj", "sps4/far_csj_cb"), (".png",)),
+    "conditions": ("reference-conditions.md", ("In short", "What holds of the paper's statements"), ()),
+}
+#: of a run's attributes, those that the page tells
+FACTS = ("title", "method", "evaluations", "steps", "versions")
+
+
+def collect(
+    results: Path, attributes: Mapping[str, Mapping[str, object]], rendered: str, source: Path | None = None
+) -> Content:
+    """What lies in a results folder (figures/, tables/, runs/<scene>/), and in the sources.
+
+    attributes: scene -> attributes of its run.  rendered: the scene whose film and views are shown.  source: folder
+    with `docs` and `scenes`.  Whatever is not there is left out.
+    """
+    tables = {
+        path.stem: from_markdown(path.read_text(encoding="utf-8"))
+        for path in sorted((results / "tables").glob("table*.md"))
+    }
+    images = {name: results / "figures" / f"{name}.png" for name in figures.NAMES}
+    drawn = {name: path.read_bytes() for name, path in images.items() if path.is_file()}
+    folder = results / "runs" / rendered
+    films = [path for path in (folder / "film.mp4", folder / "film.gif") if path.is_file()]
+    still = folder / "mechanism.png"
+    pages = [path for path in (folder / "motion.html", folder / "modes.html") if path.is_file()]
+    return Content(
+        figures=tuple(drawn),
+        tables=tables,
+        assumptions=merged_assumptions(attributes),
+        images=drawn,
+        film=(films[0].name, films[0].read_bytes()) if films else None,
+        still=still.read_bytes() if still.is_file() else None,
+        views="".join(figures_of(path.read_text(encoding="utf-8")) for path in pages),
+        facts={scene: {key: str(facts[key]) for key in FACTS if key in facts} for scene, facts in attributes.items()},
+        documents={} if source is None else _documents(source / "docs"),
+        variants=() if source is None else _variants(source / "scenes" / "sps4" / "variants"),
+    )
+
+
+def _documents(docs: Path) -> dict[str, str]:
+    return {key: section(docs / file, heads, endings) for key, (file, heads, endings) in DOCUMENTS.items()}
+
+
+def _variants(folder: Path) -> list[tuple[str, str]]:
+    """Name and title of each scene in a folder."""
+    variants = []
+    for path in sorted(folder.glob("*.toml")):
+        note(path)
+        title = tomllib.loads(path.read_text(encoding="utf-8")).get("title", "")
+        variants.append((f"`{path.parent.parent.name}/{path.parent.name}/{path.stem}`", str(title)))
+    return variants
+
+
+def run_attributes(paths: Mapping[str, Path]) -> dict[str, dict[str, object]]:
+    """Attributes of the run datasets at these paths, by scene."""
+    by_scene = {}
+    for scene, path in paths.items():
+        with xr.open_dataset(path) as run:
+            by_scene[scene] = dict(run.attrs)
+    return by_scene
+
+
+def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[str, tuple[str, tuple[str, ...]]]:
+    """Each assumption once, with the scenes that make it; paths in alphabetical order."""
+    scenes: dict[tuple[str, str], list[str]] = {}
+    for scene, facts in attributes.items():
+        for where, text in json.loads(str(facts.get("assumptions", "{}"))).items():
+            scenes.setdefault((where, text), []).append(scene)
+    result: dict[str, tuple[str, tuple[str, ...]]] = {}
+    for (where, text), names in sorted(scenes.items()):
+        key = where if where not in result else f"{where} ({', '.join(names)})"
+        result[key] = (text, tuple(names))
+    return result
+
+
+def page(content: Content) -> bytes:
+    """The report, results/report/index.html: one page, images and film inside."""
+    return html_page(
+        content, [(name, figures.title(name)) for name in content.figures], assumption_rows(content)
+    ).encode()
+
+
+def paper_markdown(content: Content) -> str:
+    """docs/paper.md: every figure and table with its scenes and command, the tables, assumptions, discrepancies."""
+    parts = [
+        "# The paper, reproduced\n",
+        f"{CITATION}. This page is written by `flexclear report`; every number on it was computed by the "
+        "commands next to it.\n",
+        "`make all` makes everything below. `flexclear run` brings the named scenes up to date, `flexclear "
+        "report` draws every figure and table "
+        "into `results/figures` and `results/tables`.\n",
+        "## Figures and tables\n",
+        _index(),
+        "## Tables\n",
+        *(_table(name, table) for name, table in content.tables.items()),
+        "## Assumptions\n",
+        "Values that the paper does not print. Each is marked `assumed` in its scene file.\n",
+        _pipe(("value", "assumption", "scenes"), assumption_rows(content)),
+        "## Discrepancies\n",
+        "What the paper leaves open or prints in conflict with itself. Differences in numbers stand below each "
+        "table. Which of its statements on mode sets hold, and for which position of the prismatic joint: "
+        "[reference-conditions.md](reference-conditions.md).\n",
+        _pipe(("place", "matter", "here"), [(d.place, d.matter, d.here) for d in DISCREPANCIES]),
+    ]
+    return "\n".join(parts)
+
+
+def assumption_rows(content: Content) -> list[tuple[str, str, str]]:
+    """Place, reason and scenes of each assumption; a value of all scenes says so.
+
+    Values of parts that differ only in their number (leg 1 to 4) share a row.
+    """
+    total = len(content.facts)
+    grouped: dict[tuple[str, str], list[str]] = {}
+    for path, (text, scenes) in sorted(content.assumptions.items(), key=lambda item: weight(item[0])):
+        where = "all" if len(scenes) == total else ", ".join(scene.partition("/")[2] or scene for scene in scenes)
+        grouped.setdefault((text.removeprefix("assumed:").strip(), where), []).append(path.partition(" (")[0])
+    return [(", ".join(f"`{path}`" for path in places), text, where) for (text, where), places in grouped.items()]
+
+
+#: parts on whose values most hangs in these scenes: the joint with clearance, the flexible rod, the layout
+WEIGHTY = ("joint.A1", "body.rod1", "body.ground", "body.platform", "drive", "joint", "body")
+
+
+def weight(where: str) -> int:
+    """The rank of a value among the assumptions; small ones come first."""
+    known = [k for k, start in enumerate(WEIGHTY) if where == start or where.startswith(f"{start}.")]
+    return known[0] if known else len(WEIGHTY)
+
+
+def scenes_of(name: str) -> tuple[str, ...]:
+    """Scenes that a figure or table reads, in order, each once."""
+    return tuple(dict.fromkeys(reference.partition(":")[0] for reference in figures.needs(name)))
+
+
+def command(name: str) -> str:
+    """What to type for one figure or table."""
+    scenes = [scene for scene in scenes_of(name) if "/" in scene]
+    return f"flexclear run {' '.join(scenes)} && flexclear report" if scenes else "flexclear report"
+
+
+def _index() -> str:
+    rows = []
+    for name in figures.NAMES:
+        scenes = ", ".join(
+            f"`{scene}`" if "/" in scene else f"timing of the `{scene}` scenes" for scene in scenes_of(name)
+        )
+        rows.append((figures.title(name), scenes, f"`{command(name)}`"))
+    return _pipe(("figure or table", "scenes", "command"), rows)
+
+
+def _table(name: str, table: Table) -> str:
+    notes = "".join(f"\n{note}\n" for note in table.notes)
+    return f"### {table.title}\n\n`{command(name)}`\n\n{_pipe(table.columns, table.rows)}{notes}"
+
+
+def _pipe(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = [" | ".join(heads), "|".join("---" for _ in heads), *(" | ".join(row) for row in rows)]
+    return "\n".join(f"| {line} |" if "---" not in line else f"|{line}|" for line in lines) + "\n"

@@ -1,0 +1,162 @@
+"""The report of the paper: the tasks of every figure and table with all that they need, and of the page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from flexclear.papers.wang_wang_2019 import timing
+from flexclear.papers.wang_wang_2019.figure_stage import FIGURES
+from flexclear.pipeline.core.artifacts.paths import DATA
+from flexclear.pipeline.core.artifacts.store import Record
+from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.workflow.schedule import Outcome
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import derived_series, kernels, simulation
+from flexclear.stages.graph import Graph
+from flexclear.stages.workplace import Workplace, check
+
+#: the scene whose film and pictures the page shows: the paper's full model
+HEADLINE = "sps4/far_csj_cb"
+
+
+@dataclass(frozen=True)
+class Scenes:
+    """Graphs of scenes by name, and times by family, each built once, so that all figures share their tasks."""
+
+    graphs: dict[str, Graph] = field(default_factory=dict)
+    times: dict[str, Task] = field(default_factory=dict)
+
+    def graph(self, name: str) -> Graph:
+        """Graph of ``scenes/<name>.toml``."""
+        if name not in self.graphs:
+            self.graphs[name] = Graph(load_scene(scene_file(name)))
+        return self.graphs[name]
+
+    def artifact(self, reference: str) -> Task:
+        """The task behind ``<scene>:<artifact>[/<body>]`` or ``<folder>:timing``."""
+        name, _, artifact = reference.partition(":")
+        return self.timing(name) if artifact == "timing" else self.graph(name).artifact(artifact)
+
+    def timing(self, family: str) -> Task:
+        """Measured times of all scenes that lie directly in a folder below scenes/.
+
+        They are seconds of the processor, and so are measured while other tasks run: alone they would be a third of the
+        whole report's time, with all other cores idle.
+        """
+        if family not in self.times:
+            self.times[family] = self._timing(family)
+        return self.times[family]
+
+    def _timing(self, family: str) -> Task:
+        files = sorted((DATA / "scenes" / family).glob("*.toml"))
+        if not files:
+            raise InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")
+        graphs = [self.graph(f"{family}/{path.stem}") for path in files]
+        return Task(
+            stage="timing",
+            scene=family,
+            run="flexclear.papers.wang_wang_2019.timing:run",
+            params={g.scene.name: simulation.params(g.scene) for g in graphs},
+            inputs={f"{g.scene.name}:{name}": task for g in graphs for name, task in g.bodies().items()}
+            | _paper_kernels(graphs),
+            modules=tuple(sorted({name for g in graphs for name in simulation.modules(g.scene)})),
+            folder=f"runs/{family}",
+            names={"nc": "timing.nc"},
+        )
+
+
+def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
+    """What only the timing runs on, compiled while other tasks run; kernels of the scenes' own runs are there by
+    then."""
+    tasks: dict[tuple[str, ...], Task] = {}
+    for graph in graphs:
+        for scene in (timing.paper_scene(graph.scene), timing.damped_scene(graph.scene, graph.scene.solver.rtol)):
+            tasks.setdefault(kernels.shared(scene), kernels.task(scene, graph.bodies()))
+    return {f"kernels/{k}": task for k, task in enumerate(tasks.values())}
+
+
+def bring(workplace: Workplace) -> Outcome:
+    """Bring everything that the report shows, and the page, up to date; what fails is left out of the page."""
+    scenes = Scenes()
+    tasks = report_tasks(workplace, scenes)  # records go by the identity of tasks, which must not end before
+    shown = workplace.bring(tasks)
+    graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in shown.records]
+    made = workplace.bring([page_task(workplace, shown.records, graphs)])
+    check(made)
+    return Outcome({**shown.records, **made.records}, shown.failures)
+
+
+def report_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
+    """All figures, tables and pictures. What takes longest comes first, with all that it needs: film and times."""
+    figures = figure_tasks(workplace, scenes)
+    times = [task for task in figures if any(above.stage == "timing" for above in task.inputs.values())]
+    others = [task for task in figures if task not in times]
+    return [*scenes.graph(HEADLINE).of("render").values(), *times, *others]
+
+
+def figure_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
+    """One task for each figure and table."""
+    return [_figure_task(name, entry, scenes) for name, entry in figure_index(workplace).items()]
+
+
+def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
+    """What each figure and table needs, see `papers.wang_wang_2019.figure_stage.index`."""
+    names = list(import_module(FIGURES).NAMES)
+    task = Task(
+        stage="figures",
+        scene="report",
+        part="index",
+        run="flexclear.papers.wang_wang_2019.figure_stage:index",
+        params={"names": names},
+        modules=tuple(f"{FIGURES}.{name}" for name in names),
+        folder="",
+    )
+    outcome = workplace.bring([task])
+    check(outcome)
+    record = outcome.records[id(task)]
+    index: dict[str, dict[str, Any]] = json.loads(
+        workplace.store.path(task.stage, record.key, "index.json").read_bytes()
+    )
+    return index
+
+
+def page_task(workplace: Workplace, records: Mapping[int, Record], graphs: list[Graph]) -> Task:
+    """The page; it is written again when anything that it shows has changed."""
+    return Task(
+        stage="report",
+        scene="report",
+        part="page",
+        run="flexclear.papers.wang_wang_2019.page_stage:run",
+        params={
+            "results": str(workplace.store.root),
+            "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},
+            "origins": {graph.scene.name: derived_series.origins(graph.scene) for graph in graphs},
+            "rendered": HEADLINE,
+            "digests": sorted(record.digest for record in records.values()),
+        },
+        folder="report",
+    )
+
+
+def scene_file(name: str) -> Path:
+    """Where a scene of the project is."""
+    return DATA / "scenes" / f"{name}.toml"
+
+
+def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
+    return Task(
+        stage="figures",
+        scene="report",
+        part=name,
+        run="flexclear.papers.wang_wang_2019.figure_stage:run",
+        params={"figure": name},
+        inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
+        modules=(f"{FIGURES}.{name}",),
+        folder="tables" if name.startswith("table") else "figures",
+    )

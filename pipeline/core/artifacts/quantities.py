@@ -1,0 +1,273 @@
+"""Quantities of interest (`pipeline.core.scene.quantity`) read from a run, and compared between two runs.
+
+Series are compared at the regular output times that both runs have, never interpolated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexclear.pipeline.core.artifacts.coordinates import ROTATION
+from flexclear.pipeline.core.numerics.rotations import rotation_between
+from flexclear.pipeline.core.scene.expression import fold
+from flexclear.pipeline.core.scene.quantity import COMPONENTS, KINDS, Quantity, as_written, parse
+from flexclear.pipeline.core.scene.run_schema import RUN
+from flexclear.pipeline.core.system.errors import InputError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+    from flexclear.pipeline.core.scene.output import Output
+    from flexclear.pipeline.core.scene.schema import TimeSpan
+
+#: two output times are the same when they differ by less than this fraction of the latest: rounding of sums and
+#: products only. Times of events are outputs, too, and those of two accurate runs are so near that a coarser measure
+#: would take them for one, and the motion in between for an error
+SAME_TIME = 1e-13
+#: closings with an approach above this count as impacts [m/s]
+IMPACT = 1e-4
+#: fraction of its clearance by which the perturbed run moves each contact at the start: the order of the offset in
+#: ensembles, and far above what an integration at the default tolerance errs by
+PERTURBATION = 2e-5
+#: neighbouring runs are visibly separated where they differ by this fraction of the largest motion
+SEPARATED = 1e-3
+#: a separation that lasts for this fraction of the run ends its predictability horizon; an impact that comes a little
+#: earlier in one of two runs separates them for its duration only
+LASTING = 1.0 / 36.0
+
+
+def lasting(time: np.ndarray, separated: np.ndarray, least: float) -> int | None:
+    """Index of the first time from which on `separated` holds for `least` [s] or to the last time; None without one.
+
+    time [s], separated: shape (n,).
+    """
+    joined = np.flatnonzero(~separated)
+    until = np.append(time[joined], np.inf)[np.searchsorted(joined, np.arange(len(time)))]
+    first = np.flatnonzero(separated & (until > time + least))
+    return int(first[0]) if len(first) else None
+
+
+def series(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
+    """Values over time, shape (time, components); only of quantities that have a value at every time [SI]."""
+    if not quantity.steps:
+        return _of_part(run, quantity)
+
+    def leaf(step: Quantity | tuple[float, str]) -> np.ndarray:
+        return _of_part(run, step) if isinstance(step, Quantity) else np.full((1, 1), step[0])
+
+    return fold(quantity.steps, leaf, lambda operator, operands: _OPERATORS[operator](*operands))
+
+
+_OPERATORS: dict[str, Callable[..., np.ndarray]] = {
+    "+": np.add,
+    "-": np.subtract,
+    "*": np.multiply,
+    "/": np.divide,
+    "^": np.power,
+    "minus": np.negative,
+    "norm": lambda a: np.linalg.norm(a, axis=1, keepdims=True),
+    "max": np.maximum,
+    "min": np.minimum,
+    "step": lambda a: np.heaviside(a, 1.0),
+    **{name: getattr(np, name) for name in ("abs", "sqrt", "sin", "cos", "tan", "exp", "log", "tanh", "sign")},
+}
+
+
+def _of_part(run: xr.Dataset | LabelledArrays, quantity: Quantity) -> np.ndarray:
+    kind = KINDS[quantity.kind]
+    values: np.ndarray = run[kind.variable].values
+    if kind.owner == "section":  # of all sections of the body the one where it is largest
+        mine = values[:, run["section_body"].values == quantity.owner].reshape(len(values), -1, 3 if kind.dim else 1)
+        largest = np.argmax(np.linalg.norm(mine, axis=2), axis=1)
+        values = np.take_along_axis(mine, largest[:, None, None], axis=1)
+    elif kind.owner:
+        values = values[:, run[kind.owner].values.tolist().index(quantity.owner)]
+    values = values.reshape(len(values), -1)
+    return values[:, [COMPONENTS.index(quantity.component)]] if quantity.component else values
+
+
+def evaluate(run: xr.Dataset, text: str) -> xr.DataArray:
+    """A quantity of a run by its name, over time, with its unit; the contacts' of each event, or of the run.
+
+    text: as `[view] watch` has it (`pipeline.core.scene.quantity`).  Raises InputError for one that the run lacks.
+    """
+    import xarray as xr  # here, since a run needs none of it
+
+    try:
+        quantity = parse(text, owners(run))
+    except ValueError as error:
+        raise InputError(f"quantity '{text}'", str(error)) from None
+    attributes = {"units": unit(run, quantity), "long_name": quantity.name}
+    if not quantity.over_time:
+        return xr.DataArray(np.squeeze(events(run, quantity)), name=quantity.name, attrs=attributes)
+    values, dim = series(run, quantity), quantity.dim
+    coordinates = {"time": run["time"].values} | ({dim: run[dim].values} if dim else {})
+    shown, dims = (values, ("time", dim)) if dim else (values[:, 0], ("time",))
+    return xr.DataArray(shown, coordinates, dims, quantity.name, attributes)
+
+
+def owners(run: xr.Dataset) -> dict[str, dict[str, bool]]:
+    """Names of what owns the quantities of a run, and whether they are about an axis, as `parse` takes them."""
+    known: dict[str, dict[str, bool]] = {"": {}}
+    for dim in {kind.owner for kind in KINDS.values()} - {""}:
+        names = "section_body" if dim == "section" else dim
+        if names in run.coords:
+            turns = (
+                run[f"{dim}_motion"].values == ROTATION if f"{dim}_motion" in run.coords else [False] * run.sizes[dim]
+            )
+            known[dim] = dict(zip(map(str, run[names].values), map(bool, turns), strict=True))
+    known[""] = {key: False for key, kind in KINDS.items() if not kind.owner and kind.variable in run}
+    return known
+
+
+def has(run: xr.Dataset, quantity: Quantity) -> bool:
+    """Whether a run holds this quantity."""
+    known = owners(run)
+    return quantity.is_there(known) and all(KINDS[term.kind].variable in run for term in quantity.terms())
+
+
+#: where a run says of each part whether it pushes or turns, where that is not the quantity's own variable
+PUSHES = {"peak_force": "contact_normal_force"}
+
+
+def unit(run: xr.Dataset, quantity: Quantity) -> str:
+    """The SI unit of a quantity in a run: of what acts along a rotation that of a torque."""
+    kind = KINDS[quantity.kind]
+    name = PUSHES.get(quantity.kind, kind.variable)
+    if f"{name}_units" in run.coords:
+        return as_written(str(run[f"{name}_units"].sel({kind.owner: quantity.owner}).values))
+    turns = (
+        kind.units[0] != kind.units[1] and name in run and run[name].attrs.get("units") == RUN[kind.variable].turning
+    )
+    return kind.units[1] if turns else quantity.unit
+
+
+def events(run: xr.Dataset, quantity: Quantity, until: float = np.inf) -> np.ndarray:
+    """Impact times [s] or the largest contact force [N] of contacts that begin up to a time [s], shape (n,).
+
+    Or the total normal impulse of the run [N s].
+    """
+    if quantity.kind == "impulse":
+        return series(run, quantity)[-1]
+    mine = (run["event_contact"].values == quantity.owner) & (run["event_kind"].values == "closing")
+    mine &= run["event_time"].values <= until
+    if quantity.kind == "peak_force":
+        return np.array([run["event_peak_force"].values[mine].max(initial=0.0)])
+    impact = mine & (run["event_approach_speed"].values > IMPACT)
+    times: np.ndarray = run["event_time"].values[impact]
+    return times
+
+
+def common_times(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Indices into a and into b of the times that both have, ascending, each time once."""
+    unit = SAME_TIME * max(np.abs(a).max(initial=0.0), np.abs(b).max(initial=0.0)) or 1.0
+    _, first, second = np.intersect1d(np.round(a / unit), np.round(b / unit), return_indices=True)
+    return first, second
+
+
+def deviation(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity) -> tuple[np.ndarray, np.ndarray]:
+    """Common times [s] and the distance of the two runs at each, shape (n,); of a series."""
+    i, j = common_times(run["time"].values, reference["time"].values)
+    a, b = series(run, quantity)[i], series(reference, quantity)[j]
+    distance = rotation_between(a, b) if quantity.kind == "orientation" else np.linalg.norm(a - b, axis=1)
+    return run["time"].values[i], distance
+
+
+def error(run: xr.Dataset, reference: xr.Dataset, quantity: Quantity, until: float = np.inf) -> float:
+    """Largest distance between two runs up to a time [s], in the quantity's unit.
+
+    Infinite when the runs differ in the number of impacts before `until`.
+    """
+    if quantity.over_time:
+        time, distance = deviation(run, reference, quantity)
+        return float(distance[time <= until].max(initial=0.0))
+    if quantity.kind == "impulse":
+        i, j = common_times(run["time"].values, reference["time"].values)
+        last = max(int(np.searchsorted(run["time"].values[i], until, side="right")) - 1, 0)
+        return float(np.abs(series(run, quantity)[i[last]] - series(reference, quantity)[j[last]]).max())
+    a, b = events(run, quantity, until), events(reference, quantity, until)
+    return float(np.abs(a - b).max(initial=0.0)) if len(a) == len(b) else np.inf
+
+
+def standard_error(ensemble: xr.Dataset, quantity: Quantity) -> float | None:
+    """Largest standard error over time of the mean of the members' values, in the quantity's unit.
+
+    None where an ensemble does not say: events, orientations, and owners that it does not keep.
+    """
+    kind = KINDS[quantity.kind]
+    if kind.variable not in ensemble or quantity.kind == "orientation" or "time" not in ensemble[kind.variable].dims:
+        return None
+    if quantity.owner not in ensemble[kind.owner].values:
+        return None
+    values = ensemble[kind.variable].sel({kind.owner: quantity.owner}).transpose("member", "time", ...).values
+    if quantity.component:
+        values = values[..., COMPONENTS.index(quantity.component)]
+    spread = np.sqrt(values.var(axis=0, ddof=1).reshape(values.shape[1], -1).sum(axis=1))
+    return float(spread.max() / np.sqrt(len(values)))
+
+
+def scale(run: xr.Dataset, quantity: Quantity) -> float:
+    """What a relative error is relative to: the largest change from the start; of forces the largest value.
+
+    For impact times it is the time from the start to the last one.
+    """
+    if quantity.kind == "impact_times":
+        times = events(run, quantity)
+        return float(times[-1] - run["time"].values[0]) if len(times) else 0.0
+    if not quantity.over_time:
+        return float(np.abs(events(run, quantity)).max(initial=0.0))
+    values = series(run, quantity)
+    if quantity.kind == "orientation":
+        return float(rotation_between(values[:1], values).max())
+    start = values[:1] if quantity.of_place else 0.0
+    return float(np.linalg.norm(values - start, axis=1).max())
+
+
+def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
+    """The part of a run that `error` and `scale` need for these quantities."""
+    recorded: dict[str, xr.DataArray] = {}
+    terms = [term for quantity in chosen for term in quantity.terms()]
+    for kind in {KINDS[term.kind] for term in terms if term.kind not in ("peak_force", "impact_times")}:
+        names = sorted({term.owner for term in terms if KINDS[term.kind].owner == kind.owner})
+        whole = kind.owner in ("", "section")
+        recorded[kind.variable] = run[kind.variable] if whole else run[kind.variable].sel({kind.owner: names})
+    if any(not term.over_time for term in terms):
+        recorded |= {str(name): run[name] for name in run.data_vars if str(name).startswith("event_")}
+    if "horizon" in run:
+        recorded["horizon"] = run["horizon"]
+    import xarray as xr  # here, since a run needs none of it
+
+    return xr.Dataset(recorded)
+
+
+def reduced(time: np.ndarray, values: np.ndarray, reduction: str) -> np.ndarray:
+    """Recorded values of a series (`pipeline.core.scene.quantity`); shape () or (components,).
+
+    time: shape (n,), increasing; its steps are the weights of means.  values: shape (n, components).
+    """
+    if reduction == "final":
+        return np.asarray(values[-1])
+    sizes = np.linalg.norm(values, axis=1)
+    if reduction == "largest":
+        return np.asarray(sizes.max())
+    span = time[-1] - time[0]
+    if reduction == "rms":
+        return np.asarray(np.sqrt(np.trapezoid(sizes**2, time) / span))
+    return np.asarray(np.trapezoid(values, time, axis=0) / span)
+
+
+def of_impacts(times: np.ndarray, reduction: str) -> float:
+    """Number of impacts, or time of the first or last one, nan where there is none. times: ascending [s]."""
+    if reduction == "count":
+        return float(len(times))
+    return float(times[0 if reduction == "first" else -1]) if len(times) else np.nan
+
+
+def regular_times(time: TimeSpan, output: Output) -> np.ndarray:
+    """The regular output times of a run, those of breaks and events left out, shape (n,) [s]."""
+    count = int(np.floor((time.end - time.start) / output.interval * (1 + 1e-12))) + 1
+    return np.asarray(time.start + output.interval * np.arange(count))

@@ -1,0 +1,1 @@
+"""Rotations and directions in NumPy, for data and set-up."""

@@ -1,0 +1,195 @@
+"""Rotations in NumPy, for data and set-up; the compiled kernels have their own, on tuples.
+
+Quaternions are ``w x y z``; matrices ``R_AB`` take components in B to components in A. The
+functions broadcast over leading dimensions unless they say otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from flexclear.pipeline.core.numerics.axes import check_axes, check_axis
+
+#: share by which values differ at most that count as equally large
+_EQUAL = 1e-6
+#: square of the sine of the angle to -z below which a direction counts as that
+_OPPOSITE = 1e-18
+
+
+def first_largest(values: np.ndarray, axis: int = -1) -> np.ndarray:
+    """Index of the largest of values >= 0 along an axis; of those that are equal up to rounding, the first.
+
+    Rounding differs between processors, and must not choose.
+    """
+    return np.argmax(values >= (1.0 - _EQUAL) * values.max(axis=axis, keepdims=True), axis=axis)
+
+
+def skew(v: np.ndarray) -> np.ndarray:
+    """Matrix of the cross product, ``skew(v) @ w == cross(v, w)``; shape (..., 3, 3)."""
+    v = np.asarray(v, dtype=float)
+    out = np.zeros((*v.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
+    return out
+
+
+def quaternion_to_matrix(q: np.ndarray) -> np.ndarray:
+    """Rotation matrix of a unit quaternion, shape (..., 3, 3)."""
+    w, x, y, z = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """What `numpy.cross` gives of arrays (..., 3), in Fortran's order.
+
+    Long series in that order have one component after the other, each of them in one piece.
+    """
+    out = np.empty(np.broadcast_shapes(a.shape, b.shape), order="F")
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        np.multiply(a[..., i], b[..., j], out=out[..., k])
+        out[..., k] -= a[..., j] * b[..., i]
+    return out
+
+
+def turned(R: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """R v of arrays (..., 3, 3) and (..., 3), in Fortran's order; see `cross`."""
+    out = np.empty((*np.broadcast_shapes(R.shape[:-2], v.shape[:-1]), 3), order="F")
+    for i in range(3):
+        np.multiply(R[..., i, 0], v[..., 0], out=out[..., i])
+        out[..., i] += R[..., i, 1] * v[..., 1]
+        out[..., i] += R[..., i, 2] * v[..., 2]
+    return out
+
+
+def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
+    """Unit quaternion of a rotation matrix, w >= 0, shape (..., 4), in Fortran's order. Stable for every angle."""
+    R = np.asarray(R, dtype=float)
+    trace = R[..., 0, 0] + R[..., 1, 1] + R[..., 2, 2]
+    # four times the products of two components, of each with all: the row is taken, and divided, whose own square is
+    # the largest (Shepperd 1978)
+    squares = [1.0 + trace, *(1.0 + (2.0 * R[..., k, k] - trace) for k in range(3))]
+    xy, yz, zx = (R[..., (k + 1) % 3, k] + R[..., k, (k + 1) % 3] for k in range(3))
+    wx, wy, wz = (R[..., (k + 2) % 3, (k + 1) % 3] - R[..., (k + 1) % 3, (k + 2) % 3] for k in range(3))
+    w, x, y, z = squares
+    rows = ((w, wx, wy, wz), (wx, x, xy, zx), (wy, xy, y, yz), (wz, zx, yz, z))
+    best, q = np.argmax(squares, axis=0), np.empty((*R.shape[:-2], 4), order="F")
+    for largest, row in enumerate(rows):
+        those = best == largest
+        for k in range(4):
+            np.copyto(q[..., k : k + 1], row[k][..., None], where=those[..., None])
+    q /= np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(q[..., :1] >= 0.0, q, -q)
+
+
+def continued(q: np.ndarray) -> np.ndarray:
+    """Unit quaternions (time, ..., 4) without jumps of sign; the first one's sign stays."""
+    flips = np.einsum("t...i,t...i->t...", q[1:], q[:-1]) < 0.0
+    if flips.any():
+        q = q.copy()
+        q[1:] *= np.cumprod(np.where(flips, -1.0, 1.0), axis=0)[..., None]
+    return q
+
+
+def quaternion_product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Hamilton product; ``R(a b) = R(a) R(b)``."""
+    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
+    w = a[..., :1] * b[..., :1] - np.sum(a[..., 1:] * b[..., 1:], axis=-1, keepdims=True)
+    v = a[..., :1] * b[..., 1:] + b[..., :1] * a[..., 1:] + np.cross(a[..., 1:], b[..., 1:])
+    return np.concatenate([w, v], axis=-1)
+
+
+def quaternion_conjugate(q: np.ndarray) -> np.ndarray:
+    """The inverse rotation of a unit quaternion."""
+    return np.asarray(q, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def rotation_vector_to_quaternion(v: np.ndarray) -> np.ndarray:
+    """Quaternion of the rotation by ``|v|`` rad about ``v``; one vector, shape (4,)."""
+    v = np.asarray(v, dtype=float)
+    half = 0.5 * float(np.linalg.norm(v))
+    return np.concatenate([[np.cos(half)], 0.5 * np.sinc(half / np.pi) * v])
+
+
+def rotation_vector_to_matrix(v: np.ndarray) -> np.ndarray:
+    """Rotation matrix of the rotation by ``|v|`` rad about ``v``; one vector."""
+    return quaternion_to_matrix(rotation_vector_to_quaternion(v))
+
+
+def axes_to_matrix(axes: Mapping[str, Sequence[float]] | Sequence[Sequence[float]]) -> np.ndarray:
+    """Rotation matrix whose columns are the frame's axes in the parent.
+
+    axes: two named axes (the first exact, the second made perpendicular), or all three.
+    Raises ValueError as `check_axes` does.
+    """
+    check_axes(axes)
+    if not isinstance(axes, Mapping):
+        u, _, vt = np.linalg.svd(np.array(axes, dtype=float).T)
+        return u @ vt
+    (first, a), (second, b) = ((name, np.array(v, dtype=float)) for name, v in axes.items())
+    a = a / np.linalg.norm(a)
+    b = b - a * (a @ b)
+    b = b / np.linalg.norm(b)
+    R = np.empty((3, 3))
+    i, j = "xyz".index(first), "xyz".index(second)
+    k = 3 - i - j
+    R[:, i], R[:, j] = a, b
+    R[:, k] = np.cross(a, b) if (j - i) % 3 == 1 else np.cross(b, a)
+    return R
+
+
+def axis_to_matrix(axis: Sequence[float]) -> np.ndarray:
+    """Rotation matrix of the least rotation that brings z to a direction; for -z, half a turn about x.
+
+    Raises ValueError as `check_axis` does.
+    """
+    check_axis(axis)
+    a = np.array(axis, dtype=float)
+    x, y, z = (a / np.linalg.norm(a)).tolist()
+    square = x * x + y * y  # of the sine of the angle between the two
+    if z < 0.0 and square < _OPPOSITE:  # which way to turn is then a matter of rounding
+        return axes_to_matrix({"z": [x, y, z], "x": [1.0, 0.0, 0.0]})
+    fraction = 1.0 / (1.0 + z) if z >= 0.0 else (1.0 - z) / square
+    return np.array(
+        [[1.0 - fraction * x * x, -fraction * x * y, x], [-fraction * x * y, 1.0 - fraction * y * y, y], [-x, -y, z]]
+    )
+
+
+def rotation_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Angle of the rotation that takes pose a to pose b [rad], shape (...,), in [0, pi].
+
+    a, b: unit quaternions, shape (..., 4).  Accurate for small angles too: the angle is taken from
+    the vector part, not from an arc cosine close to 1.
+    """
+    relative = quaternion_product(quaternion_conjugate(a), b)
+    return 2.0 * np.arctan2(np.linalg.norm(relative[..., 1:], axis=-1), np.abs(relative[..., 0]))
+
+
+def von_mises(stress: np.ndarray) -> np.ndarray:
+    """Von Mises stress, in the unit of the components, shape (...,) of (..., 6): xx yy zz yz xz xy."""
+    x, y, z, yz, xz, xy = np.moveaxis(stress, -1, 0)
+    normal = (x - y) ** 2 + (y - z) ** 2 + (z - x) ** 2
+    return np.asarray(np.sqrt(0.5 * normal + 3.0 * (yz**2 + xz**2 + xy**2)))
+
+
+def principal(stress: np.ndarray) -> np.ndarray:
+    """Principal stresses, the largest first, shape (..., 3) of (..., 6)."""
+    return np.asarray(np.linalg.eigvalsh(matrices(stress))[..., ::-1])
+
+
+def matrices(stress: np.ndarray) -> np.ndarray:
+    """Symmetric matrices (..., 3, 3) of components (..., 6)."""
+    x, y, z, yz, xz, xy = np.moveaxis(stress, -1, 0)
+    return np.stack([np.stack(row, axis=-1) for row in ((x, xy, xz), (xy, y, yz), (xz, yz, z))], axis=-2)
+
+
+def components(matrix: np.ndarray) -> np.ndarray:
+    """Components (..., 6) of symmetric matrices (..., 3, 3)."""
+    return np.asarray(matrix[..., [0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]])

@@ -1,0 +1,366 @@
+"""Quantities as users write them, converted to SI once, at the edge."""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from collections.abc import Iterable
+from difflib import get_close_matches
+from functools import lru_cache
+
+#: units that a message lists
+COMMON = ("m", "mm", "s", "kg", "N", "N m", "rad", "deg", "rpm", "Hz", "Pa", "J")
+#: a quotient of two numbers
+_FRACTION = re.compile(r"([-+]?[\d.]+) */ *([\d.]+)")
+#: a number that is written with a comma
+_COMMA = re.compile(r"\s*[-+]?\d+,\d")
+
+Exponents = tuple[float, float, float, float]
+
+#: factor to SI and physical dimension of every unit that a scene or recipe may use
+UNITS: dict[str, tuple[float, str]] = {
+    "m": (1.0, "length"),
+    "mm": (1e-3, "length"),
+    "um": (1e-6, "length"),
+    "nm": (1e-9, "length"),
+    "cm": (1e-2, "length"),
+    "km": (1e3, "length"),
+    "in": (0.0254, "length"),
+    "ft": (0.3048, "length"),
+    "s": (1.0, "time"),
+    "ms": (1e-3, "time"),
+    "us": (1e-6, "time"),
+    "min": (60.0, "time"),
+    "h": (3600.0, "time"),
+    "kg": (1.0, "mass"),
+    "g": (1e-3, "mass"),
+    "mg": (1e-6, "mass"),
+    "t": (1e3, "mass"),
+    "lb": (0.45359237, "mass"),
+    "rad": (1.0, "angle"),
+    "mrad": (1e-3, "angle"),
+    "urad": (1e-6, "angle"),
+    "deg": (math.pi / 180.0, "angle"),
+    "rev": (2.0 * math.pi, "angle"),
+    "arcmin": (math.pi / 10800.0, "angle"),
+    "arcsec": (math.pi / 648000.0, "angle"),
+    "N": (1.0, "force"),
+    "kN": (1e3, "force"),
+    "MN": (1e6, "force"),
+    "mN": (1e-3, "force"),
+    "lbf": (4.4482216152605, "force"),
+    "N m": (1.0, "torque"),
+    "N mm": (1e-3, "torque"),
+    "kN m": (1e3, "torque"),
+    "Nm": (1.0, "torque"),
+    "Nmm": (1e-3, "torque"),
+    "kNm": (1e3, "torque"),
+    "J": (1.0, "energy"),
+    "mJ": (1e-3, "energy"),
+    "kJ": (1e3, "energy"),
+    "W": (1.0, "power"),
+    "kW": (1e3, "power"),
+    "N s": (1.0, "impulse"),
+    "N m s": (1.0, "angular impulse"),
+    "Pa": (1.0, "pressure"),
+    "kPa": (1e3, "pressure"),
+    "bar": (1e5, "pressure"),
+    "MPa": (1e6, "pressure"),
+    "GPa": (1e9, "pressure"),
+    "Hz": (2.0 * math.pi, "angular velocity"),
+    "kHz": (2e3 * math.pi, "angular velocity"),
+    "MHz": (2e6 * math.pi, "angular velocity"),
+    "rpm": (math.pi / 30.0, "angular velocity"),
+    "rad/s": (1.0, "angular velocity"),
+    "deg/s": (math.pi / 180.0, "angular velocity"),
+    "rad/s^2": (1.0, "angular acceleration"),
+    "deg/s^2": (math.pi / 180.0, "angular acceleration"),
+    "m/s": (1.0, "velocity"),
+    "mm/s": (1e-3, "velocity"),
+    "m/s^2": (1.0, "acceleration"),
+    "mm/s^2": (1e-3, "acceleration"),
+    "kg/m^3": (1.0, "density"),
+    "g/cm^3": (1e3, "density"),
+    "kg m^2": (1.0, "inertia"),
+    "kg mm^2": (1e-6, "inertia"),
+    "g mm^2": (1e-9, "inertia"),
+    "m^2": (1.0, "area"),
+    "mm^2": (1e-6, "area"),
+    "m^4": (1.0, "second moment of area"),
+    "mm^4": (1e-12, "second moment of area"),
+    "N/m": (1.0, "stiffness"),
+    "N/mm": (1e3, "stiffness"),
+    "N/m^1.5": (1.0, "Hertz stiffness"),
+    "kN/m": (1e3, "stiffness"),
+    "N s/m": (1.0, "damping"),
+    "N s/mm": (1e3, "damping"),
+    "N m/rad": (1.0, "torsional stiffness"),
+    "N m/deg": (180.0 / math.pi, "torsional stiffness"),
+    "N m s/rad": (1.0, "torsional damping"),
+    "m/rad": (1.0, "length per angle"),
+    "rad/m": (1.0, "angle per length"),
+    "N/rad": (1.0, "force per angle"),
+    "N s/rad": (1.0, "force per angular velocity"),
+    "N/s": (1.0, "force per time"),
+    "N/m s": (1.0, "stiffness per time"),
+    "N/rad s": (1.0, "force per angle and time"),
+    "N m/rad s": (1.0, "torsional stiffness per time"),
+    "%": (1e-2, "number"),
+}
+
+#: largest number, and one over the least: squares of products such as m l^2 must stay within floating point
+LARGEST = 1e50
+#: exponents of kg, m, s and rad in what an SI unit measures; products of units (`unit`) are distinguished by them
+_EXPONENTS: dict[str, Exponents] = {
+    "number": (0, 0, 0, 0),
+    "length": (0, 1, 0, 0),
+    "time": (0, 0, 1, 0),
+    "mass": (1, 0, 0, 0),
+    "angle": (0, 0, 0, 1),
+    "force": (1, 1, -2, 0),
+    "torque": (1, 2, -2, 0),
+    "energy": (1, 2, -2, 0),
+    "power": (1, 2, -3, 0),
+    "impulse": (1, 1, -1, 0),
+    "angular impulse": (1, 2, -1, 0),
+    "pressure": (1, -1, -2, 0),
+    "angular velocity": (0, 0, -1, 1),
+    "angular acceleration": (0, 0, -2, 1),
+    "velocity": (0, 1, -1, 0),
+    "acceleration": (0, 1, -2, 0),
+    "density": (1, -3, 0, 0),
+    "inertia": (1, 2, 0, 0),
+    "area": (0, 2, 0, 0),
+    "second moment of area": (0, 4, 0, 0),
+    "stiffness": (1, 0, -2, 0),
+    "Hertz stiffness": (1, -0.5, -2, 0),
+    "damping": (1, 0, -1, 0),
+    "torsional stiffness": (1, 2, -2, -1),
+    "torsional damping": (1, 2, -1, -1),
+    "stiffness per time": (1, 0, -3, 0),
+    "torsional stiffness per time": (1, 2, -3, -1),
+    "force per time": (1, 1, -3, 0),
+    "force per angle and time": (1, 1, -3, -1),
+    "length per angle": (0, 1, 0, -1),
+    "angle per length": (0, -1, 0, 1),
+    "force per angle": (1, 1, -2, -1),
+    "force per angular velocity": (1, 1, -1, -1),
+}
+#: what the exponents belong to
+_BASE = ("kg", "m", "s", "rad")
+#: a unit and its power; powers of more digits measure nothing, and would not be numbers
+_FACTOR = re.compile(r"([A-Za-z]+)(?:\^(-?\d(?:\.\d{1,3})?))?")
+_SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "u", "μ": "u", "°": "deg"})
+
+#: characters of a quantity; more are none
+LONGEST = 200
+_QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$")
+
+
+@lru_cache(maxsize=4096)
+def unit(text: str) -> tuple[float, str] | None:
+    """Factor to SI and dimension of a unit, or of a product of units such as ``"N mm/deg"``; None when it is none.
+
+    What follows a stroke divides; powers are written ``^2``, factors parted by spaces, dots or stars.
+    """
+    text = _plain(text)
+    if text in UNITS:
+        return UNITS[text]
+    product = _product(text)
+    dimension = product and next((name for name, known in _EXPONENTS.items() if known == product[1]), None)
+    return (product[0], dimension) if product and dimension else None
+
+
+def _plain(text: str) -> str:
+    return " ".join(text.translate(_SPELLINGS).split())
+
+
+def _product(text: str) -> tuple[float, Exponents] | None:
+    """Factor to SI and exponents of kg, m, s and rad; None when a part of it is no unit."""
+    if text in UNITS:
+        return UNITS[text][0], _EXPONENTS[UNITS[text][1]]
+    factor, total = 1.0, [0.0] * 4
+    for k, side in enumerate(text.split("/")):
+        for part in side.split() or [""]:
+            match = _FACTOR.fullmatch(part)
+            if part == "1" and text.startswith("1/"):
+                continue
+            if match is None or match[1] not in UNITS:
+                return None
+            power = float(match[2] or 1.0) * (-1.0 if k else 1.0)
+            factor *= UNITS[match[1]][0] ** power
+            total = [known + power * one for known, one in zip(total, _EXPONENTS[UNITS[match[1]][1]], strict=True)]
+    kg, m, s, rad = total
+    return factor, (kg, m, s, rad)
+
+
+def udunits(text: str) -> str:
+    """A unit as UDUNITS reads it, ``N m-1 s-1`` for ``N/m s``; empty for broken powers, which it has not."""
+    if text == "1":
+        return text
+    factors = []
+    for k, side in enumerate(_plain(text).split("/")):
+        for part in side.split():
+            match = _FACTOR.fullmatch(part)
+            power = float(match[2] or 1.0) * (-1.0 if k else 1.0) if match is not None else 0.5
+            if power != int(power):
+                return ""
+            factors.append(f"{match[1] if match else part}{int(power) if power != 1.0 else ''}")
+    return " ".join(factors)
+
+
+def measured(text: str) -> Exponents:
+    """Exponents of kg, m, s and rad in a product of known units, or of "1"; ValueError for anything else."""
+    product = (1.0, _EXPONENTS["number"]) if text == "1" else _product(_plain(text))
+    if product is None:
+        raise ValueError(f"'{text}' is no unit")
+    return product[1]
+
+
+def exponents(dimension: str) -> Exponents:
+    """Exponents of kg, m, s and rad of a dimension."""
+    return _EXPONENTS[dimension]
+
+
+def si(exponents: Exponents) -> str:
+    """The SI unit with these exponents of kg, m, s and rad: by its name where it has one, "1" of a number."""
+    name = next((name for name, known in _EXPONENTS.items() if known == exponents), "")
+    if one := _example(name, factor=1.0):
+        return one
+    over, under = (
+        [f"{u}^{n:g}" if n != 1 else u for u, e in zip(_BASE, exponents, strict=True) if (n := sign * e) > 0]
+        for sign in (1, -1)
+    )
+    return (" ".join(over) or "1") + (f"/{' '.join(under)}" if under else "")
+
+
+def coefficient(value: object, dimension: str, order: int) -> float:
+    """SI value of the coefficient of t^order in a law whose values have a dimension; ValueError in words.
+
+    A bare number is in SI; text must have the unit of the value over seconds to that power.
+    """
+    match = _parts(value) if isinstance(value, str) else None
+    if match is None or match[2] is None:
+        return quantity(value, "number")
+    kg, m, s, rad = _EXPONENTS[dimension]
+    product = _product(_plain(match[2]))
+    if product is None or product[1] != (kg, m, s - order, rad):
+        example = f"{_example(dimension)}/s^{order}".removesuffix("^1") if order else _example(dimension)
+        raise ValueError(
+            f"'{value}' is the coefficient of t^{order} of {a(dimension)}: it has a unit such as {example}"
+        )
+    return quantity(float(match[1]) * product[0], "number")
+
+
+def quantity(value: object, dimension: str) -> float:
+    """SI value of a bare number or a string like ``"20.5 mm"``.
+
+    Raises ValueError, in words, when the text is no quantity, the unit is unknown, the unit
+    belongs to another dimension, or the number is not finite, too large or too small.
+    """
+    return _computable(_read(value, dimension), value)
+
+
+def components(values: Iterable[object], dimension: str) -> list[float]:
+    """SI values of the entries of one vector or matrix; ValueError as of `quantity`, for the largest of them.
+
+    The others may be as small as they are: a rotation leaves 1e-17 of an entry that is zero, two leave 1e-34.
+    """
+    given = list(values)
+    numbers = [_read(value, dimension) for value in given]
+    if numbers:
+        largest = max(range(len(numbers)), key=lambda k: abs(numbers[k]))
+        _computable(numbers[largest], given[largest])
+    return numbers
+
+
+def _computable(number: float, written: object) -> float:
+    if number != 0.0 and not 1.0 / LARGEST <= abs(number) <= LARGEST:
+        raise ValueError(
+            f"{written!r} is beyond what can be computed with: {1.0 / LARGEST:g} to {LARGEST:g} in SI units"
+        )
+    return number
+
+
+def _read(value: object, dimension: str) -> float:
+    if type(value) is float and math.isfinite(value):  # nearly all of a scene that is read again
+        return value
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise ValueError(f"expected {a(dimension)}, a number or text like '1 {_example(dimension)}'")
+    if isinstance(value, str):
+        match = _parts(value)
+        if match is None:
+            what = "a number" if dimension == "number" else f"a number with a unit, as '1 {_example(dimension)}'"
+            raise ValueError(f"'{value}' is not {what}")
+        if _COMMA.match(value):
+            raise ValueError(f"'{value}' has a decimal comma; numbers have a decimal point")
+        number, written = float(match[1]), match[2]
+        factor, factor_and_dimension = (1.0, dimension) if written is None else _known_unit(written, dimension, value)
+        if factor_and_dimension != dimension:
+            wanted = f"{a(dimension)} belongs here, in {_known(dimension)}"
+            wanted = "a number without a unit belongs here" if dimension == "number" else wanted
+            raise ValueError(f"'{value}' is {a(factor_and_dimension)}, but {wanted}")
+        result = number * factor
+    else:
+        result = float(value) if abs(value) <= sys.float_info.max else math.inf
+    if not math.isfinite(result):
+        raise ValueError(f"{value!r} is not a finite number")
+    return result
+
+
+def _parts(text: str) -> re.Match[str] | None:
+    """Number and unit; white space at the ends is not left to the expression, which would try it in many ways."""
+    text = text.strip()
+    return _QUANTITY.fullmatch(text) if len(text) <= LONGEST else None
+
+
+def any_quantity(value: object) -> float | str:
+    """A bare number, or a quantity in words in its SI unit (``"60 mm"`` -> ``"0.06 m"``), whatever it measures.
+
+    For places whose dimension another part of the scene decides; `quantity` reads the result.
+    Raises ValueError as `quantity` does.
+    """
+    match = _parts(value) if isinstance(value, str) else None
+    written = match[2] if match is not None else None
+    if written is None or written == "%":
+        return quantity(value, "number")
+    known, product = unit(written), _product(_plain(written))
+    if known is not None:
+        return f"{quantity(value, known[1])!r} {_example(known[1], factor=1.0)}"
+    if match is None or product is None:
+        raise ValueError(unknown(written, str(value)))
+    return f"{_computable(float(match[1]) * product[0], value)!r} {si(product[1])}"
+
+
+def unknown(written: str, value: str = "") -> str:
+    """The message about a text that is no unit; value: the quantity that it belongs to."""
+    fraction = _FRACTION.fullmatch(value.strip())
+    if fraction is not None and float(fraction[2]):
+        return f"'{value}' is a fraction; a value is one number: write {float(fraction[1]) / float(fraction[2]):.12g}"
+    near = get_close_matches(written, list(UNITS), n=1)
+    hint = f"did you mean '{near[0]}'?" if near else f"known are {', '.join(COMMON)} and products of such units"
+    return f"unknown unit '{written}'; {hint}"
+
+
+def _known_unit(written: str, dimension: str, value: str) -> tuple[float, str]:
+    known = unit(written)
+    if known is None:
+        if _FRACTION.fullmatch(value.strip()):
+            raise ValueError(unknown(written, value))
+        raise ValueError(f"unknown unit '{written}'; {a(dimension)} is written in {_known(dimension)}")
+    return known
+
+
+def a(dimension: str) -> str:
+    """The dimension with its article."""
+    return f"{'an' if dimension[0] in 'aeiou' else 'a'} {dimension}"
+
+
+def _known(dimension: str) -> str:
+    return ", ".join(unit for unit, (_, of_unit) in UNITS.items() if of_unit == dimension) or "SI"
+
+
+def _example(dimension: str, factor: float | None = None) -> str:
+    """A unit of this dimension; with `factor`, the one that is so many SI units."""
+    return next((u for u, (f, of_unit) in UNITS.items() if of_unit == dimension and factor in (None, f)), "")

@@ -1,0 +1,158 @@
+"""Files that others made: what is checked before and after a library reads them, since few libraries check.
+
+They are read in this process. A reader that fails, in whatever way of its own, gives an error in words.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import glob
+import io
+import re
+from collections.abc import Mapping
+from math import prod
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.system import file_dependencies, machine
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError, ResourceError, shown
+
+if TYPE_CHECKING:
+    import meshio
+
+#: what a mesh takes in memory while it is read, over its bytes in the file: text of 20 bytes becomes a number of 8, but
+#: is there several times
+COPIES = 5.0
+#: points of a structured grid, which a header of a hundred bytes may promise without end
+MOST_POINTS = 2_000_000
+_GRID = re.compile(rb"^DATASET\s+(?:STRUCTURED|RECTILINEAR)\w*\s+DIMENSIONS((?:\s+\d{1,12}){3})\s", re.MULTILINE)
+#: bytes of the header of a VTK file that are examined
+HEADER = 2000
+#: where a file names others, by its suffix
+_NAMED = {
+    ".inp": re.compile(r"^\*INCLUDE\b.*=(.+)$", re.IGNORECASE | re.MULTILINE),
+    ".xdmf": re.compile(r"<DataItem[^>]*Format=\"(?:HDF|Binary)\"[^>]*>\s*([^<:]+)"),
+}
+_NAMED[".xmf"] = _NAMED[".xdmf"]
+#: what meshio puts among the sets of cells of a Gmsh 4 file, but numbers of curves and points
+NO_CELLS = "gmsh:bounding_entities"
+
+HDF5 = "MED and other formats in HDF5 need h5py: pip install 'flexclear[med]'"
+
+
+def require_file(path: Path, where: str) -> None:
+    """Note a file that will be read; InputError unless it is an ordinary one.
+
+    Reading a device may never end, a pipe waits for a writer.
+    """
+    try:
+        there, ordinary = path.exists(), path.is_file()
+    except (OSError, ValueError) as error:
+        raise InputError(where, f"'{path}' can be no file: {error}") from None
+    if not there:
+        raise InputError(where, f"there is no file {path}", "paths are relative to the file that names them")
+    if not ordinary:
+        raise InputError(where, f"'{path}' is no ordinary file")
+    file_dependencies.note(path)
+
+
+@contextlib.contextmanager
+def reading(path: Path, where: str, problem: str, remedy: str | None = None) -> Any:
+    """Turn whatever a reader of this file raises meanwhile into an InputError: `problem`, and the reader's reason.
+
+    Damaged files make readers fail in ways of their own.  Too little memory is a ResourceError.
+    """
+    try:
+        yield
+    except FlexclearError:
+        raise
+    except ImportError as error:  # libraries that few formats need, such as h5py
+        raise InputError(where, f"{problem}: {error}", HDF5 if error.name == "h5py" else remedy) from None
+    except MemoryError:
+        raise ResourceError(f"{where}: '{path.name}' takes more memory than there is, or is damaged") from None
+    except Exception as error:
+        raise InputError(where, f"{problem}: {shown(str(error) or type(error).__name__)}", remedy) from None
+
+
+def read_mesh(path: Path, where: str, problem: str, remedy: str, largest: int | None = None) -> meshio.Mesh:
+    """The mesh in a file, as meshio reads it: points of 1 to 3 columns, sets of cells and integer data of cells alone.
+
+    problem, remedy: of the InputError for what cannot be read.  largest: bytes at most; default: as many as there is
+    memory for.  Raises ResourceError for what is too large.
+    """
+    _require_mesh(path, where, largest)
+    with reading(path, where, problem, remedy):
+        waiting = companions(path)
+        for companion in waiting:  # grows by what these include
+            require_file(companion, where)
+            waiting += [file for file in companions(companion) if file not in (path, *waiting)]
+        return _parsed(path)
+
+
+def _require_mesh(path: Path, where: str, largest: int | None) -> None:
+    """InputError for what is no ordinary file, or promises a grid without end; ResourceError for what is too large."""
+    require_file(path, where)
+    size = path.stat().st_size
+    if largest is not None and size > largest:
+        raise InputError(where, f"'{path.name}' is larger than {machine.size(largest)}", "write it coarser")
+    machine.require_memory(COPIES * size, f"{where}: '{path.name}'", "use a coarser mesh")
+    if path.suffix == ".vtk":
+        with path.open("rb") as file:
+            match = _GRID.search(file.read(HEADER))
+        count = prod(int(number) for number in match[1].split()) if match is not None else 0
+        if count > MOST_POINTS:
+            raise InputError(where, f"'{path.name}' promises a grid of {count:.3g} points, more than {MOST_POINTS}")
+
+
+def _parsed(path: Path) -> meshio.Mesh:
+    """What `read_mesh` says; any error, in words or not, for what cannot be read."""
+    import meshio  # slow to import, and only meshes from files need it
+    import numpy as np
+
+    said = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), np.errstate(over="ignore"):
+            # meshio takes text for the length of a binary file, to see that it is none
+            mesh = meshio.read(path)
+    except SystemExit:
+        # meshio prints its reason and ends the process where the content is not what it knows of that suffix
+        raise ValueError(" ".join(said.getvalue().split()) or "meshio does not know its format") from None
+    points = np.asarray(mesh.points)
+    mesh.points = points if points.size else np.empty((0, 3))
+    if mesh.points.ndim != 2 or not 1 <= mesh.points.shape[1] <= 3 or points.dtype.kind not in "iuf":
+        raise ValueError(f"its points are an array of {points.dtype}, {points.shape}")
+    mesh.cell_sets = {
+        name: [np.asarray([] if part is None else part, dtype=np.int64).ravel() for part in parts]
+        for name, parts in mesh.cell_sets.items()
+        if name != NO_CELLS
+    }
+    mesh.point_sets = {name: np.asarray(nodes, dtype=np.int64).ravel() for name, nodes in mesh.point_sets.items()}
+    mesh.cell_data = _integers(mesh.cell_data)
+    return mesh
+
+
+def _integers(data: Mapping[str, Any]) -> dict[str, Any]:
+    """The data whose values are one integer per cell."""
+    import numpy as np
+
+    arrays = {name: [np.asarray(part) for part in parts] for name, parts in data.items()}
+    return {
+        name: parts
+        for name, parts in arrays.items()
+        if all(part.dtype.kind in "iu" and part.ndim == 1 for part in parts)
+    }
+
+
+def companions(path: Path) -> list[Path]:
+    """Files that meshio reads besides this one: of TetGen, DOLFIN, XDMF, and includes of Abaqus."""
+    if path.suffix in (".ele", ".node"):
+        return [path.with_suffix(".node" if path.suffix == ".ele" else ".ele")]
+    if path.suffix == ".xml":
+        return sorted(path.parent.glob(f"{glob.escape(path.stem)}_*.xml"))
+    if path.suffix not in _NAMED:
+        return []
+    named = [
+        Path(name.strip()) for name in _NAMED[path.suffix].findall(path.read_text(encoding="utf-8", errors="replace"))
+    ]
+    # as meshio finds them: from the folder of the process, if they are there
+    return [name if name.exists() and path.suffix == ".inp" else path.parent / name for name in dict.fromkeys(named)]

@@ -1,0 +1,61 @@
+"""What this machine has left: memory and disk, asked before work that would need more."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+
+from flexclear.pipeline.core.system.errors import ResourceError
+from flexclear.pipeline.core.system.platforms import free_space, memory
+
+__all__ = ["disk", "instruction_set", "memory", "require_disk", "require_memory", "size"]
+
+#: sets of instructions that change sums and products by rounding, as LLVM names them
+INSTRUCTIONS = ("avx512f", "avx2", "fma", "neon", "sve")
+#: settings that choose others
+CHOOSING = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT", "OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")
+
+#: fraction of what is left that one piece of work may take
+FRACTION = 0.8
+
+
+def disk(folder: Path) -> int:
+    """Bytes free where a folder is or will be."""
+    return free_space(next(p for p in (folder, *folder.parents) if p.is_dir()))
+
+
+def require_memory(need: float, what: str, remedy: str, limit: float | None = None) -> None:
+    """ResourceError when `what` needs more bytes than are allowed; limit: default `SHARE` of what is left."""
+    allowed = FRACTION * memory() if limit is None else limit
+    if need > allowed:
+        raise ResourceError(f"{what} takes about {size(need)} of memory, and {size(allowed)} are allowed; {remedy}")
+
+
+def require_disk(need: float, what: str, folder: Path, remedy: str, limit: float | None = None) -> None:
+    """ResourceError when `what` needs more bytes on disk than are allowed; limit: as of `require_memory`."""
+    allowed = FRACTION * disk(folder) if limit is None else limit
+    if need > allowed:
+        raise ResourceError(
+            f"{what} takes about {size(need)} of the disk of {folder}, and {size(allowed)} are allowed; {remedy}"
+        )
+
+
+def size(count: float) -> str:
+    """Bytes in words: ``3.2 GB``."""
+    power = next((k for k in range(5) if count < 1000.0 ** (k + 1)), 4)
+    return f"{count / 1000.0**power:.3g} {('B', 'kB', 'MB', 'GB', 'TB')[power]}"
+
+
+@cache
+def instruction_set() -> dict[str, str]:
+    """Return what decides the rounding of results on this machine, in words: the processor, its vectors, settings.
+
+    It is no part of a key: results of other processors differ within the tolerances of their runs.
+    """
+    llvm = import_module("llvmlite.binding")  # by name: no result depends on which release knows the processor
+    features = llvm.get_host_cpu_features()
+    vectors = ", ".join(name for name in INSTRUCTIONS if features.get(name)) or "none of " + ", ".join(INSTRUCTIONS)
+    facts = {"processor": llvm.get_host_cpu_name(), "instructions": vectors}
+    return facts | {name: os.environ[name] for name in CHOOSING if os.environ.get(name)}

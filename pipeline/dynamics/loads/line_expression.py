@@ -1,0 +1,37 @@
+"""Tension between two origins by an expression; all of its power is booked as work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+
+from flexclear.pipeline.core.scene.formulas import Formula
+from flexclear.pipeline.core.scene.loads import LineExpression as Declared
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.loads.fields import act
+from flexclear.pipeline.dynamics.loads.looks import line
+from flexclear.pipeline.dynamics.loads.row import Row, by_formula
+from flexclear.pipeline.dynamics.vectors import cross, scale
+
+
+def applying(formula: Callable) -> SimpleNamespace:
+    """The kernel `apply` of loads whose expression the kernel formula(d, k) computes."""
+
+    @kernel
+    def apply(d, k):
+        length, rate, along = line(d, k)
+        size = formula(d, k)
+        force = scale(-size, along)
+        origin = d.site_frames[d.loads[k].b].origin
+        act(d, k, cross(origin, force), force, length, rate, 0.0, -size * rate, 0.0)
+
+    return SimpleNamespace(apply=apply)
+
+
+class LineExpression:
+    """See the module's text."""
+
+    @staticmethod
+    def row(load: Declared, path: str, formula: Formula) -> Row:
+        """What the expression reads, and its numbers."""
+        return by_formula(formula, path, frames=load.between)

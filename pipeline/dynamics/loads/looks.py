@@ -1,0 +1,74 @@
+"""What expressions read, each by one kernel: loads by expressions are composed of these (`compile.formulas`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexclear.pipeline.dynamics import gauge
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.loads.fields import law, number  # noqa: F401
+from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub
+
+
+@kernel
+def index(d, k, i):
+    """Return what load k reads as its i-th: the number of a site, or of a gauge."""
+    return d.looks[d.loads[k].look0 + i].index
+
+
+@kernel
+def constant(d, k, i):
+    """Return the i-th number of the expression of load k."""
+    return number(d, k, 3 + i)
+
+
+@kernel
+def position(d, k, i):
+    """Return the origin of a site in the world."""
+    return add(d.site_frames[index(d, k, i)].origin, (number(d, k, 0), number(d, k, 1), number(d, k, 2)))
+
+
+@kernel
+def velocity(d, k, i):
+    """Return its velocity."""
+    return d.site_frames[index(d, k, i)].velocity
+
+
+@kernel
+def omega(d, k, i):
+    """Return its angular velocity."""
+    return d.site_frames[index(d, k, i)].omega
+
+
+@kernel
+def coordinate(d, k, i):
+    """Return a joint coordinate, full turns counted."""
+    value, _, _, _ = gauge.counted(d, index(d, k, i))
+    return value
+
+
+@kernel
+def coordinate_rate(d, k, i):
+    """Return the rate of a joint coordinate."""
+    _, rate, _, _ = gauge.counted(d, index(d, k, i))
+    return rate
+
+
+@kernel
+def line(d, k):
+    """Return distance between the two origins of load k, its rate, and the direction; the latter zero where they meet.
+
+    The direction is that from the first to the second origin.
+    """
+    a, b = d.site_frames[d.loads[k].a], d.site_frames[d.loads[k].b]
+    r = sub(b.origin, a.origin)
+    length = np.sqrt(dot(r, r))
+    along = scale(1.0 / length, r) if length > 0.0 else (0.0, 0.0, 0.0)
+    return length, dot(along, sub(b.velocity, a.velocity)), along
+
+
+@kernel
+def note(d, k, i, value):
+    """Note the i-th value of load k at whose zero the slope jumps, which guards watch."""
+    bend = d.load_bends[d.loads[k].bend0 + i]
+    bend.now = value

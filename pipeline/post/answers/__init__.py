@@ -1,0 +1,1 @@
+"""Stability, effects and plans as tables, figures, sentences and pages."""

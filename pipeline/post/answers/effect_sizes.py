@@ -1,0 +1,225 @@
+"""What each effect of a scene does to each quantity, taken away and put in, alone and in pairs: dataset, table, chart.
+
+Variants are named by the effects that they lack. The full scene lacks none, the bare one lacks all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import combinations
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.core.artifacts.effect_size import Influence, influence
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.scene.variants import Effect
+from flexclear.pipeline.post.overview.curves import measured, rounded, scaled
+from flexclear.pipeline.post.plotting.table import Table
+
+Names = frozenset[str]
+#: represents a variant that nobody asked for
+UNKNOWN = Point({}, {}, {}, 0, "not run")
+#: ranges below this have ticks between the powers of ten
+FEW = 30.0
+#: how the chart calls its bars
+LEGEND = {"dropped": "taken away", "added": "put in alone"}
+#: variables of the dataset, and what they say
+MEANINGS = {
+    "dropped": "what the quantity loses when the effect, or both, are taken from the full scene",
+    "added": "what it gains when the effect, or both, are put into the bare scene, what it lies within being there",
+    "interaction": "what two effects do to the bare scene together beyond the sum of what each does alone",
+}
+
+
+def variants(effects: Sequence[Effect]) -> list[Names]:
+    """The variants that are needed, each once: full, bare, and each effect and each pair taken away and put in."""
+    every = frozenset(effect.name for effect in effects)
+    chosen = [frozenset(pair) for n in (0, 1, 2) for pair in combinations(every, n)]
+    sets = [closed(effects, gone) for few in chosen for gone in (few, every - closed_up(effects, few))]
+    return list(dict.fromkeys(sorted(sets, key=lambda names: (len(names), sorted(names)))))
+
+
+def closed(effects: Sequence[Effect], gone: Names) -> Names:
+    """With the effects that are nothing without one that is gone."""
+    return gone | {effect.name for effect in effects if effect.within in gone}
+
+
+def closed_up(effects: Sequence[Effect], there: Names) -> Names:
+    """With the effects without which those that are there would be nothing."""
+    return there | {effect.within for effect in effects if effect.name in there and effect.within}
+
+
+def assemble(
+    effects: Sequence[Effect],
+    chosen: Sequence[Quantity],
+    points: Mapping[Names, Point],
+    members: int,
+    units: Sequence[str],
+) -> xr.Dataset:
+    """Influences over (effect, other, quantity) in the quantities' SI units, each with an `_uncertainty`.
+
+    On the diagonal of (effect, other) is what one effect does alone.  points: by the effects that a variant lacks.
+    units: of the chosen quantities.  nan where a variant was refused; infinite where the quantity goes with the effect.
+    """
+    every, n = frozenset(effect.name for effect in effects), len(effects)
+    shape = (n, n, len(chosen))
+    data = {f"{name}{part}": np.full(shape, np.nan) for name in MEANINGS for part in ("", "_uncertainty")}
+    full = points[frozenset()]
+    for i, one in enumerate(effects):
+        for j, other in enumerate(effects):
+            pair = frozenset({one.name, other.name})
+            # what lies within another effect is put in on top of that one
+            ground = every - (closed_up(effects, pair) - pair)
+            bare, lost = points.get(ground, UNKNOWN), points[closed(effects, pair)]
+            gained = points[every - closed_up(effects, pair)]
+            alone = [points.get(ground - closed_up(effects, frozenset({e.name})), UNKNOWN) for e in (one, other)]
+            independent = i != j and one.within != other.name and other.within != one.name
+            for k, quantity in enumerate(chosen):
+                variables = {"dropped": _between(lost, full, quantity, members)}
+                variables["added"] = _between(gained, bare, quantity, members)
+                if independent:
+                    variables["interaction"] = _interaction(gained, alone, bare, quantity, members)
+                for name, value in variables.items():
+                    data[name][i, j, k], data[f"{name}_uncertainty"][i, j, k] = value.difference, value.uncertainty
+    dims = ("effect", "other", "quantity")
+    result = xr.Dataset(
+        {name: (dims, values) for name, values in data.items()},
+        coords={
+            "effect": [effect.name for effect in effects],
+            "other": [effect.name for effect in effects],
+            "words": ("effect", [effect.words for effect in effects]),
+            "quantity": [quantity.name for quantity in chosen],
+            "unit": ("quantity", list(units)),
+        },
+        attrs={"Conventions": "CF-1.11", "members": members},
+    )
+    for name, text in MEANINGS.items():
+        result[name].attrs = {"long_name": text}
+        result[f"{name}_uncertainty"].attrs = {"long_name": f"{text}: what of it may be chance"}
+    refused = {"+".join(sorted(gone)) or "full": p.refused for gone, p in points.items() if p.refused}
+    return result.assign_attrs(refused="\n".join(f"without {gone}: {why}" for gone, why in refused.items()))
+
+
+def _between(a: Point, b: Point, quantity: Quantity, members: int) -> Influence:
+    return Influence(np.nan, np.nan) if a.refused or b.refused else influence(a, b, quantity, members)
+
+
+def _interaction(both: Point, alone: Sequence[Point], bare: Point, quantity: Quantity, members: int) -> Influence:
+    """Of values that can be added: both - one - other + bare, as a distance from nothing."""
+    points = (both, *alone, bare)
+    names = [name for name in both.values if name.rpartition(".")[0] == quantity.name]
+    if any(p.refused for p in points) or quantity.kind in ("orientation", "impact_times"):
+        return Influence(np.nan, np.nan)
+    if not names or any(name not in p.values for p in points for name in names):
+        return Influence(np.inf)
+    signs = (1.0, -1.0, -1.0, 1.0)
+    values = {
+        name: np.asarray(np.sum([s * p.values[name] for s, p in zip(signs, points, strict=True)], axis=0))
+        for name in names
+    }
+    deviation = {
+        name: np.sqrt(np.sum([np.square(p.deviation.get(name, 0.0 * p.values[name])) for p in points], axis=0))
+        for name in names
+    }
+    nothing = Point({name: np.zeros_like(value) for name, value in values.items()}, {}, {}, 0)
+    return influence(Point(values, {}, deviation, 0), nothing, quantity, members)
+
+
+def table(dataset: xr.Dataset) -> Table:
+    """Each effect alone: what its loss and its gain do to each quantity; and the strongest interactions."""
+    rows = []
+    for k, quantity in enumerate(dataset["quantity"].values):
+        unit = str(dataset["unit"].values[k])
+        for i, effect in enumerate(dataset["effect"].values):
+            cells = [_cell(dataset, name, i, i, k, unit) for name in ("dropped", "added")]
+            rows.append((str(quantity), str(effect), *cells, *_partner(dataset, i, k, unit)))
+    notes = [
+        "Dropped: largest change of the quantity over the run when the effect is taken from the full scene. Added: "
+        "when it is put into the bare one (friction: into the one with its clearance). Interaction: what it does "
+        "together with the effect named, beyond the sum of both.",
+        "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
+    ]
+    notes += [f"Refused: {line}" for line in filter(None, dataset.attrs["refused"].split("\n"))]
+    columns = ("quantity", "effect", "dropped", "added", "interaction", "with")
+    return Table("What each effect does", columns, tuple(rows), tuple(notes))
+
+
+def _partner(dataset: xr.Dataset, i: int, k: int, unit: str) -> tuple[str, str]:
+    """The strongest interaction of an effect, and with which."""
+    sizes = dataset["interaction"].values[i, :, k]
+    finite = np.where(np.isfinite(sizes), sizes, -1.0)
+    if not len(finite) or finite.max() < 0.0:
+        return "–", "–"
+    j = int(np.argmax(finite))
+    return _cell(dataset, "interaction", i, j, k, unit), str(dataset["effect"].values[j])
+
+
+def _cell(dataset: xr.Dataset, name: str, i: int, j: int, k: int, unit: str) -> str:
+    return written(float(dataset[name].values[i, j, k]), float(dataset[f"{name}_uncertainty"].values[i, j, k]), unit)
+
+
+def written(value: float, uncertainty: float, unit: str) -> str:
+    """A difference with what of it may be chance, in a fitting unit."""
+    if np.isnan(value):
+        return "–"
+    if np.isinf(value):
+        return "not the same events"
+    if uncertainty > 0.0:
+        return measured(value, uncertainty, unit)
+    factor, shown = scaled(value, unit)
+    return f"{rounded(factor * value, 3)} {shown}"
+
+
+def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, float] | None = None) -> dict[str, bytes]:
+    """Bars of what each effect does alone, a panel for each quantity; a line where an accuracy is requested.
+
+    Uses `dropped` and, where there is one, `added`, of single effects.
+    """
+    from matplotlib.ticker import NullFormatter
+
+    from flexclear.pipeline.post.plotting import style
+
+    names = [str(effect) for effect in dataset["effect"].values]
+    chosen = [str(quantity) for quantity in dataset["quantity"].values]
+    columns = min(2, len(chosen))
+    rows = -(-len(chosen) // columns)
+    kinds = [kind for kind in ("dropped", "added") if kind in dataset]
+    with style.style():
+        height = 1.1 + rows * (0.9 + 0.3 * len(names))
+        figure, axes = style.grid(rows, columns, (10.0, height), sharey=True)
+        for k, panel in enumerate(axes.flat):
+            if k >= len(chosen):
+                panel.set_visible(False)
+                continue
+            for n, kind in enumerate(kinds):
+                values = (
+                    np.diagonal(dataset[kind].values[:, :, k])
+                    if dataset[kind].ndim == 3
+                    else dataset[kind].values[:, k]
+                )
+                place = np.arange(len(names)) + 0.36 * (n - 0.5 * (len(kinds) - 1))
+                shown = np.where(np.isfinite(values) & (values > 0.0), values, np.nan)
+                panel.barh(place, shown, 0.34, label=LEGEND[kind], color=("#0072B2", "#E69F00")[n])
+                for y, value in zip(place, values, strict=True):
+                    text = "none" if value == 0.0 else "not examined" if np.isnan(value) else "not comparable"
+                    text = "" if np.isfinite(value) and value > 0.0 else text
+                    panel.text(0.01, y, text, transform=panel.get_yaxis_transform(), va="center", fontsize=6.8)
+            panel.set_xscale("log")
+            least = min((bar.get_width() for bar in panel.patches if bar.get_width() > 0.0), default=0.0)
+            if least > 0.0:  # bars that begin near their ends would make small differences look large
+                panel.set_xlim(left=0.1 * least)
+            if requested and np.isfinite(requested.get(chosen[k], np.nan)):
+                panel.axvline(requested[chosen[k]], color="#D55E00", lw=1.3, label="requested accuracy")
+            low, high = panel.get_xlim()
+            if high < FEW * low:
+                style.plain(panel.xaxis)
+            else:
+                panel.xaxis.set_minor_formatter(NullFormatter())
+            panel.set_yticks(np.arange(len(names)), names, fontsize=7.6)
+            panel.set_title(f"{chosen[k]} [{dataset['unit'].values[k]}]")
+        axes.flat[0].set_ylim(len(names) - 0.5, -0.5)  # the first on top, and room for the last without a bar
+        style.heading(figure, title)
+        style.shared_legend(figure, axes.flat[0], 3)
+        return style.files(name, figure)

@@ -1,0 +1,214 @@
+"""Which effects of a scene matter: what taking each away changes in each quantity, and how well that is known.
+
+Scenes with contacts are compared by the means of members that start a hair apart, the same starts in each variant. A
+change is decided where it exceeds what may be chance, or where both together are below a hundredth of the quantity's
+size (`pipeline.core.artifacts.effect_size`).
+"""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.core.artifacts.effect_size import Influence, chance, influence, size
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.post.answers.effect_sizes import written
+from flexclear.pipeline.post.overview.curves import measured, rounded
+from flexclear.pipeline.post.plotting.table import Table
+
+#: what clearance and flexibility do together: the scene against the ideal mechanism
+IDEAL = "clearance and flexibility"
+#: a change below this fraction of a quantity's size is none that a first look has to resolve
+SLIGHT = 0.01
+#: accuracies of which the answer says which effects they call for, where the scene asks for none
+LEVELS = (0.1, 0.01, 0.001)
+#: members of which Student's t is that of any larger number
+MANY = 1000
+#: a change that both runs' rounding could make, as a fraction of the quantity's size
+NOTHING = 1e-6
+
+
+@dataclass(frozen=True)
+class Pair:
+    """The scene and the scene without an effect, each over so many members (0: one run, without contacts)."""
+
+    full: Point
+    without: Point
+    members: int
+
+
+def compared(pair: Pair, quantity: Quantity) -> Influence:
+    """What the effect changes; nan where a run was refused."""
+    if pair.full.refused or pair.without.refused:
+        return Influence(np.nan, np.nan)
+    return influence(pair.without, pair.full, quantity, pair.members)
+
+
+def decided(change: Influence, scale: float) -> bool:
+    """Whether a change is known well enough, or cannot be known better by more members."""
+    if not np.isfinite(change.difference) or change.uncertainty == 0.0:
+        return True
+    return change.difference >= change.uncertainty or change.most <= SLIGHT * scale
+
+
+def undecided(pair: Pair, chosen: Sequence[Quantity]) -> list[Quantity]:
+    """The quantities of which more members may decide more."""
+    if pair.full.refused or pair.without.refused:
+        return []
+    return [q for q in chosen if not decided(compared(pair, q), size(pair.full, q))]
+
+
+def assemble(
+    pairs: Mapping[str, Pair], words: Mapping[str, str], chosen: Sequence[Quantity], units: Sequence[str], undone: str
+) -> xr.Dataset:
+    """Changes over (effect, quantity) in the quantities' SI units.
+
+    pairs: by effect, `IDEAL` among them where the scene has an ideal counterpart.  words: of the effects.
+    undone: effects that the budget did not reach, in words.
+    """
+    names = list(pairs)
+    changes = [[compared(pairs[name], q) for q in chosen] for name in names]
+    full = next(iter(pairs.values())).full
+    scales = [size(full, q) if not full.refused else np.nan for q in chosen]
+    dims = ("effect", "quantity")
+    data = {
+        "dropped": (
+            dims,
+            np.array([[c.difference for c in row] for row in changes]),
+            {"long_name": "change without it"},
+        ),
+        "dropped_uncertainty": (
+            dims,
+            np.array([[c.uncertainty for c in row] for row in changes]),
+            {"long_name": "part of the change that may be chance"},
+        ),
+        "decided": (dims, np.array([[decided(c, s) for c, s in zip(row, scales, strict=True)] for row in changes])),
+        "size": (("quantity",), np.array(scales), {"long_name": "largest value, or largest change from the start"}),
+        "members": (("effect",), np.array([pairs[name].members for name in names])),
+    }
+    coordinates = {
+        "effect": names,
+        "words": ("effect", [words[name] for name in names]),
+        "quantity": [q.name for q in chosen],
+        "unit": ("quantity", list(units)),
+    }
+    refused = {name: p.without.refused or p.full.refused for name, p in pairs.items()}
+    text = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why)
+    return xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": text, "undone": undone})
+
+
+def ideal_sentences(result: xr.Dataset) -> list[str]:
+    """A sentence for each quantity, as HTML: what clearance and flexibility change in it."""
+    if IDEAL not in result["effect"].values:
+        return []
+    one, said = result.sel(effect=IDEAL), []
+    for k, name in enumerate(str(q) for q in result["quantity"].values):
+        change = Influence(float(one["dropped"][k]), float(one["dropped_uncertainty"][k]))
+        if np.isfinite(change.difference):
+            text = _change(change, float(result["size"][k]), str(result["unit"].values[k]), int(one["members"]))
+            said.append(f"<b>{html.escape(name)}</b>: {text}.")
+    return said
+
+
+def _change(change: Influence, scale: float, unit: str, members: int) -> str:
+    means = f", as means of {members} runs" if members and change.uncertainty > 1e-3 * change.difference else ""
+    bound = f"<b class='n'>{measured(change.most, np.nan, unit)}</b>"
+    if change.most <= NOTHING * scale:
+        return f"does not change: the runs agree to {bound}"
+    part = _percent(change.difference, scale) if scale > 0.0 else ""
+    if not decided(change, scale):
+        more = needed(change, scale, members)
+        return f"changes by {bound} at most{part and _percent(change.most, scale)}{means}; about {more} would decide it"
+    if change.difference > 0.0:
+        slightly = "slightly, " if change.difference < SLIGHT * scale else ""
+        value = measured(change.difference, change.uncertainty or np.nan, unit)
+        return f"changes {slightly}by up to <b class='n'>{value}</b>{part}{means}"
+    return f"changes by less than {bound}{part and _percent(change.most, scale)}{means}"
+
+
+def _percent(value: float, scale: float) -> str:
+    return f" ({rounded(100.0 * value / scale, 2)} % of its size)"
+
+
+def needed(change: Influence, scale: float, members: int) -> int:
+    """Members that would decide a change: chance falls with the root of their number, and Student's t with it."""
+    enough, fewer = max(SLIGHT * scale, change.difference), chance(MANY) / chance(members)
+    return int(np.ceil(members * (fewer * change.uncertainty / enough) ** 2)) if enough > 0.0 else 2 * members
+
+
+def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
+    """Which effects matter, in one paragraph.
+
+    requested: the accuracy that the scene asks for, by quantity in SI; without it three levels answer.
+    """
+    single = result.sel(effect=[e for e in result["effect"].values if e != IDEAL])
+    if not single.sizes["effect"]:
+        return "The scene has no effect that could be taken away."
+    levels = [("The accuracy that the scene asks for", _limits(result, requested))] if requested else [
+        (f"An accuracy of {100.0 * level:g} %", level * result["size"].values) for level in LEVELS
+    ]  # fmt: skip
+    said, before, calm = list[str](), list[str](), list[str]()
+    for name, limits in levels:
+        now, perhaps = _called_for(single, limits)
+        new = [effect for effect in now if effect not in before]
+        unsure = [effect for effect in perhaps if effect not in now]
+        open_ = f" (not decided: {_enumerated(unsure)})" if unsure else ""
+        if new or unsure:
+            said.append(f"{name} calls {'also ' if before and new else ''}for {_enumerated(new) or 'no more'}{open_}.")
+        else:
+            calm.append(name)
+        before += new
+    more = "no more" if before else "none"
+    said += [f"{name} calls for {more}." for name in calm[:1]]
+    said += [f"So does {name[0].lower()}{name[1:]}." for name in calm[1:]]
+    if result.attrs["undone"]:
+        said.append(f"Not examined within the budget: {result.attrs['undone']}.")
+    return " ".join(said)
+
+
+def _limits(result: xr.Dataset, requested: Mapping[str, float]) -> np.ndarray:
+    return np.array([requested.get(str(q), np.inf) for q in result["quantity"].values])
+
+
+def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list[str]]:
+    """Effects that change a quantity by more than its limit, and those that chance alone may make do so."""
+    change, chance = single["dropped"].values, single["dropped_uncertainty"].values
+    now = np.any(np.where(np.isnan(change), False, change > limits), axis=1)
+    perhaps = np.any(np.where(np.isnan(change), True, change + chance > limits), axis=1)
+    words = [str(w) for w in single["words"].values]
+    return [w for w, hit in zip(words, now, strict=True) if hit], [
+        w for w, hit in zip(words, perhaps & ~now, strict=True) if hit
+    ]
+
+
+def _enumerated(names: Sequence[str]) -> str:
+    return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + f" and {names[-1]}"
+
+
+def table(result: xr.Dataset) -> Table:
+    """Effects as rows, quantities as columns: what is different without the effect."""
+    rows = []
+    for i, words in enumerate(str(w) for w in result["words"].values):
+        cells = [
+            written(
+                float(result["dropped"][i, k]),
+                float(result["dropped_uncertainty"][i, k]),
+                str(result["unit"].values[k]),
+            )
+            for k in range(result.sizes["quantity"])
+        ]
+        members = int(result["members"][i])
+        rows.append((words, *cells, str(members) if members else "one run"))
+    notes = ["Largest change of each quantity over the run without the effect; behind ±: what of it may be chance."]
+    notes += [f"Refused: {line}" for line in filter(None, result.attrs["refused"].split("\n"))]
+    return Table(
+        "What each effect does",
+        ("without", *(str(q) for q in result["quantity"].values), "members"),
+        tuple(rows),
+        tuple(notes),
+    )

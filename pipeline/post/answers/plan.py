@@ -1,0 +1,253 @@
+"""A plan as a dataset, a table, words and a page: what was decided, why, and what it rests on."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.core.scene.plan_decisions import EVIDENCE, NOT_WORTH, Plan
+from flexclear.pipeline.post.answers.effect_sizes import written
+from flexclear.pipeline.post.plotting.table import Table
+
+
+def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
+    """Influences over (effect, quantity), decisions and evidence over effects, what is requested over quantities; SI.
+
+    units: of the quantities, by name.  nan where nothing was estimated, infinite where nothing bounds it or the events
+    differ.
+    """
+    names = list(plan.requested)
+    shape = (len(plan.decisions), len(names))
+    estimate, doubt = (np.full(shape, np.nan) for _ in range(2))
+    for i, decision in enumerate(plan.decisions):
+        for k, name in enumerate(names):
+            estimate[i, k] = decision.estimate.get(name, np.nan)
+            doubt[i, k] = decision.uncertainty.get(name, 0.0 if name in decision.estimate else np.nan)
+    meshes = list(plan.meshes.values())
+    planned = {
+        "gone": [effect.name for effect in plan.gone],
+        "modes": dict(plan.modes),
+        "integrator": plan.integrator,
+        "rtol": plan.rtol,
+        **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
+        "uncoupled": list(plan.uncoupled),
+    }
+    plan_dataset = xr.Dataset(
+        {
+            "influence": (("effect", "quantity"), estimate),
+            "uncertainty": (("effect", "quantity"), doubt),
+            "kept": (("effect",), np.array([int(d.kept) for d in plan.decisions], dtype=np.int8)),
+            "evidence": (("effect",), np.array([d.evidence for d in plan.decisions], dtype=object)),
+            "reason": (("effect",), np.array([d.reason for d in plan.decisions], dtype=object)),
+            "wanted": (("quantity",), np.array([plan.requested[name] for name in names])),
+            "integration": (("quantity",), np.array([plan.integration.get(name, np.nan) for name in names])),
+            "elements": (("body",), np.array([m.given for m in meshes], dtype=np.int64)),
+            "elements_called_for": (("body",), np.array([m.called_for for m in meshes], dtype=np.int64)),
+            "mesh_frequency_error": (("body",), np.array([m.frequency for m in meshes], dtype=float)),
+            "mesh_compliance_error": (("body",), np.array([m.compliance for m in meshes], dtype=float)),
+            "mesh_error": (
+                ("body", "quantity"),
+                np.array([[m.error[name] for name in names] for m in meshes], dtype=float).reshape(-1, len(names)),
+            ),
+        },
+        coords={
+            "body": np.array(list(plan.meshes), dtype=object),
+            "effect": np.array([d.effect.name for d in plan.decisions], dtype=object),
+            "words": ("effect", np.array([d.effect.words for d in plan.decisions], dtype=object)),
+            "quantity": np.array(names, dtype=object),
+            "unit": ("quantity", np.array([units[name] for name in names], dtype=object)),
+        },
+        attrs={
+            "Conventions": "CF-1.11",
+            "title": title,
+            "planned": json.dumps(planned, sort_keys=True),
+            "dearer": plan.dearer,
+            "evaluations": plan.evaluations,
+            "runs": plan.runs,
+        },
+    )
+    meanings = {
+        "influence": "estimated influence of the effect on the quantity, in the quantity's unit",
+        "uncertainty": "what the estimate may be wrong by",
+        "kept": "1: the planned scene has the effect",
+        "evidence": "what the decision rests on",
+        "reason": "the decision in words",
+        "wanted": "accuracy that the scene asks for",
+        "integration": "estimated error of the planned run's integration, and of the modes that it leaves out",
+        "elements": "finite elements of the body",
+        "elements_called_for": "finite elements that the requested accuracy calls for",
+        "mesh_frequency_error": "largest error of a retained frequency due to the mesh, as a fraction",
+        "mesh_compliance_error": "largest error of the frames' compliance due to the mesh, as a fraction",
+        "mesh_error": "estimated error of the quantity due to the body's mesh, at most, in the quantity's unit",
+    }
+    for name, text in meanings.items():
+        plan_dataset[name].attrs = {"long_name": text}
+    return plan_dataset
+
+
+def drawn(planned: xr.Dataset) -> xr.Dataset:
+    """What the chart of influences takes of a plan."""
+    return xr.Dataset(
+        {"dropped": planned["influence"] + planned["uncertainty"].fillna(0.0)},
+        coords={"effect": planned["effect"], "quantity": planned["quantity"], "unit": planned["unit"]},
+    )
+
+
+def table(planned: xr.Dataset) -> Table:
+    """Decision, evidence and reason of each effect, and its estimated influence on each quantity."""
+    names = [str(name) for name in planned["quantity"].values]
+    units = [str(unit) for unit in planned["unit"].values]
+    rows = []
+    for i, effect in enumerate(planned["words"].values):
+        part = planned.isel(effect=i)
+        cells = [
+            written(float(part["influence"][k]), float(np.nan_to_num(part["uncertainty"][k])), unit)
+            for k, unit in enumerate(units)
+        ]
+        decision = "keep" if int(part["kept"]) else "drop"
+        rows.append((str(effect), decision, *cells, EVIDENCE[str(part["evidence"].values)], str(part["reason"].values)))
+    requested = [written(float(value), 0.0, unit) for value, unit in zip(planned["wanted"].values, units, strict=True)]
+    rows.append(("wanted", "", *requested, "", ""))
+    decided = json.loads(planned.attrs["planned"])
+    notes = [words(planned)]
+    notes += [
+        f"{name} keeps {count} of its modes, which do the same as all." for name, count in decided["modes"].items()
+    ]
+    notes += [_of_mesh(planned.sel(body=body), units) for body in planned["body"].values]
+    if decided["uncoupled"]:
+        notes.append(f"Not integrated, since nothing couples it to what is asked for: {listed(decided['uncoupled'])}.")
+    if planned.attrs["dearer"]:
+        notes.append(f"{planned.attrs['dearer']}.")
+    notes.append(
+        f"The planned run is integrated by {decided['integrator']} at a relative tolerance of {decided['rtol']:.0e}. "
+        f"The plan rests on {planned.attrs['runs']} short runs, {planned.attrs['evaluations']:,} evaluations."
+    )
+    return Table(
+        "What the requested accuracy calls for",
+        ("effect", "decision", *names, "evidence", "why"),
+        tuple(rows),
+        tuple(notes),
+    )
+
+
+def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
+    """Whether a body's finite elements are enough, in a sentence or two."""
+    given, called = int(part["elements"]), int(part["elements_called_for"])
+    errors = [
+        f"{name} by at most {written(float(value), 0.0, unit)}"
+        for name, value, unit in zip(part["quantity"].values, part["mesh_error"].values, units, strict=True)
+        if np.isfinite(value)
+    ]
+    frequency, compliance = (100.0 * float(part[f"mesh_{of}_error"]) for of in ("frequency", "compliance"))
+    head = (
+        f"{part['body'].item()} has {given} finite elements, which err by {frequency:.2g} % in a frequency and "
+        f"{compliance:.2g} % in compliance"
+    )
+    if not errors:
+        return f"{head}; what that does to what is asked for cannot be determined."
+    text = f"{head}, and so change {listed(errors)}"
+    if called > given:
+        return f"{text}: the requested accuracy calls for {called}."
+    return f"{text}: enough; {called} would do. Elements cost no time in a run, so the recipe stays as it is."
+
+
+def words(planned: xr.Dataset) -> str:
+    """The plan in a sentence or two, for a designer."""
+    needed, unseen, gone = _sorted(planned)
+    asked = " and ".join(str(name) for name in planned["quantity"].values)
+    if not needed and not unseen:
+        return f"For {asked} as requested nothing but the ideal mechanism is needed: {listed(gone)} may be left out."
+    left = f"{listed(gone)} may be left out" if gone else "nothing may be left out" if not unseen else ""
+    parts = [f"{listed(needed)} must stay" if needed else "", left]
+    parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} unchanged without a run" if unseen else ""]
+    return f"For {asked} as requested {'; '.join(filter(None, parts))}."
+
+
+def listed(names: list[str]) -> str:
+    """Names with commas and an `and`."""
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" and {names[-1]}"
+
+
+def verified(planned: xr.Dataset) -> Table:
+    """The true distance of the planned run from the full one, next to what is requested."""
+    rows = []
+    for k, name in enumerate(planned["quantity"].values):
+        unit = str(planned["unit"].values[k])
+        error, chance = float(planned["error"][k]), float(planned["chance"][k])
+        requested = float(planned["wanted"][k])
+        rows.append(
+            (str(name), written(requested, 0.0, unit), written(error, chance, unit), _verdict(planned.isel(quantity=k)))
+        )
+    notes = [
+        f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
+        f"{int(planned.attrs['planned_evaluations']):,} as planned, of all members together.",
+        *_no_gain(int(planned.attrs["full_evaluations"]), int(planned.attrs["planned_evaluations"])),
+        "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
+    ]
+    return Table(
+        "The plan next to the full scene", ("quantity", "wanted", "true error", "verdict"), tuple(rows), tuple(notes)
+    )
+
+
+MET, MISSED, UNDECIDED = "met", "missed", "not decided"
+
+
+def verdict(error: float, chance: float, requested: float) -> str:
+    """Met where error and chance together are below what is requested, missed where both are above, else not
+    decided."""
+    if error + chance <= requested:
+        return MET
+    return MISSED if error - chance > requested else UNDECIDED
+
+
+def _verdict(one: xr.Dataset) -> str:
+    """The verdict on one quantity, with what it would take where it is not decided."""
+    error, chance, requested = (float(one[name]) for name in ("error", "chance", "wanted"))
+    said = verdict(error, chance, requested)
+    if said == MISSED:
+        return f"missed, {error / requested:.2g} times"
+    if said == UNDECIDED and error < requested:
+        members = int(one.attrs["members"])
+        return f"not decided: {int(np.ceil(members * (chance / (requested - error)) ** 2))} members would"
+    return said
+
+
+def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
+    """What each accuracy calls for, by the accuracy in words; why there is no plan, where there is none."""
+    rows = list[tuple[str, ...]]()
+    for level, result in plans.items():
+        if isinstance(result, str):
+            rows.append((level, "–", "–", "–", "–", result.splitlines()[0]))
+            continue
+        text = json.loads(result.attrs["planned"])
+        needed, unseen, gone = _sorted(result)
+        modes = ", ".join(f"{count} of {body}" for body, count in text["modes"].items()) or "all"
+        method = f"{text['integrator']}, rtol {text['rtol']:.0e}"
+        rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
+    return Table(
+        "What accuracy calls for",
+        ("of each size", "needed", "unchanged without a run", "may be left out", "modes", "integrated by"),
+        tuple(rows),
+        (
+            "Each accuracy is that of all watched quantities; name one in [accuracy] to get its planned scene. "
+            "Unchanged without a run: leaving the effect out would save no time worth the runs that measure its size.",
+        ),
+    )
+
+
+def _sorted(result: xr.Dataset) -> tuple[list[str], list[str], list[str]]:
+    """Effects in words: those that are needed, those that stay without evidence, and those that may be left out."""
+    rows = list(zip(result["words"].values, result["kept"].values, result["reason"].values, strict=True))
+    return (
+        [str(w) for w, recorded, reason in rows if recorded and reason != NOT_WORTH],
+        [str(w) for w, recorded, reason in rows if recorded and reason == NOT_WORTH],
+        [str(w) for w, recorded, _ in rows if not recorded],
+    )
+
+
+def _no_gain(full: int, planned: int) -> list[str]:
+    """That a plan takes more evaluations than the scene as it is, where it does."""
+    return [f"The plan is {planned / full:.2g} times as dear as the scene as it is."] if planned > full else []

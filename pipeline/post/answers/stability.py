@@ -1,0 +1,195 @@
+"""Is a run stable: what was checked, with value, limit, verdict and remedy, and a figure of the errors over time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.post.plotting import style
+from flexclear.pipeline.post.single_run.horizon import sentence
+
+#: the energy that a run loses without a trace, as a fraction of the largest energy
+ENERGY = 1e-3
+#: by how far loops may be open, as a fraction of the mechanism's extent
+LOOPS = 1e-6
+#: below this there is nothing but rounding
+ROUNDING = 1e-15
+#: agreement with runs at other tolerances and by other methods, as a fraction of each quantity's size
+AGREEMENT = 0.01
+#: fraction of steps that may be made again, and that stability may shorten
+REJECTED, STIFF = 0.3, 0.3
+#: condition number of the closures above which a singular pose is near
+CONDITION = 1e6
+ENERGIES = ("kinetic", "potential", "elastic", "drive_work", "load_work")
+
+
+@dataclass(frozen=True)
+class Check:
+    """One check in words.  good: whether the value keeps its limit."""
+
+    name: str
+    value: str
+    limit: str
+    good: bool
+    remedy: str
+
+    @property
+    def verdict(self) -> str:
+        """In words."""
+        return "good" if self.good else "look here"
+
+    @property
+    def advice(self) -> str:
+        """The remedy where one is needed."""
+        return "–" if self.good else self.remedy
+
+
+def checks(run: xr.Dataset, study: xr.Dataset | None, members: float | None = None) -> list[Check]:
+    """All that a run and its cost study say of its stability.  study: None where there is none.
+
+    members: horizon of the scene's ensemble [s], None where there is none.
+    """
+    result = [_energy(run), *_loops(run), *([] if study is None else _agreement(study)), _rejected(run), _stiff(run)]
+    return [*result, *_condition(run), *_predictable(run, members)]
+
+
+def largest_energy(run: xr.Dataset) -> float:
+    """Largest change of any of the energies from the start [J]."""
+    changes = [np.abs(run[n].values - run[n].values[0]).max() for n in ENERGIES if n in run]
+    return max(map(float, changes), default=0.0)
+
+
+def _energy(run: xr.Dataset) -> Check:
+    largest, missed = largest_energy(run), float(np.abs(run["energy_error"].values).max())
+    fraction = missed / largest if largest > 0.0 else 0.0
+    remedy = "a tighter tolerance: [solver] rtol" if "step" not in run.attrs else "shorter steps: [solver] step"
+    return Check("energy balance", f"{fraction:.1e} of the largest energy", f"{ENERGY:g}", fraction < ENERGY, remedy)
+
+
+def _loops(run: xr.Dataset) -> list[Check]:
+    """Only where there are loops."""
+    if "constraint_error" not in run or "condition" not in run:
+        return []
+    places = run["position"].values.reshape(-1, 3)
+    extent = float(np.linalg.norm(np.ptp(places, axis=0))) or 1.0
+    fraction = float(np.abs(run["constraint_error"].values).max()) / extent
+    value = f"{fraction:.1e} of the extent" if fraction > ROUNDING else "rounding"
+    return [Check("drift of closed loops", value, f"{LOOPS:g}", fraction < LOOPS, "a tighter tolerance")]
+
+
+def _agreement(study: xr.Dataset) -> list[Check]:
+    """With runs at half and a tenth of the tolerance, and with another family of methods, up to the horizon."""
+    result = []
+    for group, method, setting in (
+        ("tolerance", "adaptive_integrator", "rtol"),
+        ("step", "fixed_integrator", "step"),
+    ):
+        if f"distance_by_{group}" not in study:
+            continue
+        own, at = str(study.attrs["own_integrator"]), float(study.attrs[f"own_{setting}"])
+        for m in (str(name) for name in study[method].values):
+            values = study[f"distance_by_{group}"].sel({method: m}).max("quantity", skipna=False)
+            there = [float(s) for s in study[setting].values if np.isfinite(values.sel({setting: s}))]
+            if m == own:
+                shown = [s for s in there if 0.05 * at < s < 0.9 * at]
+            else:
+                shown = [min(there)] if there else []
+            for s in shown:
+                value = float(values.sel({setting: s}))
+                name = f"agreement with {m}, {setting} {s:g}{' s' if group == 'step' else ''}"
+                result.append(
+                    Check(name, f"{value:.1e} of a size", f"{AGREEMENT:g}", value < AGREEMENT, "a tighter tolerance")
+                )
+    return result
+
+
+def _rejected(run: xr.Dataset) -> Check:
+    steps, again = float(run.attrs.get("steps", 0)), float(run.attrs.get("rejected_steps", 0))
+    fraction = again / max(steps + again, 1.0)
+    remedy = "another integrator, or a tighter tolerance"
+    return Check("rejected steps", f"{100.0 * fraction:.2g} %", f"{100.0 * REJECTED:g} %", fraction < REJECTED, remedy)
+
+
+def _stiff(run: xr.Dataset) -> Check:
+    fraction, chosen = float(run.attrs.get("stiff_share", 0.0)), "method_reason" in run.attrs
+    limit = "none: the integrator was chosen by its cost" if chosen else f"{100.0 * STIFF:g} %"
+    remedy = "leave [solver] integrator out, or name an implicit one"
+    name = "steps that stability shortens"
+    return Check(name, f"{100.0 * fraction:.2g} %", limit, chosen or fraction < STIFF, remedy)
+
+
+def _condition(run: xr.Dataset) -> list[Check]:
+    if "condition" not in run:
+        return []
+    worst = int(np.argmax(run["condition"].values))
+    value, time = float(run["condition"][worst]), float(run["time"][worst])
+    text = f"condition number {value:.2g} at t = {time:.4g} s"
+    return [
+        Check("distance from singular poses", text, f"{CONDITION:.0e}", value < CONDITION, "pass the pose at speed")
+    ]
+
+
+def _predictable(run: xr.Dataset, members: float | None) -> list[Check]:
+    if "horizon" not in run:
+        return []
+    end = float(run["time"][-1])
+    horizon = min(float(run["horizon"]), end if members is None else members)
+    return [
+        Check(
+            "predictability",
+            f"up to t = {horizon:.4g} s",
+            f"{end:.4g} s, the end",
+            horizon >= end,
+            "means over members beyond it: [ensemble]",
+        )
+    ]
+
+
+def answer(run: xr.Dataset, result: list[Check], members: float | None = None) -> str:
+    """What the checks say together, in words.  members: as in `checks`."""
+    bad = [check for check in result if not check.good and check.name != "predictability"]
+    disagreeing = [check for check in bad if check.name.startswith("agreement")]
+    bad = [check for check in bad if check not in disagreeing[1:]]  # one says it, the table has the others
+    text = (
+        f"Yes: all {len(result)} checks hold."
+        if all(check.good for check in result)
+        else "The integration is stable: every check of it holds."
+        if not bad
+        else "Not in everything: " + "; ".join(f"{c.name} ({c.value}, limit {c.limit}): {c.remedy}" for c in bad) + "."
+    )
+    if "horizon" in run:
+        text += " " + sentence(float(run["horizon"]), float(run["time"][-1]), members)
+    return text
+
+
+def figure(run: xr.Dataset) -> dict[str, bytes]:
+    """``stability.png`` and ``.svg``: errors of energy and loops over time, with their limits, and the separation."""
+    panels = [("energy error", "fraction of the largest energy", run["time"].values, _relative_energy(run), ENERGY)]
+    if "condition" in run and "constraint_error" in run:
+        extent = float(np.linalg.norm(np.ptp(run["position"].values.reshape(-1, 3), axis=0))) or 1.0
+        values = np.abs(run["constraint_error"].values) / extent
+        if values.max(initial=0.0) > ROUNDING:
+            panels.append(("drift of closed loops", "fraction of the extent", run["time"].values, values, LOOPS))
+    if "separation" in run:
+        from flexclear.pipeline.core.artifacts.quantities import SEPARATED
+
+        times, values = run["separation_time"].values, run["separation"].values
+        panels.append(("separation of a perturbed run", "fraction of each motion", times, values, SEPARATED))
+    with style.style():
+        figure, axes = style.grid(1, len(panels), (3.6 * len(panels), 2.9))
+        for axis, (title, label, time, values, limit) in zip(axes.ravel(), panels, strict=True):
+            shown = np.where(values > 0.0, values, np.nan)
+            axis.plot(1e3 * time, shown, color="#0072B2", lw=1.0)
+            axis.axhline(limit, color="#D55E00", lw=1.2, label="limit")
+            axis.set(yscale="log", title=title, xlabel="time (ms)", ylabel=label)
+            low = float(np.nanmin(shown)) if np.isfinite(shown).any() else limit * 1e-3
+            axis.set_ylim(max(low, 1e-18) * 0.5, None)
+        axes.ravel()[0].legend(fontsize=8)
+        return style.files("stability", figure)
+
+
+def _relative_energy(run: xr.Dataset) -> np.ndarray:
+    largest = largest_energy(run)
+    return np.asarray(np.abs(run["energy_error"].values) / (largest or 1.0))

@@ -1,0 +1,164 @@
+"""What a report says first: what clearance and flexibility do, in sentences that the numbers make."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from flexclear.pipeline.core.artifacts import quantities
+from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.post.answers.stability import ENERGY, largest_energy
+from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
+from flexclear.pipeline.post.single_run.horizon import sentence
+from flexclear.pipeline.post.single_run.series import parameters
+
+#: a difference is reported from none where it is so many times larger than both runs' own errors
+DISTINGUISHED = 2.0
+#: below this fraction of the largest value an effect is called slight
+SLIGHT = 0.01
+#: below this fraction, both runs' own errors included, there is none, as of a body that a drive leads
+NOTHING = 1e-6
+NEITHER = "The scene has neither clearance nor flexible bodies"
+
+
+def answer(
+    compared: xr.Dataset | None,
+    run: xr.Dataset | None,
+    doubts: Sequence[str],
+    changes: Sequence[str] = (),
+    members: float | None = None,
+) -> str:
+    """A list of sentences, as HTML.
+
+    compared: of `overview.comparison`, the ideal counterpart first and the scene last; None where there is none.
+    run: schema RUN of the scene.  doubts: warnings of the run.  changes: sentences of `post.answers.matters` on what
+    differs from the ideal mechanism, which replace those that two runs alone allow.  members: horizon of the scene's
+    ensemble [s], None where there is none.
+    """
+    said = [] if compared is None else [*changes] or _effects(compared)
+    if compared is None and run is not None:
+        lacks = "Slots, planes and stops have no ideal counterpart" if "contact" in run.coords else NEITHER
+        said.append(f"{lacks}, so there is no idealised run to compare it with.")
+    if run is not None:
+        said += [*_impacts(run), *_horizon(run, members), *_trust(run)]
+    if doubts:
+        many = "one warning" if len(doubts) == 1 else f"{len(doubts)} warnings"
+        said.append(f"The run gave <span class='bad'>{many}</span>, see <a href='#doubts'>below</a>.")
+    head = "" if compared is None else "<p>Compared with the same mechanism with ideal joints and rigid bodies:</p>"
+    return f"{head}<ul>{''.join(f'<li>{text}</li>' for text in said)}</ul>"
+
+
+def _effects(compared: xr.Dataset) -> list[str]:
+    """A sentence for each quantity: the difference from the ideal mechanism, and whether it exceeds the error."""
+    sentences = []
+    last = compared.sizes["run"] - 1
+    for j, name in enumerate(str(q) for q in compared["quantity"].values):
+        unit = str(compared["unit"].values[j])
+        difference = float(compared["difference"][last, j])
+        if not np.isfinite(difference):
+            continue
+        errors = [float(compared["error"][i, j]) for i in (0, last)]
+        error = sum(errors) if np.isfinite(errors).all() else np.nan
+        size = float(compared["largest"][0, j])
+        fraction = difference / size if size > 0.0 else np.nan
+        value = measured(difference, error, unit)
+        known = np.isfinite(fraction) and fraction < 100.0
+        part = f", which is {rounded(100.0 * fraction, 2)} % of its largest value in the ideal run" if known else ""
+        if np.isfinite(error) and difference + error < NOTHING * size:
+            text = f"does not change: the runs agree to <b class='n'>{measured(difference + error, np.nan, unit)}</b>"
+        elif np.isfinite(error) and difference < DISTINGUISHED * error:
+            text = (
+                f"the runs are not exact enough to show an effect: their difference ({value}) is less "
+                f"than {DISTINGUISHED:g} times their errors together"
+            )
+        elif np.isfinite(fraction) and fraction < SLIGHT:
+            text = f"changes slightly, by up to <b class='n'>{value}</b>{part}"
+        else:
+            text = f"changes by up to <b class='n'>{value}</b>{part}"
+        sentences.append(f"<b>{html.escape(name)}</b>: {text}.")
+    return sentences
+
+
+def _impacts(run: xr.Dataset) -> list[str]:
+    """A sentence for each contact of the scene, ends of stops among them."""
+    sentences = []
+    for name in (str(c) for c in run["contact"].values) if "contact" in run.coords else ():
+        unit = quantities.unit(run, Quantity(name, "peak_force"))
+        count, peak = (quantities.events(run, Quantity(name, kind)) for kind in ("impact_times", "peak_force"))
+        closed = float(np.mean(run["contact_gap"].sel(contact=name).values < 0.0))
+        sentences.append(
+            f"<b>{html.escape(name)}</b>: {impacts(len(count), closed).capitalize()}; the contact "
+            f"{'force' if unit == 'N' else 'torque'} reaches <b class='n'>{measured(float(peak[0]), np.nan, unit)}</b>."
+        )
+    return sentences
+
+
+def _horizon(run: xr.Dataset, members: float | None) -> list[str]:
+    if "horizon" not in run:
+        return []
+    end, horizon = float(run["time"].values[-1]), float(run["horizon"])
+    later = (
+        " Later values are those of this one run; use averages over several runs (<code>[ensemble]</code>) there."
+        if min(horizon, end if members is None else members) < end
+        else ""
+    )
+    return [html.escape(sentence(horizon, end, members)) + later]
+
+
+def _trust(run: xr.Dataset) -> list[str]:
+    largest, missed = largest_energy(run), float(np.abs(run["energy_error"].values).max())
+    fraction = missed / largest if largest > 0.0 else 0.0
+    word = "<span class='good'>closes</span>" if fraction < ENERGY else "<span class='bad'>does not close</span>"
+    return [
+        f"The energy balance {word}: <span class='n'>{fraction:.1e}</span> of the largest energy is unaccounted for."
+    ]
+
+
+def effects(scene: Mapping[str, Any]) -> dict[str, str]:
+    """Which effects a scene (its parameters) has, by name, in words; those that it has not say so."""
+    body, joint = scene.get("body", {}), scene.get("joint", {})
+    load = scene.get("load", {})
+    flexible = [n for n, b in body.items() if b["type"] == "flexible"]
+    loose = [n for n, j in joint.items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"]
+    there = {
+        "clearance": loose,
+        "contact friction": [f"{n} ({joint[n]['friction']['law']})" for n in loose if joint[n].get("friction")],
+        "wear": [n for n in loose if joint[n].get("wear")],
+        "flexible bodies": [f"{n} ({body[n]['modes']['reference']})" for n in flexible],
+        "damping of flexible bodies": [n for n in flexible if body[n].get("damping") is not None],
+        "geometric stiffening": [n for n in flexible if body[n].get("stiffening") is not None],
+        "gravity": [n for n, part in load.items() if part["type"] == "gravity"],
+        "springs, dampers, bushings": [
+            n for n, p in load.items() if p["type"] in ("spring-damper", "joint-spring", "bushing")
+        ],
+        "joint friction": [n for n, part in load.items() if part["type"] == "joint-friction"]
+        + [n for n, part in joint.items() if n not in loose and part.get("friction")],
+        "controllers": [n for n, part in load.items() if "pid" in part["type"]],
+        "other forces": [n for n, p in load.items() if p["type"] in ("point-force", "point-torque", "joint-force")],
+        "stops": list(scene.get("stop", {})),
+        "gears": list(scene.get("gear", {})),
+    }
+    return {name: ", ".join(listed) if listed else "not in the scene" for name, listed in there.items()}
+
+
+def by_weight(assumptions: Mapping[str, str], run: xr.Dataset | None) -> dict[str, str]:
+    """Assumptions in the order of what hangs on them: of joints with clearance and flexible bodies first."""
+    scene = {} if run is None else parameters(run)
+    loose = {n for n, j in scene.get("joint", {}).items() if "clearance" in j["type"] or j["type"] == "ball-on-plane"}
+    flexible = {n for n, b in scene.get("body", {}).items() if b["type"] == "flexible"}
+
+    def weight(path: str) -> int:
+        family, _, rest = path.partition(".")
+        part = rest.partition(".")[0]
+        if (family, part in loose) == ("joint", True):
+            return 0
+        if (family, part in flexible) == ("body", True):
+            return 1
+        order = {"drive": 2, "load": 3, "stop": 3, "gear": 3, "start": 4, "joint": 5, "body": 6}
+        return order.get(family, 7)
+
+    return dict(sorted(assumptions.items(), key=lambda item: (weight(item[0]), item[0])))

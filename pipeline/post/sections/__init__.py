@@ -1,0 +1,1 @@
+"""Poincare sections: periodic, quasi-periodic or chaotic, and the page about it."""

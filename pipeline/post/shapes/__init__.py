@@ -1,0 +1,1 @@
+"""Surfaces of deformed bodies, and stress on them, as numbers."""

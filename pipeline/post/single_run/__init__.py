@@ -1,0 +1,1 @@
+"""What follows from one run: series, impacts, wear, horizon."""

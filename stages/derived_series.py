@@ -1,0 +1,45 @@
+"""Stage 5: a run (and its ensemble) -> the series and tables derived from it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.scene.provenance import assumed
+from flexclear.pipeline.core.workflow.task import given_arrays
+from flexclear.stages import meshing
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
+
+
+@given_arrays
+def run(params: Mapping[str, Any], inputs: Mapping[str, LabelledArrays], progress: Progress) -> dict[str, Any]:
+    """The post dataset (schema POST), with what the scene says of where its values come from."""
+    from flexclear.pipeline.post import derived
+
+    return {"nc": derived(inputs["run"], inputs.get("ensemble")).assign_attrs(**params["attributes"])}
+
+
+def params(scene: Scene) -> dict[str, Any]:
+    """Attributes that no run depends on: `sources` and `assumptions`, path in the scene -> text, as JSON."""
+    return {"attributes": origins(scene)}
+
+
+def origins(scene: Scene) -> dict[str, str]:
+    """Where values come from, as attributes of datasets."""
+    texts = sources(scene)
+    origin = {"sources": texts, "assumptions": assumed(texts)}
+    return {name: json.dumps(by_place, sort_keys=True) for name, by_place in origin.items()}
+
+
+def sources(scene: Scene) -> dict[str, str]:
+    """Where values come from, those of mesh recipes included: path -> text."""
+    by_path = scene.sources()
+    for body, recipe in scene.recipes().items():
+        by_path |= meshing.sources(Path(recipe), f"body.{body}.recipe")
+    return by_path

@@ -1,0 +1,153 @@
+"""Next to stage 4: a scene with `[accuracy]` -> which of its effects that calls for."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.scene import variants
+from flexclear.pipeline.core.scene.load import edited, read_toml
+from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import rigid_body, simulation
+from flexclear.stages.graph import Graph
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
+
+#: inputs that are bundles of fewer modes: this, the level, the body
+FEWER = "fewer/"
+#: inputs that are bundles from twice as many elements
+FINER, TWICE = "finer/", 2
+#: reference condition with static modes between interfaces, six for each but one, and those without any
+WITH_STATIC, DIRECTIONS = "craig-bampton", 6
+NORMAL = ("free-free", "fixed-fixed", "cantilever")
+#: modes of rods come in pairs; so many at least have a half that is worth a look
+PAIR, LEAST_HALVED = 2, 4
+
+
+def task(scene: Scene) -> Task:
+    """The plan of a scene; shown as ``plan.nc``."""
+    rigid = edited(
+        variants.without(scene, [effect for effect in variants.effects(scene) if effect.name.startswith("body.")]),
+        {"accuracy": None},
+    )
+    whole = Graph(edited(scene, {"accuracy": None}), shown=False)
+    inputs = whole.bodies() | Graph(rigid, shown=False).bodies()
+    for k, counts in enumerate(levels(scene)):
+        less = Graph(edited(variants.with_modes(scene, counts), {"accuracy": None}), shown=False)
+        inputs |= {f"{FEWER}{k}/{body}": less.bundle[body] for body in counts}
+    counts = elements(scene)
+    if counts:
+        finer = Graph(edited(scene, {"accuracy": None}), shown=False, recipe={"elements": TWICE})
+        inputs |= {f"{FINER}{body}": finer.bundle[body] for body in counts}
+    simulate = simulation.params(scene)
+    return Task(
+        stage="plan",
+        scene=scene.name,
+        run="flexclear.stages.effect_plan:run",
+        params={
+            "simulate": simulate,
+            "title": scene.title,
+            "elements": counts,
+            "units": {q.name: q.unit for q in scene.requested()},
+        },
+        context={"name": scene.name, "limits": scene.limits.written()},
+        inputs=inputs,
+        modules=simulation.modules(scene),
+        folder=f"plan/{scene.name.replace('/', '_')}",
+        names={"nc": "plan.nc"},
+    )
+
+
+def elements(scene: Scene) -> dict[str, int]:
+    """Numbers of finite elements of flexible bodies whose recipe says one, and which may have twice as many."""
+    counts = {body: read_toml(Path(part.mesh)).get("elements") for body, part in scene.flexible().items()}
+    most = scene.limits.cells // TWICE
+    return {body: n for body, n in counts.items() if isinstance(n, int) and n <= most}
+
+
+def levels(scene: Scene) -> tuple[dict[str, int], ...]:
+    """Numbers of modes that bodies with more may do with, by body, the fewest first.
+
+    Of a basis with static modes these alone, and half of the others, in pairs, as rods bend in two planes; of normal
+    modes alone half of them.
+    """
+    fewest, half = dict[str, int](), dict[str, int]()
+    for name, body in scene.flexible().items():
+        count, static = body.modes.count, _static(body)
+        if isinstance(body.damping, RatioPerMode):
+            continue  # a ratio for each mode fits one number of modes only
+        if static and not (isinstance(count, int) and count <= static):
+            fewest[name] = static
+        if isinstance(count, int) and static is not None and count - static >= LEAST_HALVED:
+            half[name] = static + PAIR * round((count - static) / (2 * PAIR))
+    return tuple(level for level in ((fewest, fewest | half) if half else (fewest,)) if level)
+
+
+def _static(body: FlexibleBody) -> int | None:
+    """How many static modes its basis has; None where that is not known beforehand."""
+    if body.modes.reference in NORMAL:
+        return 0
+    if body.modes.reference != WITH_STATIC:
+        return None
+    ends = body.modes.interfaces or read_toml(Path(body.mesh)).get("interfaces", ())
+    return DIRECTIONS * (len(ends) - 1) if len(ends) > 1 else None
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """``plan.nc`` with all decisions, the table of them and the chart; inputs are bundles, as of `task`."""
+    from flexclear.pipeline.post.answers import plan as shown
+    from flexclear.pipeline.post.answers.effect_sizes import chart
+    from flexclear.pipeline.post.plotting.table import files
+
+    dataset = shown.dataset(decided(params, inputs, progress), params["title"], params["units"])
+    progress(None, "chart")
+    requested = dict(zip(dataset["quantity"].values.tolist(), dataset["wanted"].values.tolist(), strict=True))
+    result: dict[str, Any] = {"nc": dataset} | files("plan", shown.table(dataset))
+    return result | chart("plan", shown.drawn(dataset), f"What the accuracy calls for: {params['title']}", requested)
+
+
+def decided(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> Any:
+    """The plan (`core.scene.plan_decisions.Plan`)."""
+    from flexclear.pipeline.dynamics.plan.search import plan
+
+    rigid = {name: data for name, data in inputs.items() if name.startswith(rigid_body.PREFIX)}
+    fewer = less(inputs)
+
+    def filled(scene: Scene) -> Scene:
+        """With the rigid bodies that recipes describe."""
+        mine = {name: data for name, data in rigid.items() if name.removeprefix(rigid_body.PREFIX) in scene.meshed()}
+        return simulation.rebuild(simulation.params(scene), mine)
+
+    own = {name: data for name, data in rigid.items() if _meshed(params["simulate"], name)}
+    scene = simulation.rebuild(params["simulate"] | {"name": params.get("name", "scene")}, own)
+    meshes = {body: (n, inputs[f"{FINER}{body}"]) for body, n in params.get("elements", {}).items()}
+    return plan(scene, simulation.bundles(inputs), fewer, meshes, filled, progress)
+
+
+def less(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
+    """Bundles of fewer modes, by level, the fewest first, and body; those that have no fewer are left out."""
+    fewer: dict[int, dict[str, xr.Dataset]] = {}
+    for name, data in inputs.items():
+        if name.startswith(FEWER):
+            level, _, body = name.removeprefix(FEWER).partition("/")
+            if data.sizes["mode"] < inputs[f"bundle/{body}"].sizes["mode"]:
+                fewer.setdefault(int(level), {})[body] = data
+    return [fewer[level] for level in sorted(fewer)]
+
+
+def _meshed(simulate: Mapping[str, Any], name: str) -> bool:
+    """Whether a body that a recipe describes is rigid in the scene itself."""
+    return bool(simulate["scene"]["body"][name.removeprefix(rigid_body.PREFIX)]["type"] == "rigid")
+
+
+def from_dataset(planned: xr.Dataset) -> dict[str, Any]:
+    """What of a plan makes its scene: names of effects that go, modes, integrator and tolerance."""
+    choice: dict[str, Any] = json.loads(planned.attrs["planned"])
+    return choice

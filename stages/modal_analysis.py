@@ -1,0 +1,53 @@
+"""Stage 2: mesh -> frequencies and mass-normalised shapes under one reference condition."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.scene.registry import module_of
+from flexclear.stages import meshing
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.parts import FlexibleBody
+    from flexclear.pipeline.core.system.progress import Progress
+
+CONDITIONS = "flexclear.pipeline.structure.modes.reference"
+
+
+def params(body: FlexibleBody) -> dict[str, Any]:
+    """The selected coordinates; nothing else of the body."""
+    return body.modes.model_dump(mode="json", exclude={"source"}, exclude_none=True)
+
+
+def modules(body: FlexibleBody, where: str) -> tuple[str, ...]:
+    """Modules of the reference conditions and of the kind of body; InputError when there is none of that name."""
+    names = [body.modes.reference, *([body.modes.of] if body.modes.of else [])]
+    return (*(module_of(CONDITIONS, name, where=where) for name in names), *meshing.modules(Path(body.mesh)))
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """The modes (schema MODES) as ``nc``, and their shapes for ParaView as ``vtu``."""
+    from flexclear.pipeline.structure.modes import paraview
+    from flexclear.pipeline.structure.modes.select import ModeRequest
+    from flexclear.pipeline.structure.modes.solution import solve
+
+    count = params.get("count")
+    result = solve(
+        inputs["mesh"],
+        params["reference"],
+        interfaces=params.get("interfaces"),
+        requested=ModeRequest(
+            count=None if count == "all" else count,
+            up_to=params.get("up_to"),
+            compliance=params.get("compliance"),
+            mass=params.get("mass"),
+        ),
+        held=params.get("held", ()),
+        of=params.get("of"),
+        progress=progress,
+    )
+    return {"nc": result, "vtu": paraview.vtu(result)}

@@ -1,0 +1,49 @@
+"""Stage 3: mesh and modes -> the reduced modal bundle, all that the dynamics needs of the body."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.scene.registry import lookup, module_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
+
+STRESS = "flexclear.pipeline.structure.stress"
+SHORTENING = "flexclear.pipeline.structure.modes.geometric_stiffness"
+WHERE = "[output] stress"
+
+
+def params(scene: Scene, body: str) -> dict[str, Any]:
+    """Whether and where stresses are to be recovered, and whether bending shortens the body; what is asked for only."""
+    asked: dict[str, Any] = {"stress": True} if body in (scene.output.stress or ()) else {}
+    if gauges := scene.output.on(body):
+        asked["gauges"] = {name: gauge.model_dump(mode="json", exclude_none=True) for name, gauge in gauges.items()}
+    return asked | ({"stiffening": True} if scene.flexible()[body].stiffening is not None else {})
+
+
+def modules(scene: Scene, body: str, kind: str) -> tuple[str, ...]:
+    """Module that recovers stresses of this kind of body; InputError when there is none."""
+    asked = params(scene, body)
+    stress = (module_of(STRESS, kind, where=WHERE),) if "stress" in asked else ()
+    return (*stress, *((SHORTENING,) if "stiffening" in asked else ()))
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """The bundle (schema BUNDLE)."""
+    from flexclear.pipeline.structure.modes import bundle
+
+    progress(None, "inertia integrals")
+    mesh, modes = inputs["mesh"], inputs["modes"]
+    extra: dict[str, Any] = {}
+    if params.get("stress"):
+        recover = lookup(STRESS, str(mesh.attrs.get("body_kind", "beam")), where=WHERE)
+        extra |= recover(mesh, modes, params.get("gauges", {}))
+    if params.get("stiffening"):
+        extra |= import_module(SHORTENING).variables(mesh, modes)
+    return {"nc": bundle.build(mesh, modes, extra)}

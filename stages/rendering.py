@@ -1,0 +1,98 @@
+"""Stage 6: a run, its reduced bodies or its vibrations -> pictures, films, pages to turn, files for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.scene.appearance import UNSEEN
+from flexclear.pipeline.core.scene.load import is_file
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.stages.simulation import bundles
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
+
+#: what can be shown, as what; repeated here, because asking the modules that draw takes their import
+FORMATS: dict[str, tuple[str, ...]] = {
+    "motion": ("png", "gif", "mp4", "html", "gltf", "pvd"),
+    "stress": ("png", "gif", "mp4", "html"),
+    "modes": ("png", "gif", "mp4", "html", "gltf", "pvd"),
+    "joint": ("png", "gif", "mp4", "html"),
+    "vibrations": ("png", "gif", "mp4", "html"),
+}
+#: films of what have curves next to them
+FILMED = ("motion", "stress")
+#: keys of `[view]` that pictures of solids heed
+SEEN = ("direction", "up", "zoom", "exaggeration", "duration", "impact_slowdown")
+
+
+def gl_state() -> str:
+    """Which GL libraries this machine has; part of the key of everything that is drawn with them."""
+    from flexclear.pipeline.post.render import gl
+
+    return gl.state()
+
+
+def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
+    """What is shown and how: what the scene says of its pictures, what is watched, the GL libraries where they matter.
+
+    Raises InputError for files of shapes that are not there.
+    """
+    values: dict[str, Any] = {"what": what, "format": kind}
+    if what in ("motion", "stress", "vibrations") and kind in ("png", "gif", "mp4"):
+        values["gl"] = gl_state()
+    if kind == "html":
+        values["title"] = scene.title
+    if what != "modes":
+        values["bodies"] = _looks(scene)
+    if scene.view is not None and what != "modes":
+        asked = scene.view.model_dump(mode="json", include=set(SEEN), exclude_none=True)
+        values |= {"view": asked} if asked else {}
+    if (what == "joint" and kind in ("png", "html")) or (what in FILMED and kind in ("gif", "mp4")):
+        terms = [term for quantity in scene.watched() for term in quantity.terms()]
+        values["watched"] = list(dict.fromkeys(term.owner for term in terms if term.owner))
+        if what in FILMED and scene.view is not None and scene.view.watch is not None:
+            values["curves"] = [quantity.written() for quantity in scene.watched()]
+    return values
+
+
+def _looks(scene: Scene) -> dict[str, Any]:
+    """Shapes and colours of bodies, where the scene gives some; files by their names, since their content counts."""
+    looks = {}
+    for name, body in scene.body.items():
+        look = body.model_dump(mode="json", include=set(UNSEEN), exclude_none=True)
+        for k, shape in enumerate(look.get("geometry", ())):
+            if shape["type"] == "file" and not is_file(Path(shape["file"])):
+                raise InputError(
+                    f"{scene.path or scene.name} [body.{name}.geometry.{k}]",
+                    f"there is no file {shape['file']}",
+                    "paths are relative to the scene",
+                )
+        if look:
+            looks[name] = look
+    return looks
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Files by name; inputs are ``run`` or ``linear``, and ``bundle/<body>``."""
+    from flexclear.pipeline.core.scene.quantity import Quantity
+    from flexclear.pipeline.post.render.mechanism import Looks
+    from flexclear.pipeline.post.render.pictures import Shown, make
+
+    shown = Shown(
+        run=inputs.get("run"),
+        linear=inputs.get("linear"),
+        bundles=bundles(inputs),
+        looks=Looks(bodies=params.get("bodies", {}), **params.get("view", {})),
+        watched=params.get("watched", ()),
+        curves=[Quantity.read(data) for data in params.get("curves", ())],
+        title=str(params.get("title", "")),
+        progress=progress,
+    )
+    progress(None, f"{params['what']} as {params['format']}")
+    return dict(make(params["what"], params["format"], shown))

@@ -1,0 +1,116 @@
+"""Stage 4: scene and bundles -> one run, or an ensemble of runs."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from flexclear.pipeline.core.artifacts.paths import results_root
+from flexclear.pipeline.core.scene import provenance
+from flexclear.pipeline.core.scene.appearance import UNSEEN
+from flexclear.pipeline.core.scene.resource_estimate import check_run
+from flexclear.pipeline.core.workflow import stopping
+from flexclear.pipeline.core.workflow.task import given_arrays
+from flexclear.stages import rigid_body
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
+
+#: of one kind: datasets or labelled arrays
+Data = TypeVar("Data")
+#: limits of a scene that is made again without its own: what it asks for was judged when it was read
+JUDGED = {"rows": sys.maxsize, "members": sys.maxsize}
+
+
+def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
+    """What the engine sees of a scene. Titles, views, shapes, limits, sources, and paths of files are not
+    part of it, nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run,
+    nor whether that may be missed."""
+    unseen = ("title", "description", "view", "limits", "accuracy" if ensemble else "ensemble")
+    left_out: dict[str, Any] = dict.fromkeys(unseen, True)
+    left_out["body"] = {"__all__": set(UNSEEN)}
+    if not ensemble:
+        left_out["accuracy"] = {"allow_missed"}
+    if not sections:
+        left_out["sections"] = True
+    table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
+    for body in scene.recipes():
+        table["body"][body]["mesh"] = ""  # what was made of it comes as a bundle
+    return {"scene": provenance.without(table)}
+
+
+def modules(scene: Scene) -> tuple[str, ...]:
+    """Modules that a run reaches by its parts' names, so that editing a law leaves scenes without it alone.
+
+    Raises InputError when a name is not listed in its family.
+    """
+    from flexclear.pipeline.dynamics.compile import sources
+
+    return sources.modules(scene)
+
+
+@given_arrays
+def run(params: Mapping[str, Any], inputs: Mapping[str, Labelled], progress: Progress) -> dict[str, Any]:
+    """One run (schema RUN); inputs are ``bundle/<body>``.  What the bundles lack where it matters is reported, and
+    kept."""
+    from flexclear.pipeline import dynamics
+
+    scene, reduced = rebuild(params, inputs), bundles(inputs)
+    check_run(scene, results_root())
+    lacks = missing_compliance(scene, reduced)
+    for text in lacks:
+        progress(None, text)
+    with stopping.until(scene.limits.time, scene.limits.time_words):
+        simulated = dynamics.simulated(scene, reduced, progress)
+    warnings = "\n".join(filter(None, [str(simulated.attrs.get("warnings", "")), *lacks]))
+    return {"nc": simulated.assign_attrs(warnings=warnings) if warnings else simulated}
+
+
+def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[str]:
+    """Sentences about flexible bodies whose modes lack static compliance between the frames that joints use."""
+    if not reduced:
+        return []
+    from flexclear.pipeline.core.artifacts import deficits
+
+    messages = []
+    for body, bundle in reduced.items():
+        ends = (end.partition(".") for joint in scene.joint.values() for end in joint.between)
+        used = [frame for owner, _, frame in ends if owner == body]
+        if used and "compliance_share" in bundle:
+            messages += deficits.warnings(bundle, used, body)
+    return messages
+
+
+def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
+    from flexclear.pipeline import dynamics
+
+    scene = rebuild(params, inputs)
+    check_run(scene, results_root())
+    with stopping.until(scene.limits.time, scene.limits.time_words):
+        return {"nc": dynamics.ensemble(scene, bundles(inputs), progress)}
+
+
+def bundles(inputs: Mapping[str, Data]) -> dict[str, Data]:
+    """The inputs called ``bundle/<body>``, by body."""
+    return {name.removeprefix("bundle/"): data for name, data in inputs.items() if name.startswith("bundle/")}
+
+
+def rebuild(params: Mapping[str, Any], inputs: Mapping[str, Labelled] | None = None) -> Scene:
+    """The scene again, from `params`; its title is its name, where that is reported.
+
+    inputs: among them ``rigid/<body>`` of the rigid bodies that recipes describe, whose numbers are filled in.
+    """
+    from flexclear.pipeline.core.scene.schema import Scene
+
+    table, name = params["scene"], str(params.get("name", "scene"))
+    body = rigid_body.filled(table["body"], inputs or {})
+    mine = {"body": body, "title": name, "limits": params.get("limits", JUDGED)}
+    scene = Scene.model_validate({**table, **mine})
+    scene._name = name
+    return scene

@@ -1,0 +1,1 @@
+"""Points of a sweep: planned, handed to processes or a cluster, stored."""

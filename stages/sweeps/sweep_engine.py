@@ -1,0 +1,292 @@
+"""Who runs the points of a sweep: this process, the cores of this machine, or a Dask cluster; with equal results."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from math import ceil, inf
+from pathlib import Path
+from typing import Any
+
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.system.errors import InputError, ResourceError
+from flexclear.pipeline.core.workflow import stopping, workers
+from flexclear.pipeline.core.workflow.schedule import TICK
+from flexclear.stages.sweeps.sweep_points import source_digest, work
+
+#: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
+BATCH_SECONDS, MOST, QUEUED = 0.5, 1000, 2
+#: towards the end less is handed out, a fraction of what is left, so that all workers finish together; least seconds of
+#: it
+LEAST = 0.02
+#: evaluations of a point from which on it is run together with others, and of all that wait, for which code is made
+WORTH, WORTH_CODE = 5_000, 5_000_000
+#: so many, where each worker has as many, and seconds of work of several times as many: fewer wait for their last ones
+ABREAST, BATCH_SECONDS_TOGETHER = 8, 5.0
+#: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
+PER_WORKER = 5e-3
+#: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
+LONG = 5.0
+#: seconds in which a scheduler must have answered
+PATIENCE = 10.0
+#: seconds after which a cluster is asked again how many workers it has
+LOOK = 5.0
+#: how often in a row processes of this machine may be lost before it is for good
+LOSSES = 3
+
+
+@dataclass(frozen=True)
+class Job:
+    """A point to be run. family: its key; point: path in the scene -> value; journal: where it keeps its work."""
+
+    key: str
+    family: str
+    point: dict[str, Any]
+    journal: Path
+
+
+Done = Callable[[Sequence[tuple[Job, Point]], float], None]
+Points = list[dict[str, Any]]
+#: gives `stages.sweeps.sweep_points.work` to whoever does it, with its first six arguments
+Submit = Callable[[str, bytes, Points, bool, Sequence[Path | None], bool], Future[Any]]
+
+
+@dataclass(frozen=True)
+class Engine:
+    """Who does the work, and on how many tasks at a time; whether on this machine.
+
+    renew: called where a worker has died and taken the others with it, before work is given out again.
+    """
+
+    submit: Submit
+    width: Callable[[], int]
+    here: bool = True
+    renew: Callable[[], None] = lambda: None
+
+    def run(self, jobs: Sequence[Job], families: dict[str, bytes], done: Done) -> None:
+        """Run points; `done` receives finished ones and their processor time [s], in any order of the batches.
+
+        families: what `stages.sweeps.sweep_points.work` is given of each.  Raises ResourceError when workers keep
+        dying, StoppedError when all is to stop.
+        """
+        waiting, running, pace, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
+        evaluations, abreast = 0.0, False  # of the points that were finished last; whether code is made for several
+        while waiting or running:
+            stopping.check()
+            # nothing is compiled twice: until the first point is there nothing else begins
+            width = self.width()
+            while waiting and len(running) < (QUEUED * width if pace else 1):
+                left = sum(map(len, waiting))
+                enough = abreast or (left >= ABREAST * width and left * evaluations >= WORTH_CODE)
+                abreast = evaluations >= WORTH and enough
+                mine = _take(waiting, _portion(left, pace, width, abreast) if pace else 1)
+                keep = self.here and not 0.0 < pace < LONG
+                running[self._given(mine, families, alone=not pace, keep=keep, abreast=abreast)] = mine
+            finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
+            for future in finished:
+                mine = running.pop(future)
+                try:
+                    points, seconds = future.result()
+                except BrokenProcessPool:
+                    # whose fault it was is not known: every batch on its way is lost, and made again
+                    again = [mine, *running.values()]
+                    running.clear()
+                    lost += 1
+                    if lost > LOSSES:
+                        text = f"worker processes were killed {lost} times in a row; is the memory full?"
+                        raise ResourceError(text) from None
+                    waiting += [list(reversed(batch)) for batch in again]
+                    self.renew()
+                    break
+                done(list(zip(mine, points, strict=True)), seconds)
+                evaluations = sum(point.evaluations for point in points) / len(points)
+                first, lost = not pace, 0  # what the first one took held compiling and fetching
+                pace = max(1e-6, seconds / len(mine)) if not first else BATCH_SECONDS / 2.0
+
+    def _given(
+        self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool, abreast: bool
+    ) -> Future[Any]:
+        family, points = mine[0].family, [job.point for job in mine]
+        journals = [job.journal if keep else None for job in mine]
+        try:
+            return self.submit(family, families[family], points, alone, journals, abreast)
+        except (BrokenProcessPool, ConnectionError, EOFError) as error:  # the others: of one killed while it starts
+            if not self.here:
+                raise
+            failed: Future[Any] = Future()
+            failed.set_exception(BrokenProcessPool(str(error)))
+            return failed
+
+
+def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
+    """Jobs in stretches of one family, the next one last."""
+    families: dict[str, list[Job]] = {}
+    for job in jobs:
+        families.setdefault(job.family, []).append(job)
+    return [list(reversed(mine)) for mine in reversed(families.values())]
+
+
+def _portion(left: int, pace: float, width: int, abreast: bool) -> int:
+    """Points that are handed out at a time. left: those that wait; pace: seconds of each.
+
+    abreast: whether they are run side by side; of few, most would wait for the last one.
+    """
+    asking = PER_WORKER * width
+    seconds_of_work = BATCH_SECONDS_TOGETHER if abreast else BATCH_SECONDS
+    seconds = min(max(seconds_of_work, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
+    if abreast and left < ABREAST * width:  # the last ones
+        return max(ABREAST // 2, ceil(left / width))
+    if abreast:
+        return ABREAST * min(MOST // ABREAST, max(1, round(seconds / pace / ABREAST)))
+    return min(MOST, max(1, int(seconds / pace)))
+
+
+def _take(waiting: list[list[Job]], count: int) -> list[Job]:
+    stretch = waiting[-1]
+    taken = [stretch.pop() for _ in range(min(count, len(stretch)))]
+    if not stretch:
+        waiting.pop()
+    return taken
+
+
+@contextmanager
+def engine(width: int, scheduler: str | None) -> Iterator[Engine]:
+    """The engine of a sweep: a Dask cluster at an address, that many processes here, or this one."""
+    if scheduler is not None:
+        with _cluster(scheduler) as runner:
+            yield runner
+        return
+    if width == 1:
+        yield Engine(_here, lambda: 1)
+        return
+    pools: list[ProcessPoolExecutor] = [workers.pool(width)]
+
+    def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
+        with workers.without_main():
+            return pools[-1].submit(work, family, packed, *rest)
+
+    def renew() -> None:
+        workers.kill(pools[-1])
+        pools.append(workers.pool(width))
+
+    try:
+        yield Engine(submit, lambda: width, renew=renew)
+    except BaseException:
+        workers.kill(pools[-1])
+        raise
+    pools[-1].shutdown()
+
+
+def _here(*given: Any) -> Future[Any]:
+    """The work, done in this process at once."""
+    future: Future[Any] = Future()
+    future.set_result(work(*given))
+    return future
+
+
+@contextmanager
+def _cluster(address: str) -> Iterator[Engine]:
+    """The workers of a Dask scheduler; InputError when there are none, or they run other sources."""
+    where = f"--scheduler {address}"
+    try:
+        from distributed import Client, KilledWorker
+        from distributed.client import FutureCancelledError
+        from distributed.comm import CommClosedError
+    except ImportError:
+        raise InputError(where, "dask.distributed is not installed", "pip install 'flexclear[cluster]'") from None
+    stack = ExitStack()
+    stack.enter_context(_quiet("distributed"))
+    try:
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        stack.callback(client.close)
+    except (OSError, ValueError, TimeoutError) as error:
+        stack.close()
+        raise InputError(
+            where, f"no scheduler answers there ({type(error).__name__})", "start one with `dask scheduler`"
+        ) from None
+    try:
+        yield _on_cluster(client, where)
+    except KilledWorker as error:
+        text = f"{where}: workers died again and again over a task ({error}); is their memory full?"
+        raise ResourceError(text) from None
+    except (CancelledError, FutureCancelledError, CommClosedError):
+        raise ResourceError(f"{where}: the scheduler has gone; finished results are stored") from None
+    except ImportError as error:  # of a worker that has joined since
+        raise InputError(where, f"a worker cannot import flexclear: {error}", "install it where it runs") from None
+    finally:
+        stack.close()
+
+
+@contextmanager
+def _quiet(library: str) -> Iterator[None]:
+    """Meanwhile a library logs nothing: what happens to it is reported in one sentence, without its traceback."""
+    names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == library]
+    levels = {logger: logger.level for logger in map(logging.getLogger, names)}
+    for logger in levels:
+        logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for logger, level in levels.items():
+            logger.setLevel(level)
+
+
+def _on_cluster(client: Any, where: str) -> Engine:
+    """The engine of a cluster; points that are lost with a worker are run by another one, as its scheduler sees to."""
+    executor, seen = client.get_executor(), [now(), _threads(client, where)]
+    held: dict[str, Any] = {}
+
+    def submit(family: str, packed: bytes, *rest: Any) -> Future[Any]:
+        # sent once; workers fetch it from each other, and the scheduler has it made again when it is lost with one
+        if family not in held:
+            held[family] = client.submit(bytes, packed, key=f"family-{family}", pure=False)
+        future: Future[Any] = executor.submit(work, family, held[family], *rest, source_digest())
+        return future
+
+    def width() -> int:
+        """Workers may come and go."""
+        if now() - seen[0] > LOOK:
+            seen[:] = now(), sum(client.nthreads().values())
+        return max(1, int(seen[1]))
+
+    return Engine(submit, width, here=False)
+
+
+def _threads(client: Any, where: str) -> int:
+    """Return how many tasks the workers run at a time.
+
+    Raises InputError where there are none, or they run other sources, ResourceError where one keeps silent.
+    """
+    end = inf
+    while True:
+        threads = sum(client.nthreads().values())
+        if not threads:
+            raise InputError(where, "the scheduler has no workers", "start some with `dask worker ADDRESS`")
+        digests = client.run(source_digest, on_error="return")
+        for worker, digest in digests.items():
+            if isinstance(digest, ImportError):
+                raise InputError(
+                    where, f"worker {worker} cannot import flexclear: {digest}", "install it where it runs"
+                )
+        failed = {worker: error for worker, error in digests.items() if isinstance(error, Exception)}
+        if not failed:
+            break
+        end = min(end, now() + PATIENCE)  # from the first failure on: the check itself may have waited for a worker
+        if now() > end:
+            worker, error = next(iter(failed.items()))
+            raise ResourceError(f"{where}: worker {worker} does not answer ({error}); is its memory full?")
+        time.sleep(TICK)  # the scheduler removes workers that have died, and the others are asked again
+    others = [worker for worker, digest in digests.items() if digest != source_digest()]
+    if others:
+        raise InputError(where, f"worker {others[0]} runs other sources of flexclear", "install the same ones there")
+    return int(threads)
+
+
+def now() -> float:
+    """Clock for rates [s]."""
+    return time.monotonic()

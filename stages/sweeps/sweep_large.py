@@ -1,0 +1,126 @@
+"""Sweeps whose dataset is larger than memory: points stay in the store, and the dataset is a folder in Zarr's form.
+
+It is written in slabs of the first dimension, so that no more than one of them is ever in memory.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from importlib.util import find_spec
+from math import ceil, prod
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flexclear.pipeline.core.artifacts.disk import disk_limits
+from flexclear.pipeline.core.artifacts.points import Point, dimensions, unpacked
+from flexclear.pipeline.core.artifacts.store import Record, Store
+from flexclear.pipeline.core.system import machine
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.stages.sweeps.sweep_plan import Plan
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SUFFIX = ".zarr"
+#: a dataset in one file is in memory so many times: points, arrays, the bytes of the file, and what is read back
+HELD = 4.0
+#: bytes of a slab; batches of points in memory while slabs are put together
+SLAB, BATCHES = 1 << 26, 8
+INSTALL = "pip install 'flexclear[zarr]'"
+
+
+def require_zarr(where: str) -> None:
+    """InputError where the form cannot be written."""
+    if find_spec("zarr") is None:
+        raise InputError(where, "Zarr is not installed", INSTALL)
+
+
+def is_large(plan: Plan) -> bool:
+    """Whether the dataset does not fit into what memory the scene's `[limits]` allow, by default what is left.
+
+    Raises ResourceError where it cannot be written in slabs either.
+    """
+    allowed = plan.scene.limits.memory or machine.FRACTION * machine.memory()
+    need = HELD * plan_size(plan)
+    if need > allowed and find_spec("zarr") is None:
+        machine.require_memory(need, "the sweep's dataset", f"keep less, or {INSTALL}: it is then on disk", allowed)
+    return need > allowed
+
+
+def require_small(plan: Plan) -> None:
+    """ResourceError for a dataset that is to be returned, and does not fit."""
+    remedy = "keep less, or make it by `flexclear sweep FILE`, which leaves it on disk"
+    machine.require_memory(HELD * plan_size(plan), "the sweep's dataset", remedy, plan.scene.limits.memory)
+
+
+def plan_size(plan: Plan) -> float:
+    """Bytes of all recorded values."""
+    lengths = dimensions(plan.time, plan.sections)
+    each = sum(prod(lengths[dim] for dim in one.dims) for one in plan.recorded) * len(plan.statistics)
+    return 8.0 * each * prod(plan.design.shape)
+
+
+def write(path: Path, slabs: Iterator[xr.Dataset], along: str) -> None:
+    """A dataset as a folder in Zarr's form, whole or not at all. slabs: its parts, in order; along: their dimension."""
+    made = path.with_name(f".{path.stem}.part{SUFFIX}")
+    with disk_limits(path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        shutil.rmtree(made, ignore_errors=True)
+        for k, slab in enumerate(slabs):
+            # Zarr has texts of any length; NumPy's have one, which the next slab may exceed
+            texts = {name: v.astype(object) for name, v in slab.variables.items() if v.dtype.kind == "U"}
+            whole = slab.assign({n: v for n, v in texts.items() if n in slab.data_vars})
+            whole = whole.assign_coords({n: v for n, v in texts.items() if n in slab.coords})
+            if k == 0:
+                whole.to_zarr(made, mode="w", consolidated=False)
+            else:
+                whole.to_zarr(made, append_dim=along, consolidated=False)
+        shutil.rmtree(path, ignore_errors=True)
+        os.replace(made, path)
+
+
+def written(plan: Plan, store: Store, done: Mapping[str, Point], path: Path) -> xr.Dataset:
+    """The dataset of the points in the store, written to `path` and opened there; values are read when asked for.
+
+    done: the finished points, their values left out.
+    """
+    import xarray as xr
+
+    write(path, _slabs(plan, store, done), plan.design.dims[0])
+    return xr.open_zarr(path, chunks=None, consolidated=False)
+
+
+def _slabs(plan: Plan, store: Store, done: Mapping[str, Point]) -> Iterator[xr.Dataset]:
+    places = dict(_places(plan, store))
+    opened = lru_cache(BATCHES)(lambda k: unpacked(store.load(records[k]), plan.recorded))
+    records = {record.key: record for record in places.values()}
+    complete = int(all(job.key in done for job in plan.jobs))
+    count = plan.design.shape[0]
+    rows = ceil(count / max(1, ceil(plan_size(plan) / SLAB)))
+    for first in range(0, count, rows):
+        part = plan.rows(first, first + rows)
+        here = {job.key: opened(places[job.key].key)[job.key] for job in part.jobs if job.key in places}
+        yield part.dataset(here).assign_attrs(complete=complete)
+
+
+def _places(plan: Plan, store: Store) -> Iterator[tuple[str, Record]]:
+    """Keys of points and the batch that each of them is in."""
+    for family in plan.families:
+        for record, batch in family.batches(store):
+            yield from ((str(key), record) for key in batch["key"].values)
+
+
+def write_copy(path: Path, dataset: xr.Dataset) -> None:
+    """A dataset, in memory or lazily opened, in Zarr's form."""
+    along = str(dataset["status"].dims[0])
+    count = dataset.sizes[along]
+    rows = ceil(count / max(1, ceil(dataset.nbytes / SLAB)))
+    write(path, (dataset.isel({along: slice(k, k + rows)}).load() for k in range(0, count, rows)), along)
+
+
+def stripped(point: Point) -> Point:
+    """What a sweep must know of a point whose values are in the store."""
+    return Point({}, {}, {}, point.evaluations, point.refused)

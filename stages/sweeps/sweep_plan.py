@@ -1,0 +1,354 @@
+"""What a sweep comes to: its points checked, distinguished by the flexible bodies they need, and named by content."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.artifacts.store import FAMILY
+from flexclear.pipeline.core.scene.design import Axis, Design, design
+from flexclear.pipeline.core.scene.limits import check_members
+from flexclear.pipeline.core.scene.load import edited, with_numbers
+from flexclear.pipeline.core.scene.quantity import Recorded, parse_recorded
+from flexclear.pipeline.core.scene.schema import Sections
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.machine import instruction_set
+from flexclear.pipeline.core.workflow.task import Task, facts, key
+from flexclear.stages import simulation
+from flexclear.stages.graph import Graph
+from flexclear.stages.sweeps.sweep_engine import Job
+from flexclear.stages.sweeps.sweep_points import Family as Work
+from flexclear.stages.workplace import Workplace, check
+
+if TYPE_CHECKING:
+    import numpy as np
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.points import Point
+    from flexclear.pipeline.core.artifacts.store import Record, Store
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.scene.sweep import Sweep
+
+#: numeric values of a parameter that are all checked beforehand; of more, the least and the largest
+CHECKED = 200
+#: what a path in the scene decides that cannot be in one series
+TIMES = ("time.start", "time.end", "output.interval")
+#: and what decides how many sections there are
+COUNTS = ("sections.periods",)
+#: represents what is varied in the facts of a family
+VARIED = "varied"
+
+
+@dataclass(frozen=True)
+class Family:
+    """Points that share their flexible bodies: what workers are given, and the facts that decide all of them."""
+
+    work: Work
+    facts: Mapping[str, str]
+
+    @property
+    def key(self) -> str:
+        """Digest of the facts."""
+        return self.work.key
+
+    @property
+    def folder(self) -> tuple[str, str]:
+        """Stage of its batches in the store, and a name there that no batch has."""
+        return f"sweep/{self.key}", FAMILY
+
+    def keep(self, points: Mapping[str, Point], store: Store, recorded: Sequence[Recorded], here: bool = True) -> None:
+        """Store finished points as one artifact. here: whether this machine computed them."""
+        from flexclear.pipeline.core.artifacts.points import batch
+
+        name = hashlib.sha256("".join(sorted(points)).encode()).hexdigest()[:32]
+        store.put(
+            self.folder[0], name, {"nc": batch(points, recorded)}, self.facts, instruction_set() if here else None
+        )
+
+    def find(self, store: Store, recorded: Sequence[Recorded]) -> dict[str, Point]:
+        """All points of the family that are stored and sound, with their values of the `recorded` quantities."""
+        from flexclear.pipeline.core.artifacts.points import unpacked
+
+        points: dict[str, Point] = {}
+        for _, batch in self.batches(store):
+            points |= unpacked(batch, recorded)
+        return points
+
+    def batches(self, store: Store) -> Iterator[tuple[Record, xr.Dataset]]:
+        """What `keep` has stored, as far as it is sound."""
+        for path in sorted((store.root / "cache" / self.folder[0]).glob("*.json")):
+            record = store.find(self.folder[0], path.stem)
+            if record is not None:
+                yield record, store.load(record)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A sweep whose paths, values and quantities are known to fit its scene.
+
+    scene: with what is set, at the first point.
+    families, jobs: once the flexible bodies are there; see `prepare`.
+    """
+
+    sweep: Sweep
+    scene: Scene
+    design: Design
+    recorded: tuple[Recorded, ...]
+    families: tuple[Family, ...] = ()
+    jobs: tuple[Job, ...] = ()
+
+    def dataset(self, points: Mapping[str, Point]) -> xr.Dataset:
+        """The sweep's dataset of the points that are finished."""
+        from flexclear.pipeline.core.artifacts import points as results
+
+        attributes: dict[str, str | int] = {"sweep": self.sweep.name, "scene": self.scene.name}
+        attributes |= {"title": self.sweep.title} if self.sweep.title else {}
+        attributes |= {"set": json.dumps(self.sweep.set, sort_keys=True)} if self.sweep.set else {}
+        attributes |= {"members": self.sweep.members} if self.sweep.members else {}
+        keys = [job.key for job in self.jobs]
+        return results.dataset(
+            self.design,
+            self.recorded,
+            keys,
+            points,
+            self.time,
+            self.sections,
+            attributes,
+            self.statistics,
+        )
+
+    def rows(self, first: int, last: int) -> Plan:
+        """The part of the plan with these entries of the first dimension, up to the last one or the end."""
+        axes, each = self.design.axes, prod(self.design.shape[1:])
+        cut = [replace(axis, values=axis.values[first:last]) for axis in (axes[:1] if self.design.grid else axes)]
+        made = Design((*cut, *axes[len(cut) :]), self.design.grid)
+        return replace(self, design=made, jobs=self.jobs[first * each : last * each])
+
+    @property
+    def time(self) -> np.ndarray:
+        """Of the recorded series [s]."""
+        from flexclear.pipeline.core.artifacts.quantities import regular_times
+
+        return regular_times(self.scene.time, self.scene.output)
+
+    @property
+    def sections(self) -> int:
+        """How many there are of each point, where they are recorded."""
+        return (self.scene.sections or Sections()).periods
+
+    @property
+    def statistics(self) -> list[str]:
+        """Of `points.SHARES`, those that are asked for."""
+        asked = {"values": True, "error": self.sweep.error, "deviation": self.sweep.members}
+        return [statistic for statistic, requested in asked.items() if requested]
+
+
+def plan(sweep: Sweep, scene: Scene, where: str) -> Plan:
+    """The plan of a sweep, all of it checked before anything is run.
+
+    where: the sweep's file, for messages.  Raises InputError for paths that the scene does not have, values that it
+    refuses, and quantities that nothing of it has.
+    """
+    try:
+        base = edited(scene, {**sweep.set, "accuracy": None}) if sweep.set else edited(scene, {"accuracy": None})
+    except InputError as error:
+        raise _placed(f"{where} [set]", error) from None
+    check_members(sweep.members or 0, base.limits, f"{where} [members]")
+    made = design(sweep)
+    _check_values(base, made, where)
+    base = edited(base, made.points()[0])
+    recorded = tuple(_kept(base, name, where) for name in sweep.keep)
+    _check_recorded(sweep, base, made, recorded, where)
+    _check_units(base, made, recorded, where)
+    return Plan(sweep, base, made, recorded)
+
+
+def _placed(where: str, error: InputError) -> InputError:
+    problem, remedy = getattr(error, "problem", str(error)), getattr(error, "remedy", None)
+    return InputError(where, problem, remedy)
+
+
+def _check_values(base: Scene, made: Design, where: str) -> None:
+    """InputError for a value that the scene does not take; of many points of a sample the extreme ones are examined.
+
+    In a grid each value is next to the first ones of the others: what some combinations mean for the mechanism is
+    found when they are run.
+    """
+    points = made.points()
+    try:
+        edited(base, points[0])
+    except InputError as error:
+        raise _placed(f"{where} [vary{_guilty(base, made)}]", error) from None
+    for axis in made.axes:
+        for k in _looked_at(axis):
+            chosen = points[k] if not made.grid else points[0] | dict.fromkeys(axis.places, axis.values[k])
+            try:
+                with_numbers(base, chosen)
+            except InputError as error:
+                raise _placed(f"{where} [vary.{axis.name}]", error) from None
+
+
+def _guilty(base: Scene, made: Design) -> str:
+    """The parameter whose first value the scene does not take by itself, with a dot before it; or nothing."""
+    for axis in made.axes:
+        try:
+            edited(base, dict.fromkeys(axis.places, axis.values[0]))
+        except InputError:
+            return f".{axis.name}"
+    return ""
+
+
+def _looked_at(axis: Axis) -> Sequence[int]:
+    numbers = axis.coordinate
+    if len(numbers) <= CHECKED or isinstance(numbers[0], str):
+        return range(len(numbers))
+    by_size = sorted(range(len(numbers)), key=lambda k: numbers[k])
+    return by_size[0], by_size[-1]
+
+
+def _kept(base: Scene, name: str, where: str) -> Recorded:
+    try:
+        return parse_recorded(name, base.owners())
+    except ValueError as error:
+        raise InputError(f"{where} [keep]", str(error)) from None
+
+
+def _check_recorded(sweep: Sweep, base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> None:
+    varied = {path for axis in made.axes for path in axis.places}
+    timed = sorted(varied & set(TIMES))
+    for one in recorded:
+        if one.reduction == "series" and timed:
+            raise InputError(
+                f"{where} [keep]",
+                f"'{one.name}' is a series, whose times are those of all points, but {timed[0]} is varied",
+                "keep a number of it, such as the final or the largest value",
+            )
+        if one.reduction == "sections" and varied & set(COUNTS):
+            raise InputError(f"{where} [vary.{COUNTS[0]}]", "points would have different numbers of sections", "set it")
+    sections = [one.reduction == "sections" for one in recorded]
+    if any(sections) and not (all(sections) and not sweep.members and not sweep.error):
+        raise InputError(
+            f"{where} [keep]",
+            "sections follow one motion over many periods: neither runs of one period, "
+            "nor members, nor an estimated error go with it",
+            "keep sections alone, or make two sweeps of it",
+        )
+    if sweep.members and not base.contacts() and not base.stop:
+        raise InputError(
+            f"{where} [members]", "members differ by a ball's offset, but the scene has no clearance joint", "remove it"
+        )
+    if sweep.members and any(one.quantity.kind == "orientation" for one in recorded):
+        raise InputError(f"{where} [keep]", "orientations have no mean over members", "keep a position instead")
+    if sweep.error and base.solver.step is not None:
+        raise InputError(
+            f"{where} [error]", "the scene has steps of fixed length, which no tolerance changes", "vary solver.step"
+        )
+
+
+def _check_units(base: Scene, made: Design, recorded: Sequence[Recorded], where: str) -> None:
+    """InputError for a quantity that is about an axis at some of the points only."""
+    for axis, scene in _worded(base, made):
+        for one in recorded:
+            if _kept(scene, one.name, where).unit != one.unit:
+                raise InputError(
+                    f"{where} [vary.{axis.name}]",
+                    f"'{one.name}' is a force at some points and a torque at others",
+                    "make two sweeps of it",
+                )
+
+
+def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
+    """The scene at a point with each value that is no number, and so may name other parts."""
+    points = made.points()
+    for axis in made.axes:
+        texts = list(map(str, axis.values)) if isinstance(axis.coordinate[0], str) else []
+        for k in (texts.index(text) for text in dict.fromkeys(texts)):
+            chosen = points[0] | dict.fromkeys(axis.places, axis.values[k]) if made.grid else points[k]
+            yield axis, edited(base, chosen)
+
+
+def prepare(requested: Plan, workplace: Workplace) -> Plan:
+    """The plan with its families, whose flexible bodies are brought up to date first, and its points by key."""
+    points = requested.design.points()
+    groups = _groups(requested.scene, points)
+    graphs = {text: Graph(edited(requested.scene, first), shown=False) for text, first in groups.items()}
+    outcome = workplace.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
+    check(outcome)
+    modules = _modules(requested)
+    families = {}
+    for text, graph in graphs.items():
+        records = {name: outcome.records[id(task)] for name, task in graph.simulate.inputs.items()}
+        sections = any(one.reduction == "sections" for one in requested.recorded)
+        simulate = simulation.params(graph.scene, sections=sections)
+        task = Task(
+            stage="sweep",
+            scene=graph.scene.name,
+            run="flexclear.stages.sweeps.sweep_points:work",
+            params={
+                "simulate": _without_varied(simulate, points[0], groups[text]),
+                "keep": [one.name for one in requested.recorded],
+                "members": requested.sweep.members or 0,
+                "error": requested.sweep.error,
+            },
+            folder="",
+            modules=modules,
+        )
+        given = facts(task, {name: record.digest for name, record in records.items()}, workplace.sources)
+        inputs = {name: workplace.store.load(record) for name, record in records.items()}
+        keep = tuple(one.name for one in requested.recorded)
+        limited = {**simulate, "limits": graph.scene.limits.written()}  # no facts, and a point may ask for more
+        work = Work(key(given), limited, inputs, keep, requested.sweep.members or 0, requested.sweep.error)
+        families[text] = Family(work, given)
+    jobs = []
+    for point in points:
+        text, own = _group(requested.scene, point)
+        family = families[text].key
+        # what decides the bodies is in the family's scene, whose bodies are numbers by now
+        rest = {name: value for name, value in point.items() if name not in own}
+        name, (stage, _) = _point_key(family, point), families[text].folder
+        jobs.append(Job(name, family, rest, workplace.store.path(stage, name, "part").with_suffix("")))
+    return replace(requested, families=tuple(families.values()), jobs=tuple(jobs))
+
+
+def _group(scene: Scene, point: Mapping[str, Any]) -> tuple[str, dict[str, Any]]:
+    """Those values of a point that decide the bodies which recipes describe, and their text."""
+    bodies = tuple(f"body.{name}." for name in scene.recipes())
+    mine = {where: value for where, value in point.items() if where.startswith(bodies)} if bodies else {}
+    return json.dumps(mine, sort_keys=True, default=str), mine
+
+
+def _groups(scene: Scene, points: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
+    return dict(_group(scene, point) for point in points)
+
+
+def _modules(requested: Plan) -> tuple[str, ...]:
+    """Modules that any point reaches by the names of its parts: values that are no numbers may name others."""
+    modules = set(simulation.modules(requested.scene))
+    for _, scene in _worded(requested.scene, requested.design):
+        modules |= set(simulation.modules(scene))
+    return tuple(sorted(modules))
+
+
+def _without_varied(simulate: Mapping[str, Any], point: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters of a run without what differs from point to point, so that a sweep may be extended.
+
+    own: values that are those of a whole family.
+    """
+    table = copy.deepcopy(dict(simulate))
+    for where in point:
+        node, keys = table["scene"], where.split(".")
+        for name in keys[:-1]:
+            node = node[int(name) if isinstance(node, list) else name]
+        if where not in own:
+            node[int(keys[-1]) if isinstance(node, list) else keys[-1]] = VARIED
+    return table
+
+
+def _point_key(family: str, point: Mapping[str, Any]) -> str:
+    text = json.dumps([family, dict(sorted(point.items()))], default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:32]

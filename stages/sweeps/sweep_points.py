@@ -1,0 +1,146 @@
+"""Points of a sweep in a worker, on this machine or another one."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.system.progress import Progress, silent
+from flexclear.pipeline.core.workflow import journal
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.dynamics.record.point import Runner
+    from flexclear.pipeline.dynamics.run.batched_evaluation import Place
+
+#: runners that a worker keeps
+RUNNERS = 8
+
+
+@dataclass(frozen=True)
+class Family:
+    """Points that share a scene and its flexible bodies.
+
+    simulate: the scene, as of the simulate stage.  inputs: those of that stage by name.  keep: names of what is
+    kept.  members: of each point, 0 for the scene's own start.  error: whether errors are estimated.
+    """
+
+    key: str
+    simulate: Mapping[str, Any]
+    inputs: Mapping[str, xr.Dataset]
+    keep: tuple[str, ...]
+    members: int
+    error: bool
+
+
+@lru_cache(maxsize=RUNNERS)
+def _opened(key: str, packed: bytes) -> tuple[Scene, Runner]:
+    """The scene of a family and what runs its points; stored by a worker, since it holds the compiled functions."""
+    import pickle
+
+    from flexclear.pipeline.core.scene.quantity import parse_recorded
+    from flexclear.pipeline.dynamics.record.point import Runner
+    from flexclear.stages.simulation import bundles, rebuild
+
+    family: Family = pickle.loads(packed)
+    scene = rebuild(family.simulate, family.inputs)
+    recorded = [parse_recorded(name, scene.owners()) for name in family.keep]
+    return scene, Runner(bundles(family.inputs), recorded, family.members, family.error)
+
+
+def work(
+    key: str,
+    packed: bytes,
+    points: Sequence[Mapping[str, Any]],
+    alone: bool,
+    journals: Sequence[Path | None] = (),
+    abreast: bool = False,
+    sources: str = "",
+) -> tuple[list[Point], float]:
+    """Points of a family, and the processor time that they took [s].
+
+    packed: the pickled `Family`.  points: path in the scene -> value.  alone: whether no other worker is busy.
+    journals: of each point, where it keeps its unfinished work (`folder/key`), if it does; none by default.
+    abreast: whether they are worth to be run side by side; no point depends on it.
+    sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as
+    of a worker that has joined since.
+    """
+    from threadpoolctl import threadpool_limits
+
+    from flexclear.pipeline.core.system.errors import InputError
+    from flexclear.pipeline.core.workflow import cores
+
+    if sources and sources != source_digest():
+        raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
+    cores.tell(alone)
+    threadpool_limits(1)  # whoever loaded NumPy first, with however many threads
+    scene, runner = _opened(key, packed)
+    begun, own = time.process_time(), list(journals or [None] * len(points))
+    if not abreast:
+        results = [_point(runner, scene, point, where) for point, where in zip(points, own, strict=True)]
+    else:
+        results = _abreast(runner, scene, points, own)
+    for where in filter(None, own):
+        journal.remove(where)
+    return results, time.process_time() - begun
+
+
+def _abreast(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]], own: list[Path | None]) -> list[Point]:
+    """Points side by side, each in a thread, where that can be."""
+    from flexclear.pipeline.core.workflow.cores import side_by_side
+
+    with runner.abreast(scene, len(points)) as groups:
+
+        def one(k: int, alive: Progress) -> Point:
+            if groups is None:
+                return _point(runner, scene, points[k], own[k], alive=alive)
+            with groups.place() as where:
+                return _point(runner, scene, points[k], own[k], where, alive)
+
+        return side_by_side(one, len(points), lambda _: None, 1 if groups is None else groups.lanes)
+
+
+def _point(
+    runner: Runner,
+    scene: Scene,
+    point: Mapping[str, Any],
+    own: Path | None,
+    where: Place | None = None,
+    alive: Progress = silent,
+) -> Point:
+    """A point; what it has done so far, also when it is done, is stored where it has a journal."""
+    from flexclear.pipeline.core.scene.load import with_numbers
+    from flexclear.pipeline.core.system.errors import InputError
+
+    try:
+        edited = with_numbers(scene, point)
+    except InputError as error:
+        return Point({}, {}, {}, 0, str(error))
+    if own is None:
+        return runner.run(edited, where, alive)
+    with journal.storage(own.parent, own.name) as storage:
+        result = runner.run(edited, where, alive)
+        storage.write()  # others of its batch may take long
+        return result
+
+
+@cache
+def source_digest() -> str:
+    """Digest of the sources that a worker runs, to be compared with those of who asks it."""
+    import hashlib
+
+    from flexclear.pipeline.core.workflow.fingerprint import TREE
+
+    digest = hashlib.sha256()
+    for folder in ("commands", "papers", "pipeline", "stages"):
+        # by the one import name, under which a checkout and an installed flexclear have the same files
+        for path in sorted((TREE / "flexclear" / folder).rglob("*.py")):
+            digest.update(path.relative_to(TREE).as_posix().encode() + path.read_bytes())
+    return digest.hexdigest()

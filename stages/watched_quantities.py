@@ -1,0 +1,82 @@
+"""Next to stage 4: a variant of a scene -> what is watched of it, over members where it has contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from flexclear.pipeline.core.scene.load import edited
+from flexclear.pipeline.core.workflow.task import Task
+from flexclear.stages import simulation
+from flexclear.stages.graph import Graph
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.points import Point
+    from flexclear.pipeline.core.scene.quantity import Quantity
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
+
+#: settings of a scene that a watched run does not look at
+UNSEEN = ("accuracy", "ensemble", "sections", "view")
+#: starts of a variant with contacts
+MEMBERS = 4
+
+
+def plain(scene: Scene) -> Scene:
+    """The scene without what asks for more than one run of it."""
+    return edited(scene, dict.fromkeys(UNSEEN)) if any(getattr(scene, key) for key in UNSEEN) else scene
+
+
+def task(scene: Scene, chosen: Sequence[Quantity], members: int) -> Task:
+    """The task of a variant; its artifact holds one point, see `points.unpacked`."""
+    variant = plain(scene)
+    graph = Graph(variant, shown=False)
+    return Task(
+        stage="watched",
+        scene=scene.name,
+        run="flexclear.stages.watched_quantities:run",
+        params={
+            "simulate": simulation.params(variant),
+            "quantities": [q.written() for q in chosen],
+            "members": _members(variant, members),
+        },
+        inputs=graph.bodies(),
+        modules=simulation.modules(variant),
+        folder="",
+    )
+
+
+def _members(scene: Scene, members: int) -> int:
+    """Members of a scene with contacts; a motion without any needs none."""
+    return members if scene.contacts() or scene.stop else 0
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """One point as a dataset; refusals of the solver are in it, since they, too, say what an effect does."""
+    from flexclear.pipeline.core.artifacts.effect_size import recorded
+    from flexclear.pipeline.core.artifacts.points import batch
+    from flexclear.pipeline.core.scene.quantity import Quantity
+
+    scene = simulation.rebuild(params["simulate"], inputs)
+    chosen = [Quantity.read(data) for data in params["quantities"]]
+    progress(None, f"{scene.summary()}")
+    point = watch(scene, simulation.bundles(inputs), chosen, params["members"])
+    return {"nc": batch({"point": point}, recorded(scene.owners(), chosen))}
+
+
+def watch(scene: Scene, bundles: Mapping[str, xr.Dataset], chosen: Sequence[Quantity], members: int) -> Point:
+    """The run of a scene, in this process; `members` as given by the caller, none where there is no contact."""
+    from flexclear.pipeline.core.artifacts.effect_size import recorded, with_members
+    from flexclear.pipeline.dynamics.record.point import Runner
+
+    return Runner(bundles, recorded(scene.owners(), chosen), _members(scene, members)).run(with_members(scene))
+
+
+def point(stored: xr.Dataset, scene: Scene, chosen: Sequence[Quantity]) -> Point:
+    """The point in an artifact of `run`."""
+    from flexclear.pipeline.core.artifacts.effect_size import recorded
+    from flexclear.pipeline.core.artifacts.points import unpacked
+
+    return unpacked(stored, recorded(scene.owners(), chosen))["point"]
