@@ -76,6 +76,15 @@ def _scott_russell(run: xr.Dataset, scene: Scene) -> str:
     return f"It travels {1e3 * way:.0f} mm and leaves the straight line by {apart} m."
 
 
+def _shear_pin(run: xr.Dataset, scene: Scene) -> str:
+    broken, clamped = (float(run["event_time"][run["event_contact"] == name][0]) for name in ("break", "clamp"))
+    way = float(run["joint_position"].sel(coordinate="guide")[-1])
+    return (
+        f"The pin breaks after {1e3 * broken:.1f} ms; the slider runs on for {1e3 * (clamped - broken):.2f} ms and "
+        f"stops at {1e3 * way:.1f} mm."
+    )
+
+
 def _stewart(run: xr.Dataset, scene: Scene) -> str:
     forces = derive(run)["peak_drive_force"]
     lengths = run["joint_position"].isel(coordinate=run["coordinate_joint"].str.startswith("leg").values)
@@ -252,6 +261,9 @@ ENTRIES = {
         Entry("gallery/six_bar", "How far does a rocker swing that a loose, bending link drives?", _six_bar),
         Entry("gallery/rssr", "How far does a rocker across the crank's axis swing?", _rssr),
         Entry("gallery/stewart", "Which stroke and force must the six legs have for this path?", _stewart, at=0.0),
+        Entry(
+            "gallery/shear_pin", "When does the shear pin break, and where does the slider stop?", _shear_pin, at=0.5
+        ),
         Entry("gallery/robot_arm", "How much does the load swing after the arm has stopped?", _robot_arm),
         Entry("gallery/pid_arm", "Which torques hold the arm where its controllers have moved it?", _arm),
         Entry("checks/universal_shaft", "How unevenly does the second shaft turn?", _universal),

@@ -58,6 +58,12 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
     from flexclear.pipeline.dynamics.run.run import Run, integrate
 
     def once(edited: Scene, judges: Judges | None = None) -> LabelledArrays:
+        if edited.event:
+            from flexclear.pipeline.core.scene.registry import lookup
+            from flexclear.pipeline.dynamics.effects import EVENTS
+
+            phased: LabelledArrays = lookup(EVENTS, "phases", where="[event]")(edited, bundles, progress, judges)
+            return phased
         try:
             done = integrate(edited, bundles, progress, judges)
         except StoppedError as stopped:
@@ -99,6 +105,7 @@ def cost(
     """One run, and what its integration and its recording cost each (`pipeline.dynamics.record.cost.measure`)."""
     from flexclear.pipeline.dynamics.record.cost import measure
 
+    _require_without_events(scene, "the cost of a run")
     return measure(scene, bundles, progress, checked=checked, brief=brief)
 
 
@@ -106,6 +113,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     """All members of a scene's ensemble on its regular output times (schema ENSEMBLE)."""
     from flexclear.pipeline.dynamics.record.ensemble import ensemble as run
 
+    _require_without_events(scene, "an ensemble")
     return run(scene, bundles, progress)
 
 
@@ -113,6 +121,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     """A scene whose laws repeat, sampled once in each period (schema SECTIONS)."""
     from flexclear.pipeline.dynamics.record.sections import sections as run
 
+    _require_without_events(scene, "a section of the motion")
     return run(scene, bundles, progress)
 
 
@@ -125,9 +134,19 @@ def sensitivities(
     horizon: float,
 ) -> xr.Dataset:
     """Derivatives of quantities by numbers of a scene (`pipeline.dynamics.sensitivity.dataset`)."""
+    _require_without_events(scene, "derivatives")
     from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities as derivatives
 
     return derivatives(scene, bundles, progress, of, to, horizon)
+
+
+def _require_without_events(scene: Scene, what: str) -> None:
+    """InputError for a scene with events, of which there is no such result."""
+    from flexclear.pipeline.core.system.errors import InputError
+
+    if scene.event:
+        name = next(iter(scene.event))
+        raise InputError(f"[event.{name}]", f"{what} needs a scene without events", 'remove them: remove = ["event"]')
 
 
 def equilibrium(

@@ -23,9 +23,10 @@ JOINTS, CONTACTS = "flexclear.pipeline.dynamics.joints", "flexclear.pipeline.dyn
 NORMAL_LAWS, FORMS, FRICTION_LAWS = (f"{CONTACTS}.{family}" for family in ("normal", "form", "friction"))
 LOADS, LAWS = "flexclear.pipeline.dynamics.loads", "flexclear.pipeline.dynamics.drives"
 RECORDS = "flexclear.pipeline.dynamics.record"
+EVENTS = "flexclear.pipeline.dynamics.events"
 INTEGRATORS, STARTS = "flexclear.pipeline.dynamics.integrate", "flexclear.pipeline.dynamics.starts"
 #: laws of time that are polynomials throughout, or made of others
-WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated"}
+WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "piecewise", "repeated", "delayed"}
 
 
 @dataclass(frozen=True)
@@ -161,6 +162,9 @@ def named(scene: Scene) -> Iterator[Named]:
             yield Named(JOINTS, WITHOUT_CLEARANCE[contact.type], f"[joint.{name}]")
     for name in scene.output.requests():
         yield Named(RECORDS, name, "[output]")
+    if scene.event:
+        yield Named(EVENTS, "phases", "[event]")
+        yield from (Named(LAWS, law, "law") for law in ("constant", "delayed", "sum"))
 
 
 def schemes(scene: Scene) -> list[Scheme]:

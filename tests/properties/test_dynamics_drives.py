@@ -61,6 +61,10 @@ TABLES: dict[str, tuple[Any, ...]] = {
         {"type": "repeated", "period": 0.5, "times": 3, "law": PEAK},
         {"type": "repeated", "period": 0.5, "times": 2, "start": 0.1, "law": {"type": "spline", **CYCLE}},
     ),
+    "delayed": (
+        {"type": "delayed", "by": 0.15, "law": {"type": "sum", "laws": [RAMP, WAVES]}},
+        {"type": "delayed", "by": -0.1, "law": {"type": "spline", **POINTS, "ends": "clamped"}},
+    ),
 }
 LAWS = {name: tuple(TypeAdapter(Law).validate_python(law) for law in tables) for name, tables in TABLES.items()}
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.optimize import brentq
 
 from benchmarks.families.gallery import ENTRIES, scene_of, solved
 from flexclear.commands.scenes import bundles
@@ -113,6 +115,40 @@ def rolling_ball(run: xr.Dataset) -> None:
     assert np.abs(moved - 0.5 * 5.0 / 7.0 * 9.81 * np.sin(np.radians(20.0)) * time**2).max() < 1e-3 * time[-1]
 
 
+def shear_pin(run: xr.Dataset) -> None:
+    """The pin carries dI/dtheta w^2/2 + dV/dtheta; then the workpiece stores all energy of crank, rod and slider.
+
+    I is the inertia of these at the crank's angle, with rates per radian in closed form.
+    """
+    r, length, w, k = 0.05, 0.2, 4.0 * np.pi, 2e4
+
+    def inertia(angle: complex) -> complex:
+        sine, cosine = np.sin(angle), np.cos(angle)
+        rod = np.sqrt(length**2 - r**2 * sine**2)
+        turn = -r * cosine / rod
+        slide = -r * sine - r**2 * sine * cosine / rod
+        middle = 0.5 * (slide - r * sine)
+        return 4e-4 + 0.025**2 + 0.8 * (middle**2 + (0.5 * r * cosine) ** 2) + 3e-3 * turn**2 + 2.0 * slide**2
+
+    def pressed(angle: complex) -> complex:
+        return r * np.cos(angle) + np.sqrt(length**2 - r**2 * np.sin(angle) ** 2) - (length - r)
+
+    def slope(of: Callable[[complex], complex], angle: float) -> float:
+        return float((of(angle + 1e-30j) / 1e-30).imag)
+
+    def torque(angle: float) -> float:
+        return 0.5 * w**2 * slope(inertia, angle) + k * float(pressed(angle).real) * slope(pressed, angle)
+
+    broken = brentq(lambda angle: abs(torque(angle)) - 40.0, np.pi + 1e-3, np.radians(290.0), xtol=1e-14)
+    time = run["event_time"].values
+    # the run's tolerance is 1e-8
+    assert time[0] == pytest.approx((broken - np.pi) / w, rel=1e-6)
+    energy = 0.5 * float(inertia(broken).real) * w**2 + 0.5 * k * float(pressed(broken).real) ** 2
+    assert run["joint_position"].sel(coordinate="guide").values[-1] == pytest.approx(
+        np.sqrt(2.0 * energy / k), rel=1e-6
+    )
+
+
 def cam(run: xr.Dataset) -> None:
     """Where the follower stays on the cam, its motion is the profile, which gives the force and the torque.
 
@@ -150,9 +186,8 @@ def backlash(run: xr.Dataset) -> None:
 
 
 #: hand checks of whole runs, by mechanism
-CLOSED_FORMS = {
-    check.__name__: check for check in (six_bar, rssr, pid_arm, gear_shaft, driven_yoke, rolling_ball, cam, backlash)
-}
+CHECKED = (six_bar, rssr, pid_arm, gear_shaft, driven_yoke, rolling_ball, cam, backlash, shear_pin)
+CLOSED_FORMS = {check.__name__: check for check in CHECKED}
 
 
 def numbers(text: str) -> list[float]:

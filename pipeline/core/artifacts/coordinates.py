@@ -58,6 +58,7 @@ COORDINATES: Schema = {
     "gear_motion": _words("gear", "translation or rotation: what its second coordinate is"),
     "contact": _words("contact", "name of the joint with clearance, or of the stop's end"),
     "contact_type": _words("contact", "type of that joint, or stop"),
+    "event_motion": _words("event", "rotation where it acts along an angle, else translation"),
     "contact_motion": _words("contact", "rotation where it ends an angle, else translation"),
     "rubbing": _words("rubbing", "name of the ideal joint with friction"),
     "worn": _words("worn", "name of the contact that wears"),

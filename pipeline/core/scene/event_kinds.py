@@ -5,3 +5,5 @@ from __future__ import annotations
 #: names by number, in attributes of datasets
 EVENT_KINDS = ("opening", "closing", "compression", "sticking", "slipping")
 OPENING, CLOSING, COMPRESSION, STICKING, SLIPPING = range(len(EVENT_KINDS))
+#: what events of a scene do
+CHANGES = ("release", "lock", "switch")

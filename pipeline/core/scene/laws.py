@@ -267,6 +267,17 @@ class Repeated(Part):
         return self
 
 
+class Delayed(Part):
+    """A law that counts time from a later moment on.
+
+    by: that moment [s].  law: what is delayed.
+    """
+
+    type: Literal["delayed"]
+    by: Time
+    law: "Bare"
+
+
 class Expression(Part):
     """An expression of the time `t` that makes polynomials and sines, as ``h * sin(w * t)^2``.
 
@@ -289,7 +300,7 @@ class Expression(Part):
 
 
 Law = Annotated[
-    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated | Expression,
+    Constant | Step | Polynomial | Harmonic | Spline | Table | Sum | Piecewise | Repeated | Delayed | Expression,
     Field(discriminator="type"),
 ]
 #: all of them
@@ -319,6 +330,8 @@ def _count(law: Any) -> int:
             return sum(1 + _count(section.law) for section in law.sections)
         case Repeated():
             return law.times * (1 + _count(law.law))
+        case Delayed():
+            return _count(law.law)
     return 1
 
 

@@ -27,7 +27,7 @@ from flexclear.pipeline.core.system import file_names
 from flexclear.pipeline.core.system.errors import InputError, ResourceError, shown
 from flexclear.pipeline.core.system.file_dependencies import note
 
-FAMILIES = ("body", "joint", "drive", "load", "stop", "gear")
+FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "event")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
 #: bytes that no scene or recipe needs: as many as the reader of TOML takes in a second, whatever they are
 LARGEST = 1 << 20
@@ -412,7 +412,7 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
             file = shape.get("file") if isinstance(shape, dict) else None
             if isinstance(file, str) and not Path(file).is_absolute():
                 shape["file"] = absolute(file)
-    for law in _tables([table.get("drive"), table.get("load")]):
+    for law in _tables([table.get(family) for family in ("drive", "load", "event")]):
         if not Path(law["file"]).is_absolute():
             law["file"] = absolute(law["file"])
 

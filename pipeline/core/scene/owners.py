@@ -87,6 +87,16 @@ def _drives(scene: Any) -> Iterator[tuple[str, bool]]:
             yield from ((f"{name}.{part}", part.startswith("rotation")) for part, _ in drive.components())
         else:
             yield name, turns(scene, drive)
+    for name, event in scene.event.items():
+        if event.kind == "lock":
+            yield from ((held, turning) for held, (_, turning) in locked(scene, name, event).items())
+
+
+def locked(scene: Any, name: str, event: Any) -> dict[str, tuple[str, bool]]:
+    """Coordinates that a lock called `name` holds: name of what holds it -> coordinate, and whether it is an angle."""
+    joint = scene.joint.get(event.part[1])
+    known = COORDINATES.get(joint.type, {}) if joint is not None else {}
+    return {f"{name}.{c}" if len(known) > 1 else name: (c, turning) for c, turning in known.items()}
 
 
 def turns(scene: Any, part: Any) -> bool:

@@ -207,6 +207,29 @@ def parse(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
     return quantity if quantity.name == text else replace(quantity, text=text)
 
 
+def condition(text: str, owners: Mapping[str, Collection[str]]) -> Quantity:
+    """The quantity that is positive where a comparison, as ``force(A1) > 200 N``, is true; vectors by magnitude.
+
+    owners: as of `parse`.  Raises ValueError for what is no comparison of quantities.
+    """
+    sides = re.split("([<>])", text)
+    if len(sides) != 3:
+        raise ValueError(f"'{text}' is no comparison: write one < or >, as in 'force(A1) > 200 N'")
+    left, right = (_magnitude(side, owners) for side in sides[::2])
+    measure([*left, *right, "max"])
+    larger, smaller = (left, right) if sides[1] == ">" else (right, left)
+    made = Quantity("", EXPRESSION, text=text, steps=(*larger, *smaller, "-"))
+    if not made.terms():
+        raise ValueError(f"'{text}' compares numbers: name a quantity")
+    return made
+
+
+def _magnitude(text: str, owners: Mapping[str, Collection[str]]) -> list[Any]:
+    """One side of a comparison, in postfix order."""
+    steps = read(text, owners)
+    return [*steps, "norm"] if measure(steps)[1] else steps
+
+
 def read(
     text: str,
     owners: Mapping[str, Collection[str]],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.scene.event_kinds import EVENT_KINDS
+from flexclear.pipeline.core.scene.event_kinds import CHANGES, EVENT_KINDS
 from flexclear.pipeline.core.scene.output import VARIABLES
 from flexclear.pipeline.core.scene.variable import Schema, Variable
 
@@ -176,8 +176,10 @@ RUN: Schema = {
         optional=True,
     ),
     "event_time": _V(("event",), "s", "time of the event", optional=True),
-    "event_contact": _V(("event",), "", "name of the contact", optional=True),
-    "event_kind": _V(("event",), "", f"one of {', '.join(EVENT_KINDS)}", optional=True),
+    "event_contact": _V(("event",), "", "name of the contact, or of the scene's event", optional=True),
+    "event_kind": _V(
+        ("event",), "", f"one of {', '.join(EVENT_KINDS)}; of a scene's event {', '.join(CHANGES)}", optional=True
+    ),
     "event_approach_speed": _V(
         ("event",),
         "m s-1",
@@ -190,5 +192,18 @@ RUN: Schema = {
     ),
     "event_peak_penetration": _V(("event",), "m", "largest penetration of that contact", optional=True, turning="rad"),
     "event_duration": _V(("event",), "s", "duration of that contact", optional=True),
+    "event_energy_loss": _V(
+        ("event",),
+        "J",
+        "energy that a scene's event takes from the mechanism, also what released parts had stored",
+        optional=True,
+    ),
+    "event_impulse": _V(
+        ("event",),
+        "N s",
+        "impulse along the coordinate that a scene's event holds or drives",
+        optional=True,
+        turning="N m s",
+    ),
     **{name: variable for requested in VARIABLES.values() for name, variable in requested.items()},
 }

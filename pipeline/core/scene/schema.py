@@ -14,6 +14,7 @@ from flexclear.pipeline.core.scene.clearance import (
     ClearanceSpherical,
 )
 from flexclear.pipeline.core.scene.drives import Drive
+from flexclear.pipeline.core.scene.events import Event, require_possible
 from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
 from flexclear.pipeline.core.scene.formulas import check_formulas
 from flexclear.pipeline.core.scene.gears import Gear
@@ -199,11 +200,11 @@ class Scene(Part):
 
     title: what it is, in a line.  description: more words.  body: bodies by name.  joint: joints by name, ideal ones
     and ones with clearance.  drive: prescribed motions by name.  load: forces, springs, controllers and gravity by
-    name.  stop: ends of joint coordinates by name.  gear: coupled joint coordinates by name.  time: begin and end of
-    the run.  start: how the run begins, beyond poses and velocities of bodies.  solver: integrator and tolerance.
-    output: what is recorded.  ensemble: runs from nearby starts.  sections: repeated motion, looked at once in each
-    period.  accuracy: requested accuracy by quantity.  limits: what the work may take of the machine.  view: what
-    pictures and comparisons look at.
+    name.  stop: ends of joint coordinates by name.  gear: coupled joint coordinates by name.  event: what ceases,
+    stops or changes in the run, by name. time: begin and end of the run. start: how the run begins, beyond poses
+    and velocities of bodies. solver: integrator and tolerance. output: what is recorded. ensemble: runs from nearby
+    starts. sections: repeated motion, looked at once in each period. accuracy: requested accuracy by quantity.
+    limits: what the work may take of the machine. view: what pictures and comparisons look at.
     """
 
     title: str
@@ -214,6 +215,7 @@ class Scene(Part):
     load: dict[PartName, Load] = Field(default_factory=dict)
     stop: dict[PartName, Stop] = Field(default_factory=dict)
     gear: dict[PartName, Gear] = Field(default_factory=dict)
+    event: dict[PartName, Event] = Field(default_factory=dict)
     time: TimeSpan
     start: Start | None = None
     solver: Solver = PlainIntegrator()
@@ -304,6 +306,7 @@ class Scene(Part):
         check_formulas(self)
         self._stressed_bodies_are_flexible()
         self._bodies_have_files_of_their_own()
+        require_possible(self)
 
     def by_need(self) -> bool:
         """Whether the integrator is chosen: for the accuracy that is asked for, or because the scene names none."""
@@ -394,6 +397,7 @@ class Scene(Part):
             ("load", "loads"): len(self.load),
             ("stop", "stops"): len(self.stop),
             ("gear", "gears"): len(self.gear),
+            ("event", "events"): len(self.event),
         }
         return ", ".join(f"{n} {one if n == 1 else many}" for (one, many), n in counts.items() if n)
 

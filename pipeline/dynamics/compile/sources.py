@@ -13,6 +13,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 from flexclear.pipeline.core.scene import integrators
+from flexclear.pipeline.core.scene.events import with_switched
 from flexclear.pipeline.core.scene.registry import listed
 from flexclear.pipeline.core.workflow.fingerprint import TREE, source_file
 from flexclear.pipeline.dynamics.compile import formulas
@@ -54,6 +55,7 @@ def modules(scene: Scene) -> tuple[str, ...]:
 
     Raises InputError when a name is not listed in its family.
     """
+    scene = with_switched(scene) if scene.event else scene
     names, parts = {part.module for part in named(scene)}, most_parts(scene)
     either = (parts, replace(parts, articulated=True))  # which, only the tree decides
     return tuple(sorted(names.union(*(_composed(one, scheme) for one in either for scheme in schemes(scene)))))

@@ -12,14 +12,16 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.points import Point, Values
-from flexclear.pipeline.core.artifacts.quantities import IMPACT, of_impacts, reduced, regular_times
+from flexclear.pipeline.core.artifacts.quantities import IMPACT, SAME_TIME, of_impacts, reduced, regular_times
 from flexclear.pipeline.core.scene.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.load import with_numbers
 from flexclear.pipeline.core.scene.quantity import MAGNITUDES, Recorded
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene, Sections
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects import EVENTS
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.ensemble import ball_offsets
@@ -96,6 +98,8 @@ class Runner:
             yield made
 
     def _steps_abreast(self, scene: Scene) -> bool:
+        if scene.event:
+            return False
         try:
             self._engines(thinned(scene, self.recorded))
         except (SolverError, InputError):
@@ -103,6 +107,8 @@ class Runner:
         return self.engine is not None and side_by_side(self.engine)
 
     def _values(self, scene: Scene, lane: Place | None, alive: Progress) -> tuple[Values, Values, int]:
+        if scene.event:
+            return self._over_events(scene, alive)
         engine, other = self._engines(scene)
         # exact, since how many points are run side by side depends on the machine and on how long they take
         engine.straight.requested = engine.straight.exact = True
@@ -121,6 +127,26 @@ class Runner:
         stacked = {name: np.stack([values[name] for values in rows]) for name in rows[0]}
         means = {name: values.mean(axis=0) for name, values in stacked.items()}
         return means, {name: values.std(axis=0, ddof=1) for name, values in stacked.items()}, count
+
+    def _over_events(self, scene: Scene, alive: Progress) -> tuple[Values, Values, int]:
+        """Recorded values of a scene with events, read from its whole run."""
+        if in_sections(self.recorded) or self.members:
+            raise InputError("[event]", "a run with events has neither sections nor members", "record other reductions")
+        run = lookup(EVENTS, "phases", where="[event]")(scene, self.bundles, alive, affordable(scene))
+        time = run["time"].values
+        after = np.searchsorted(time, regular_times(scene.time, scene.output) * (1.0 - SAME_TIME))
+        values: Values = {}
+        for one in self.recorded:
+            if one.quantity.over_time:
+                series = quantities.series(run, one.quantity)
+                regular = series[np.minimum(after, len(time) - 1)]
+                value = regular if one.reduction == "series" else reduced(time, series, one.reduction)
+                values[one.name] = value if one.quantity.dim or one.reduction in MAGNITUDES else value[..., 0]
+            elif one.quantity.kind == "impact_times":
+                values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
+            else:
+                values[one.name] = np.asarray(quantities.events(run, one.quantity)[0])
+        return values, {}, int(run.attrs["evaluations"])
 
     def _engines(self, scene: Scene) -> tuple[Engine, Callable[[str], Engine]]:
         """What runs a point, and the maker of what continues with another integrator; made one at a time."""

@@ -149,18 +149,24 @@ def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
     return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, ROUNDING * largest)
 
 
-def require_closed(model: Model, trajectory: Trajectory, seen: Observed) -> None:
-    """SolverError when the run diverges, or its ledger is off by more than the scene's tolerance."""
+def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchanged: float = 0.0) -> float:
+    """Return the largest energy exchanged [J], by this run or before it.
+
+    exchanged: before it, of a run that continues another one.
+    Raises SolverError when the run diverges, or its ledger is off by more than the scene's tolerance.
+    """
     _require_controlled(model, trajectory, seen)
     _require_bounded(model, trajectory, seen)
-    for energies in balances(model, seen):
-        _require(model, trajectory, energies)
+    made = balances(model, seen)
+    for energies in made:
+        _require(model, trajectory, energies, exchanged)
+    return max([exchanged, *(energies.exchanged for energies in made)])
 
 
-def _require(model: Model, trajectory: Trajectory, result: Balance) -> None:
+def _require(model: Model, trajectory: Trajectory, result: Balance, exchanged: float) -> None:
     solver = model.scene.solver
     tolerance = solver.ledger_tolerance or usual(solver)
-    allowed = tolerance * result.exchanged + result.rounding
+    allowed = tolerance * max(result.exchanged, exchanged) + result.rounding
     if result.error[result.worst] <= allowed:
         return
     first = int(np.argmax(~(result.error <= allowed)))

@@ -182,7 +182,7 @@ def state_scales(engine: Engine, period: float) -> np.ndarray:
 
 def _go(part: Engine, y: np.ndarray, here: Moment | None) -> tuple[Trajectory, Moment]:
     """Over one stretch; from the start of the run where there is no moment yet."""
-    left = None if here is None else _handed(part, here)
+    left = None if here is None else handed(part, here)
     trajectory = integrate(part, y, silent, left=left)
     return trajectory, _moment(part, trajectory)
 
@@ -195,7 +195,7 @@ def _follow(part: Engine, here: Moment) -> Moment | None:
         return None
 
 
-def _handed(part: Engine, here: Moment) -> Handover:
+def handed(part: Engine, here: Moment) -> Handover:
     """A moment as what another method would have left of this stretch: one row, and the contacts' open events."""
     counters = np.zeros(m.INTEGERS - m.STATUS, dtype=np.int64)
     for index, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.begun))):

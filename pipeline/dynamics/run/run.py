@@ -102,11 +102,11 @@ def engines(
     scene: Scene, bundles: Mapping[str, Labelled], progress: Progress
 ) -> tuple[Engine, Callable[[str], Engine]]:
     """The engine of a run, and the maker of one that continues with another integrator, given by its name."""
-    made = _maker(scene, bundles, progress)
+    made = maker(scene, bundles, progress)
     return made("", progress), cache(lambda name: made(name, progress))
 
 
-def _maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[[str, Progress], Engine]:
+def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[[str, Progress], Engine]:
     """What makes the engine of a run by an integrator's name, that of the scene's own by none; it reports progress."""
     posed, choice = begun(scene, bundles, progress)
     moved, given = driven(posed, bundles, progress)
@@ -136,7 +136,7 @@ def integrate(
     concurrently where a processor is free.  Raises InputError for a scene that cannot be built, SolverError when the
     run cannot continue, StoppedError with the run so far as `partial` when it is asked to stop.
     """
-    made = _maker(scene, bundles, progress)
+    made = maker(scene, bundles, progress)
     engine = made("", progress)
     start = consistent_start(engine)
     mended, choice = tuple(mends(engine, start)), engine.model.mechanism.choice

@@ -107,10 +107,14 @@ class StiffError(SolverError):
         self.handover = handover
 
 
-def output_times(breaks: np.ndarray, interval: float) -> np.ndarray:
-    """Regular output times and all breaks, increasing; times nearer than rounding are one."""
-    span = breaks[-1] - breaks[0]
-    regular = breaks[0] + interval * np.arange(int(np.floor(span / interval * (1 + 1e-12))) + 1)
+def output_times(breaks: np.ndarray, interval: float, origin: float | None = None) -> np.ndarray:
+    """Regular output times and all breaks, increasing; times nearer than rounding are one.
+
+    origin: from which the regular ones are counted [s]; the first break by default.
+    """
+    origin = breaks[0] if origin is None else origin
+    first = int(np.ceil((breaks[0] - origin) / interval))
+    regular = origin + interval * np.arange(first, int(np.floor((breaks[-1] - origin) / interval * (1 + 1e-12))) + 1)
     after = np.clip(np.searchsorted(breaks, regular), 1, len(breaks) - 1)
     distinct = np.minimum(np.abs(regular - breaks[after - 1]), np.abs(regular - breaks[after])) > 1e-9 * interval
     return np.union1d(regular[distinct], breaks)

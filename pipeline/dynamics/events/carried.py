@@ -1,0 +1,84 @@
+"""What continues from one phase to the next: states that belong to parts, and contacts that are closed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects import LOADS
+from flexclear.pipeline.dynamics.model.driving import coordinate_of, named_coordinate
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.stops import End
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.start import NO_IMPACT
+
+Slots = dict[tuple[str, ...], range]
+
+
+def carry(old: Model, before: np.ndarray, new: Model, y: np.ndarray) -> np.ndarray:
+    """State y of a model with the internal states of the parts that it has in common with an old one in state before.
+
+    These are angles with their turns, integral parts of controllers, rotation vectors and deflections of bristles.
+    """
+    there, y = dict(_slots(old)), y.copy()
+    for key, slots in _slots(new):
+        if key in there and len(there[key]) == len(slots):
+            y[slots] = before[there[key]]
+    return y
+
+
+def closed(scene: Scene, engine: Engine) -> Scene:
+    """The scene whose contacts that are closed in an engine's work space go on with their impact rates."""
+    joints, stops = dict[str, Any](scene.joint), dict[str, Any](scene.stop)
+    for c, contact in enumerate(engine.model.contacts):
+        if engine.modes[c]:
+            parts, name = (joints, contact.name)
+            if isinstance(contact.joint, End):
+                parts, name = stops, contact.joint.stop
+            speed = float(engine.latched[c])
+            given = {"initial_approach_speed": 0.0 if speed >= NO_IMPACT else speed}
+            parts[name] = parts[name].model_copy(update=given)
+    return scene.model_copy(update={"joint": joints, "stop": stops})
+
+
+def _slots(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
+    """Where in the state each part has internal states, by what they are."""
+    arrays, scene = model.arrays, model.scene
+    first, gauges = model.ny - arrays.size(m.N_INTERNAL), arrays.table(m.GAUGES)
+
+    def turns(gauge: int) -> range:
+        at = int(gauges[gauge]["turns"]) if gauge >= 0 else -1
+        return range(first + at, first + at + 1) if at >= 0 else range(0)
+
+    for (name, _), row in zip(model.loads, arrays.table(m.LOADS), strict=True):
+        for key in ("gauge", "measured"):
+            yield ("load", name, key), turns(int(row[key]))
+        if row["internal0"] >= 0:
+            at = first + int(row["internal0"])
+            yield ("load", name, scene.load[name].type), range(at, at + _states(scene, name))
+    for contact, row in zip(model.contacts, arrays.table(m.CONTACTS), strict=True):
+        if isinstance(contact.joint, End):
+            yield ("stop", contact.name), turns(int(row["surfaces"]))
+        elif row["bristle"] >= 0:
+            yield ("contact", contact.name), range(int(row["bristle"]), int(row["bristle"]) + 3)
+    joints = list(scene.rubbing())
+    for row in arrays.table(m.BEARINGS):
+        if row["bristle"] >= 0:
+            where = (str(int(row[k])) for k in ("kind", "side", "axis"))
+            yield ("joint", joints[int(row["joint"])], *where), range(int(row["bristle"]), int(row["bristle"]) + 3)
+
+
+def _states(scene: Scene, name: str) -> int:
+    """Number of internal states of a load, but for turns."""
+    load: Any = scene.load[name]
+    given = []
+    if hasattr(load, "joint"):
+        given.append(coordinate_of(scene, load.joint, load.coordinate, "")[2])
+    if hasattr(load, "measured"):
+        given.append(named_coordinate(scene, load.measured, "")[1] if load.measured else given[0])
+    return int(lookup(LOADS, load.type, where="[load]").row(load, "", *given).states)

@@ -1,0 +1,124 @@
+"""What events make of a scene: parts that are gone, coordinates that are held, parts that have become others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from flexclear.pipeline.core.scene.drives import JointDrive
+from flexclear.pipeline.core.scene.events import Event, switched
+from flexclear.pipeline.core.scene.fields import Part
+from flexclear.pipeline.core.scene.laws import KINDS, Constant, Delayed, Sum
+from flexclear.pipeline.core.scene.owners import COORDINATES, locked
+from flexclear.pipeline.core.scene.parts import IdealJoint
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.dynamics.drives.pieces import pieces_of
+
+#: families of parts that act along joint coordinates, and their keys that name these
+ALONG = {"drive": ("joint",), "load": ("joint", "measured"), "stop": ("joint",), "gear": ("first", "second")}
+
+
+@dataclass(frozen=True)
+class Held:
+    """A coordinate of a joint with a drive of its own; label: its name in records; turns: whether it is an angle."""
+
+    drive: str
+    joint: str
+    coordinate: str
+    label: str
+    turns: bool
+
+    @property
+    def dimension(self) -> str:
+        """What its values measure."""
+        return "angle" if self.turns else "length"
+
+
+def released(scene: Scene, event: Event) -> Scene:
+    """The scene without a part; what acts along the coordinates of a joint goes with it."""
+    family, name = event.part
+    if family == "event":
+        kept = {n: d for n, d in scene.drive.items() if n != name and not n.startswith(f"{name}.")}
+        return scene.model_copy(update={"drive": kept})
+    if family != "joint":
+        return scene.model_copy(update={family: {n: p for n, p in getattr(scene, family).items() if n != name}})
+    free = IdealJoint(type="free", between=scene.joint[name].between)
+    left = {
+        kind: {n: part for n, part in getattr(scene, kind).items() if not _acts_along(part, keys, name)}
+        for kind, keys in ALONG.items()
+    }
+    return scene.model_copy(update={"joint": {**scene.joint, name: free}, **left})
+
+
+def _acts_along(part: Any, keys: tuple[str, ...], joint: str) -> bool:
+    return any((getattr(part, key, None) or "").partition(".")[0] == joint for key in keys)
+
+
+def driven(scene: Scene, name: str, event: Event) -> list[Held]:
+    """Coordinates whose motion an event prescribes: those of a lock, or the one whose drive is switched."""
+    family, part = event.part
+    if event.kind == "lock" and scene.joint[part].type in COORDINATES:
+        return [_held(scene, drive, part, c) for drive, (c, _) in locked(scene, name, event).items()]
+    if event.kind == "switch" and family == "drive" and part in scene.drive:
+        drive: Any = scene.drive[part]
+        return [_held(scene, part, drive.joint, drive.coordinate)]
+    return []
+
+
+def _held(scene: Scene, drive: str, joint: str, coordinate: str | None) -> Held:
+    known = COORDINATES[scene.joint[joint].type]
+    name = coordinate or next(iter(known))
+    return Held(drive, joint, name, joint if len(known) == 1 else f"{joint}.{name}", known[name])
+
+
+def freed(scene: Scene, held: Iterable[Held]) -> Scene:
+    """The scene without the drives of some coordinates."""
+    mine = {(one.joint, one.coordinate) for one in held}
+
+    def on(drive: Any) -> bool:
+        if not isinstance(drive, JointDrive):
+            return False
+        return (drive.joint, _held(scene, "", drive.joint, drive.coordinate).coordinate) in mine
+
+    return scene.model_copy(update={"drive": {n: d for n, d in scene.drive.items() if not on(d)}})
+
+
+def prescribed(scene: Scene, event: Event, held: Iterable[Held], at: Mapping[str, float], t: float) -> Scene:
+    """The scene with drives whose laws begin at time t [s] in the present positions [m or rad], by name in records."""
+    made: dict[str, Any] = {}
+    for one in held:
+        law: Any = Constant(type="constant", value=at[one.label])
+        if event.kind == "switch":
+            law = JointDrive.model_validate({"joint": one.joint, "law": (event.to or {})["law"]}).law
+            begins = pieces_of(law, one.dimension).value(0.0)
+            law = Sum(type="sum", laws=(_later(law, t), Constant(type="constant", value=at[one.label] - begins)))
+        made[one.drive] = JointDrive(joint=one.joint, coordinate=one.coordinate, law=law)
+    return scene.model_copy(update={"drive": {**scene.drive, **made}})
+
+
+def rates(scene: Scene, held: Iterable[Held], t: float) -> dict[str, float]:
+    """Rates of driven coordinates after time t [s], by name in records [m/s or rad/s]."""
+    drives: Any = scene.drive
+    return {one.label: pieces_of(drives[one.drive].law, one.dimension).value(t, 1) for one in held}
+
+
+def exchanged(scene: Scene, event: Event, t: float) -> Scene:
+    """The scene with a load switched at time t [s], from which the laws that are given there count."""
+    name, keys = event.part[1], event.to or {}
+    new = switched(scene.load[name], event)
+    new = new.model_copy(update={key: _later(getattr(new, key), t) for key in keys})
+    return scene.model_copy(update={"load": {**scene.load, name: new}})
+
+
+def _later(value: Any, by: float) -> Any:
+    """A value of a part with the laws in it delayed."""
+    if isinstance(value, Constant):
+        return value
+    if isinstance(value, KINDS):
+        return Delayed(type="delayed", by=by, law=value)
+    if isinstance(value, tuple):
+        return tuple(_later(item, by) for item in value)
+    if isinstance(value, Part):
+        return value.model_copy(update={name: _later(getattr(value, name), by) for name in type(value).model_fields})
+    return value

@@ -1,0 +1,76 @@
+r"""Velocities after coordinates are brought to given rates at once, the impulses that take part, and what is lost.
+
+With the free motions Z of the mechanism, Z^T M Z = 1 and J Z = 0, and the rates C of the coordinates along them,
+
+.. math:: \Delta u = Z C^T \Lambda, \quad (C C^T) \Lambda = r - c\,u, \quad D = \tfrac12 \Delta u^T M \Delta u
+
+so that every other change of the velocities that gives the rates r takes more kinetic energy. The ideal drive that
+moves on at the rate r does the work r Lambda; T grows by that less D.
+Source: Pars (1965), A Treatise on Analytical Dynamics, ch. XIV (impulsive constraints, theorems of Carnot and Gauss).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.interface_basis import modes_of
+from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
+from flexclear.pipeline.dynamics.run.tree_factor import mass_factor
+
+#: singular values below this fraction of the largest are rounding
+RANK = 1e-9
+
+
+class Blow(NamedTuple):
+    """State after it; impulse [N s or N m s] on each coordinate; work of the drives and energy that is lost [J]."""
+
+    y: np.ndarray
+    impulses: dict[str, float]
+    work: float
+    lost: float
+
+
+def rows(engine: Engine, states: np.ndarray, t: float) -> np.ndarray:
+    """Rows of the record for states at the start, all with the contacts that a run from the first begins with."""
+    contacts = len(engine.model.contacts)
+    made = m.empty_record(len(states), contacts, engine.model.ny)
+    record = m.record(made, contacts)
+    record.time[:], record.state[:] = t, states
+    for c in overlapping(engine, states[0]):
+        speed = engine.model.contacts[c].joint.initial_approach_speed
+        if speed is not None:
+            record.modes[:, c], record.latched[:, c] = 1.0, speed or NO_IMPACT
+    return made
+
+
+def blow(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) -> Blow:
+    """The state y at time t after coordinates, by their names in records, are brought to rates [m/s or rad/s]."""
+    model = engine.model
+    engine.evaluate(y, t)
+    modes = modes_of(model.arrays)
+    L = modes @ mass_factor(engine)
+    M, J = L @ L.T, engine.rows(m.JACOBIAN) @ modes.T
+    factor = np.linalg.cholesky(M)
+    half = np.linalg.solve(factor, J.T).T
+    _, values, V = np.linalg.svd(half)
+    rank = int(np.sum(values > RANK * values.max(initial=0.0)))
+    Z = np.linalg.solve(factor.T, V[rank:].T)
+    scale = np.maximum(np.abs(Z).max(axis=0, initial=0.0), np.finfo(float).tiny)
+    states = np.tile(y, (1 + Z.shape[1], 1))
+    states[1:, model.speeds] += (Z / scale).T
+    series = joint_coordinates(model, observe(engine, rows(engine, states, t), after=True))
+    rates = np.array([series[name][1] for name in targets]).reshape(len(targets), -1)
+    C = (rates[:, 1:] - rates[:, :1]) * scale
+    missing = np.array(list(targets.values())) - rates[:, 0]
+    impulses = np.linalg.lstsq(C @ C.T, missing, rcond=RANK)[0]
+    after, s = y.copy(), C.T @ impulses
+    after[model.speeds] += Z @ s
+    work = float(np.array(list(targets.values())) @ impulses)
+    return Blow(after, dict(zip(targets, impulses.tolist(), strict=True)), work, 0.5 * float(s @ s))

@@ -1,0 +1,248 @@
+"""A scene with events as one run: phase after phase, each from the state and the scene that the event left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+from flexclear.pipeline.core.scene.events import Event
+from flexclear.pipeline.core.scene.quantity import Quantity, condition
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError, SolverError, StoppedError
+from flexclear.pipeline.core.system.progress import Progress
+from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.events.carried import carry, closed
+from flexclear.pipeline.dynamics.events.changes import driven, exchanged, freed, prescribed, rates, released
+from flexclear.pipeline.dynamics.events.impulse import blow, rows
+from flexclear.pipeline.dynamics.events.joined import Happened, Phase, joined, stored
+from flexclear.pipeline.dynamics.events.watch import Watch
+from flexclear.pipeline.dynamics.record.dataset import warnings
+from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.ledger import require_closed
+from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges, Panel, crawls
+from flexclear.pipeline.dynamics.run.run import Run, follow, maker, observed, require_shallow
+from flexclear.pipeline.dynamics.run.start import consistent_start, mends
+from flexclear.pipeline.dynamics.run.trajectory import SLICE, Followed, Stop, Trajectory, never, output_times
+from flexclear.pipeline.dynamics.starts.snapshot import moving
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.artifacts.labelled import Labelled
+
+#: evaluations after which the conditions are examined; where a run fails after an event, again with fewer
+PAUSES = (2_000, 50)
+#: conditions are examined at so many times at least
+LOOKS = 500
+#: an event nearer than this fraction of the run to its end does not happen
+END = 1e-12
+
+
+@dataclass(frozen=True)
+class _Start:
+    """Where a phase begins. scene: with the bodies as they are then, and with times up to the end of the run.
+
+    before: engine and state of the phase before; none of the first one.
+    """
+
+    scene: Scene
+    before: tuple[Engine, np.ndarray] | None = None
+
+
+def simulated(
+    scene: Scene, bundles: Mapping[str, Labelled], progress: Progress, judges: Judges | None = None
+) -> LabelledArrays:
+    """The run of a scene with events (schema RUN).
+
+    Raises InputError for events that cannot happen as they are meant, SolverError when the run cannot continue.
+    """
+    plan = _Plan(scene, bundles, progress, judges.run if judges is not None else None)
+    start, phases, waiting = _Start(scene.model_copy(update={"event": {}})), list[Phase](), dict(scene.event)
+    while True:
+        with _in_words(phases):
+            phase, event, after = plan.phase(start, waiting, phases)
+        phases.append(phase)
+        if event is None or after is None:
+            break
+        del waiting[event]
+        with _in_words(phases):
+            start, happened = plan.changed(event, *after, phase)
+        phases[-1] = replace(phase, happened=happened)
+        progress(None, f"at t = {phase.end:.6g} s: {event} ({happened.kind})")
+    doubts = [f"event {name} did not happen in this run" for name in waiting]
+    if scene.contacts() or scene.stop:
+        doubts.append("a run with events has no predictability horizon: run it again from a start nearby to see one")
+    for doubt in doubts:
+        progress(None, f"warning: {doubt}")
+    return joined(scene, phases, doubts)
+
+
+@contextmanager
+def _in_words(phases: list[Phase]) -> Iterator[None]:
+    """Errors of the scene that an event has left name the event."""
+    last = next((phase.happened.name for phase in reversed(phases) if phase.happened is not None), None)
+    try:
+        yield
+    except InputError as error:
+        if last is None or error.place.startswith("[event."):
+            raise
+        text = f"the scene that it leaves cannot go on: {error.place} {error.problem}"
+        raise InputError(f"[event.{last}]", text, error.remedy) from None
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What all phases of a run have in common."""
+
+    scene: Scene
+    bundles: Mapping[str, Labelled]
+    progress: Progress
+    panel: Panel | None
+
+    def phase(
+        self, start: _Start, waiting: Mapping[str, Event], before: list[Phase]
+    ) -> tuple[Phase, str | None, tuple[Scene, Engine, np.ndarray] | None]:
+        """A phase, the event that ends it, and scene, engine and state where it does; of the last one nothing."""
+        t, end = start.scene.time.start, self.scene.time.end
+        due = {n: e for n, e in waiting.items() if not e.before & waiting.keys()}
+        timed = {n: max(e.at, t) for n, e in due.items() if isinstance(e.at, float)}
+        first = min(timed, key=timed.__getitem__, default=None)
+        until = end if first is None else timed[first]
+        scene = start.scene.model_copy(
+            update={"time": start.scene.time.model_copy(update={"end": max(until, t + END * (end - t))})}
+        )
+        made = maker(scene, self.bundles, self.progress)
+        engine = made("", self.progress)
+        y = consistent_start(engine)
+        mended = tuple(mends(engine, y)) if start.before is None else ()
+        if start.before is not None:
+            y = carry(start.before[0].model, start.before[1], engine.model, y)
+        known = before[-1].coordinates if before else {}
+        conditions = {n: self._condition(e) for n, e in due.items() if not isinstance(e.at, float)}
+        watch = Watch(engine, y, conditions, known)
+        begins = _energies(engine, y, t)
+        phase = Phase(None, t, t, begins, begins, watch.coordinates)
+        if watch.held and start.before is None:
+            name = watch.held[0]
+            raise InputError(
+                f"[event.{name}.at]",
+                f"'{waiting[name].at}' is true already where the run begins",
+                "turn the comparison, or change the scene that the event would make",
+            )
+        at_once = watch.held[0] if watch.held else first if until <= t else None
+        if at_once is not None:
+            return phase, at_once, (scene, engine, y)
+        last, trajectory, switched, event = self._followed(engine, made, y, watch, bool(conditions))
+        event = first if event is None and first is not None and until < end else event
+        seen = observed(last, trajectory)
+        require_shallow(last.model, trajectory, seen)
+        exchanged = require_closed(last.model, trajectory, seen, max((p.exchanged for p in before), default=0.0))
+        run = Run(scene, last, trajectory, seen, None, switched, mended)
+        for sentence in warnings(run) if start.before is None else ():
+            self.progress(None, f"warning: {sentence}")
+        t = float(trajectory.time[-1])
+        state = trajectory.state[-1].copy()
+        series = joint_coordinates(last.model, seen)
+        shift = {n: watch.coordinates[n] - float(v[0][0]) for n, v in series.items()}
+        phase = replace(
+            phase,
+            run=run,
+            end=t,
+            ends=_last(stored(last.model, seen)),
+            coordinates={n: float(v[0][-1]) + shift[n] for n, v in series.items()},
+            exchanged=exchanged,
+        )
+        return phase, event, (scene, last, state) if event is not None else None
+
+    def _condition(self, event: Event) -> Quantity:
+        return condition(str(event.at), self.scene.owners())
+
+    def _followed(
+        self, engine: Engine, made: Callable[[str, Progress], Engine], y: np.ndarray, watch: Watch, watched: bool
+    ) -> tuple[Engine, Trajectory, str, str | None]:
+        """The trajectory to the end of a phase, and the event whose condition ends it."""
+        times = output_times(engine.breaks, self.scene.output.interval, self.scene.time.start)
+        if not watched:
+            return *self._steps(engine, made, y, never, times, SLICE), None
+        span = self.scene.time.end - self.scene.time.start
+        looks = np.linspace(engine.start, engine.end, 2 + int(LOOKS * (engine.end - engine.start) / span))
+        done: Followed | None = None
+        for pause in PAUSES:
+            try:
+                done = self._steps(engine, made, y, watch.stop, np.union1d(times, looks), pause)
+                watch.look(done[1].rows)
+            except SolverError as error:
+                if isinstance(error, StoppedError) or (pause == PAUSES[-1] and watch.hit is None):
+                    raise
+            if done is not None or watch.hit is not None:
+                break
+        event, until = watch.hit or (None, engine.end)
+        if event is not None and until >= engine.end - END * span:
+            event, until = None, engine.end
+        short = replace(engine, end=until)
+        times = output_times(short.breaks, self.scene.output.interval, self.scene.time.start)
+        return *self._steps(short, lambda n, p: replace(made(n, p), end=until), y, never, times, SLICE), event
+
+    def _steps(
+        self,
+        engine: Engine,
+        made: Callable[[str, Progress], Engine],
+        y: np.ndarray,
+        stop: Stop,
+        times: np.ndarray,
+        pause: int,
+    ) -> Followed:
+        begun, span = self.scene.time.start, self.scene.time.end - self.scene.time.start
+
+        def tell(fraction: float | None, text: str) -> None:
+            """Progress of the whole run."""
+            at = engine.start + (engine.end - engine.start) * (fraction or 0.0)
+            self.progress(None if fraction is None else (at - begun) / span, text)
+
+        name = engine.model.scene.solver.integrator
+        usual = Judge(None, crawls), engine.method.traits.hands_over_to
+        judge, heir = (self.panel or {}).get(name, usual)
+        panel = {**(self.panel or {}), name: (replace(judge, every=min(judge.every or SLICE, pause)), heir)}
+        return follow(engine, y, tell, lambda other: made(other, tell), panel, stop, times)
+
+    def changed(self, name: str, scene: Scene, engine: Engine, y: np.ndarray, phase: Phase) -> tuple[_Start, Happened]:
+        """Where the next phase begins after an event, and what the event did."""
+        event, t = self.scene.event[name], phase.end
+        still = moving(closed(scene, engine), engine, y, t)
+        start = still.start.model_copy(update={"branch": ()}) if still.start is not None else None
+        still = still.model_copy(update={"start": start, "time": self.scene.time.model_copy(update={"start": t})})
+        if event.kind == "release":
+            return _Start(released(still, event), (engine, y)), Happened(name, event.kind, t)
+        held, (family, part) = driven(still, name, event), event.part
+        if family == "load" and part in still.load:
+            return _Start(exchanged(still, event, t), (engine, y)), Happened(name, event.kind, t)
+        if not held:
+            raise InputError(
+                f"[event.{name}.{event.kind}]",
+                f"{family}.{part} has been released before",
+                "remove one of the two events",
+            )
+        free = freed(still, held)
+        after = prescribed(free, event, held, phase.coordinates, t)
+        other = maker(free, self.bundles, self.progress)("", self.progress)
+        struck = blow(other, consistent_start(other), t, rates(after, held, t))
+        moved = moving(free, other, struck.y, t)
+        after = after.model_copy(update={"body": moved.body, "start": moved.start})
+        impulse = next(iter(struck.impulses.values())) if len(held) == 1 else np.nan
+        return _Start(after, (engine, y)), Happened(name, event.kind, t, impulse, struck.work, held[0].turns)
+
+
+def _energies(engine: Engine, y: np.ndarray, t: float) -> dict[str, float]:
+    """Energies in a state at the start [J]."""
+    engine.select_pieces_after(t)
+    seen: Observed = observe(engine, rows(engine, y[None], t), after=True)
+    return _last(stored(engine.model, seen))
+
+
+def _last(series: Mapping[str, np.ndarray]) -> dict[str, float]:
+    return {name: float(values[-1]) for name, values in series.items()}
