@@ -35,7 +35,8 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring the tables up to date, print them and say where they are."""
-    workplace, tables = open_workplace(options), dict[str, xr.Dataset]()
+    workplace = open_workplace(options)
+    tables: dict[str, xr.Dataset] = {}
     for graph in graphs(options.scenes, options.set):
         done, record = bring(graph.scene, workplace, options.members)
         if options.json:

@@ -340,6 +340,12 @@ def test_effects_of_a_pendulum_are_its_gravity(tmp_path: Path):
         assert float(alone.sel(quantity=name)) == pytest.approx(way, rel=1e-6)
 
 
+def test_the_command_prints_effects(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    path = write("pendulum", tmp_path)[0]
+    assert main(["effects", str(path), "--set", "time.end=0.1", "--json", "-q"]) == 0
+    assert "load.gravity" in capsys.readouterr().out
+
+
 def test_what_nothing_couples_to_what_is_asked_for_is_not_integrated(tmp_path: Path):
     """A pendulum beside the leg moves by itself: the leg's motion is the same without it, to the last tolerance."""
     leg = _tight(load_scene(write("leg", tmp_path)[0]))
