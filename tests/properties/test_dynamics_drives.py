@@ -115,7 +115,8 @@ spans = st.tuples(st.just(0.0) | st.floats(1e-50, 1.0), st.floats(0.01, 1.0), si
 
 
 def test_every_drive_law_is_tried_here() -> None:
-    assert set(LAWS) == set(drives.NAMES)
+    # expressions become pieces of these laws: tests/analytic/test_expressions.py
+    assert set(LAWS) == set(drives.NAMES) - {"expression"}
 
 
 @every_law

@@ -118,7 +118,7 @@ def table(scene: Scene) -> tuple[np.ndarray, np.ndarray, Any]:
 
 def test_bearings_and_loads_have_the_guards_that_their_laws_name() -> None:
     rows, numbers, arrays = table(Scene.model_validate(brakes(1e-8)))
-    speeds, of_loads = numbers["level"] > 0.0, rows["table"] == m.LOAD_SPEEDS.place
+    speeds, of_loads = numbers["level"] > 0.0, rows["table"] == m.LOAD_BENDS.place
     # the load that brakes, at its two speeds; of the ideal joints one has bristles, all others two speeds
     assert sorted(numbers["level"][of_loads]) == [COULOMB["v_static"], COULOMB["v_dynamic"]]
     bearings = arrays.size(m.N_BEARINGS)

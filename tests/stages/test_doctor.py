@@ -44,7 +44,7 @@ def test_graphics_are_well_only_where_something_was_drawn(
 def test_threads_that_somebody_asks_for_do_not_change_bytes(root: Path):
     """Sums over several threads are added in another order; the libraries read this when they are loaded."""
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
-    code = f"import os, pipeline; print([os.environ[name] for name in {names}])"
+    code = f"import os, flexclear; print([os.environ[name] for name in {names}])"
     environment = {**os.environ, **dict.fromkeys(names, "2")}
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=root, env=environment, capture_output=True, text=True, check=True

@@ -42,7 +42,7 @@ def test_two_hundred_runs_take_no_more_memory_than_fifty(tmp_path: Path, root: P
 
 #: pages that a process is given for arrays of 3 MB, of which it has two at a time, before and after
 PAGES = """import resource
-from flexclear.pipeline.core import system
+from flexclear.pipeline.core.system import platforms as system
 
 def given():
     before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt

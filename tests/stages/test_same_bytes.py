@@ -18,7 +18,7 @@ print(*(done.records[id(task)].digest for task in graph.bundle.values()))
 #: threads that BLAS has in a task: of a NumPy that this program loads, then where somebody has set another number
 AFTER = """
 import sys
-from flexclear.pipeline.core import threads
+from flexclear.pipeline.core.system import threads
 import numpy
 with threads.one():
     looked = "threadpoolctl" in sys.modules

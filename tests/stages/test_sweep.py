@@ -347,7 +347,7 @@ import sys
 import numpy, xarray
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
-from flexclear.stages import sweep_plan
+from flexclear.stages.sweeps import sweep_plan
 from flexclear.stages.workplace import open_workplace
 table = {"scene": "x", "keep": ["pin.peak_force"], "vary": {"time.end": [1e-4]}}
 plan = sweep_plan.prepare(sweep_plan.plan(read_sweep(table, "x"), load_scene(sys.argv[1]), "x"), open_workplace())

@@ -104,7 +104,7 @@ def test_a_script_without_a_guard_is_not_run_again_by_its_helpers(root: Path, tm
 
 BROKEN = """
 import sys
-from flexclear.stages import __main__, schema
+from flexclear.commands import __main__, schema
 def command(options):
     raise BrokenPipeError(32, "Broken pipe")
 if sys.argv[1] == "helper":
