@@ -48,7 +48,6 @@ def never(rows: np.ndarray) -> bool:
 @dataclass(frozen=True)
 class Trajectory:
     """What the stepper left. rows: of the record (see `memory.record`); events: of the event table, by time.
-
     contacts: number of clearance joints.  selections: closure rows solved for, each from a time on.
     drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
@@ -109,7 +108,6 @@ class StiffError(SolverError):
 
 def output_times(breaks: np.ndarray, interval: float, origin: float | None = None) -> np.ndarray:
     """Regular output times and all breaks, increasing; times nearer than rounding are one.
-
     origin: from which the regular ones are counted [s]; the first break by default.
     """
     origin = breaks[0] if origin is None else origin
@@ -131,7 +129,6 @@ def integrate(
     jumps: Jumps | None = None,
 ) -> Trajectory:
     """The trajectory from a consistent start; SolverError when the stepper gives up.
-
     stop: asked now and then with the rows recorded so far, whether they are enough; also of what an earlier attempt has
         left.
     left: what another method left of this run; it is continued from there.
