@@ -76,10 +76,10 @@ def make(
     there. Raises FailedTasksError when the run itself cannot be made.
     """
     scene = graph.scene
-    compared = None
+    compared, answering = None, Answers(scene, workplace, seconds)
     if loose(scene) or scene.flexible():
         with in_file(scene.path):
-            compared = compare.bring([scene], workplace, "both")
+            compared = compare.bring([scene], workplace, "both", answering.kernels() if answers else ())
     drawn = graph.render.values()
     members = [graph.ensemble, graph.post] if graph.ensemble else []
     outcome = workplace.bring([graph.overview, *members, *drawn])
@@ -88,7 +88,7 @@ def make(
     for failure in outcome.failures:
         workplace.monitor.say(f"not in the report: {failure.message}")
     run = workplace.store.load(outcome.records[id(graph.simulate)]) if id(graph.simulate) in outcome.records else None
-    result = _answers(Answers(scene, workplace, seconds), workplace) if answers and run is not None else {}
+    result = _answers(answering, workplace) if answers and run is not None else {}
     text = _page(graph, workplace, outcome.records, compared, run, result)
     return publish_page(workplace.store.root / f"runs/{scene.name}", "report", text, folder=folder)
 
