@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,6 +39,12 @@ FIRST_CSJ = Model("sps4/variants/first_csj", "CSJ, first layout", "#E69F00", our
 FAR = (FAR_FREE, FAR_FIXED, FAR_CB)
 FAR_CSJ = (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)
 MODELS = (IDEAL, *FAR, CSJ, *FAR_CSJ)
+FIRST = (FIRST_IDEAL, FIRST_CSJ)
+
+
+def references(models: Sequence[Model], *artifacts: str) -> tuple[str, ...]:
+    """References of these artifacts of each model, such as ``sps4/csj:run``."""
+    return tuple(f"{model.scene}:{artifact}" for model in models for artifact in artifacts)
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import struct
 from importlib import import_module
 from pathlib import Path
@@ -32,11 +31,10 @@ def test_all_figures_and_tables_of_the_paper_are_listed():
 
 
 @pytest.mark.parametrize("name", figures.NAMES)
-def test_needs_are_literal_and_name_scenes_and_artifacts_that_exist(name):
+def test_needs_name_scenes_and_artifacts_that_exist(name):
     module = import_module(f"flexclear.papers.wang_wang_2019.figures.{name}")
-    assigned = [node for node in ast.parse(Path(module.__file__).read_text()).body if isinstance(node, ast.Assign)]
-    literal = {node.targets[0].id: node.value for node in assigned if isinstance(node.targets[0], ast.Name)}
-    assert ast.literal_eval(literal["NEEDS"]) == module.NEEDS
+    assert module.NEEDS
+    assert len(set(module.NEEDS)) == len(module.NEEDS)
     for reference in module.NEEDS:
         scene, _, artifact = reference.partition(":")
         assert artifact.partition("/")[0] in ARTIFACTS

@@ -1,6 +1,6 @@
 """The paper's figures and tables. To add one: a module here with NEEDS and make, and a line below.
 
-``NEEDS``: references of the artifacts it reads, ``<scene>:<artifact>[/<body>]``; a literal.
+``NEEDS``: references of the artifacts it reads, ``<scene>:<artifact>[/<body>]``.
 They are listed in an index (`papers.wang_wang_2019.figure_stage`), since asking the modules takes the import of the
 plotting libraries. ``make(data)``: artifacts by reference -> file contents by file name.
 """

@@ -6,14 +6,11 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 
-from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT
+from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT, references
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import parameters
 
-NEEDS = (
-    "sps4/csj:run",
-    "sps4/csj:post",
-)
+NEEDS = references([CSJ], "run", "post")
 
 #: drawn radii of socket and ball, and the angle at which the ball lies off the centre
 SOCKET, DRAWN_BALL, ANGLE = 1.0, 0.74, np.radians(-38.0)

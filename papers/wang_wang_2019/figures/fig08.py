@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.models import IDEAL, motion
+from flexclear.papers.wang_wang_2019.models import IDEAL, motion, references
 from flexclear.pipeline.post.plotting import style
 
-NEEDS = (
-    "sps4/ideal:run",
-    "sps4/ideal:post",
-)
+NEEDS = references([IDEAL], "run", "post")
 
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:

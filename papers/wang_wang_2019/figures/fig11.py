@@ -5,20 +5,11 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.models import FAR, FAR_CB, FAR_FIXED, FAR_FREE, IDEAL, motion
+from flexclear.papers.wang_wang_2019.models import FAR, FAR_CB, FAR_FIXED, FAR_FREE, IDEAL, motion, references
 from flexclear.papers.wang_wang_2019.plotting.panels import DISPLACEMENT, deviation, six_panels
 from flexclear.pipeline.post.plotting import style
 
-NEEDS = (
-    "sps4/ideal:run",
-    "sps4/ideal:post",
-    "sps4/far_free:run",
-    "sps4/far_free:post",
-    "sps4/far_fixed:run",
-    "sps4/far_fixed:post",
-    "sps4/far_cb:run",
-    "sps4/far_cb:post",
-)
+NEEDS = references((IDEAL, *FAR), "run", "post")
 
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:

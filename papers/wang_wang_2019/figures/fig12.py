@@ -5,16 +5,11 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT, motion
+from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT, motion, references
 from flexclear.papers.wang_wang_2019.plotting.panels import six_panels
 from flexclear.pipeline.post.plotting import style
 
-NEEDS = (
-    "sps4/ideal:run",
-    "sps4/ideal:post",
-    "sps4/csj:run",
-    "sps4/csj:post",
-)
+NEEDS = references((IDEAL, CSJ), "run", "post")
 
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:

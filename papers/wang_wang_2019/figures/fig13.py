@@ -4,22 +4,11 @@ from __future__ import annotations
 
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, PLATFORM, motion
+from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, JOINT, PLATFORM, motion, references
 from flexclear.papers.wang_wang_2019.plotting.panels import six_panels
 from flexclear.pipeline.post.plotting import style
 
-NEEDS = (
-    "sps4/ideal:run",
-    "sps4/ideal:post",
-    "sps4/csj:run",
-    "sps4/csj:post",
-    "sps4/far_csj_free:run",
-    "sps4/far_csj_free:post",
-    "sps4/far_csj_fixed:run",
-    "sps4/far_csj_fixed:post",
-    "sps4/far_csj_cb:run",
-    "sps4/far_csj_cb:post",
-)
+NEEDS = references((IDEAL, CSJ, *FAR_CSJ), "run", "post")
 
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:

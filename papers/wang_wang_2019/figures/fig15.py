@@ -4,34 +4,18 @@ from __future__ import annotations
 
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.plotting.phase import Plane, maps, off_ideal
-from flexclear.pipeline.post.plotting import style
+from flexclear.papers.wang_wang_2019.plotting import phase
 
-NEEDS = (
-    "sps4/ideal:run",
-    "sps4/ideal:post",
-    "sps4/csj:run",
-    "sps4/csj:post",
-    "sps4/far_csj_free:run",
-    "sps4/far_csj_free:post",
-    "sps4/far_csj_fixed:run",
-    "sps4/far_csj_fixed:post",
-    "sps4/far_csj_cb:run",
-    "sps4/far_csj_cb:post",
+NEEDS = phase.NEEDS
+PLANE = phase.Plane(
+    lambda m: m.displacement,
+    lambda m: m.velocity,
+    "z displacement (mm)",
+    "z velocity (mm/s)",
+    "Figure 15: impacts take the velocity up to {y} of its largest value off the ideal model's, the displacement {x}",
 )
-
-PLANE = Plane(lambda m: m.displacement, lambda m: m.velocity, "z displacement (mm)", "z velocity (mm/s)")
 
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
     """fig15.png and fig15.svg."""
-    with style.style():
-        figure = maps(PLANE, data)
-        style.heading(
-            figure,
-            f"Figure 15: impacts take the velocity up to {off_ideal(PLANE.y, data):.0%} of its largest value off the "
-            f"ideal model's, the displacement {off_ideal(PLANE.x, data):.1%}",
-            "the paper calls these phase plots Poincaré maps; second row (added): states when an impact "
-            "begins, hollow beyond the horizon",
-        )
-        return style.files("fig15", figure)
+    return phase.files("fig15", PLANE, data)

@@ -5,19 +5,10 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, JOINT, Model, believed_until
+from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, JOINT, Model, believed_until, references
 from flexclear.pipeline.post.plotting import style
 
-NEEDS = (
-    "sps4/csj:run",
-    "sps4/csj:post",
-    "sps4/far_csj_free:run",
-    "sps4/far_csj_free:post",
-    "sps4/far_csj_fixed:run",
-    "sps4/far_csj_fixed:post",
-    "sps4/far_csj_cb:run",
-    "sps4/far_csj_cb:post",
-)
+NEEDS = references((CSJ, *FAR_CSJ), "run", "post")
 
 PLANES = (("x", "y"), ("x", "z"))
 

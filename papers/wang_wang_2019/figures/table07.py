@@ -5,7 +5,7 @@ from __future__ import annotations
 import xarray as xr
 
 from flexclear.papers.wang_wang_2019.deviations import Deviation, max_deviation
-from flexclear.papers.wang_wang_2019.models import FAR_CB, FAR_FIXED, FAR_FREE, IDEAL, PLATFORM
+from flexclear.papers.wang_wang_2019.models import FAR, FAR_CB, FAR_FIXED, FAR_FREE, IDEAL, PLATFORM, references
 from flexclear.papers.wang_wang_2019.plotting.error_table import (
     MEANING,
     NOTHING,
@@ -19,16 +19,7 @@ from flexclear.papers.wang_wang_2019.plotting.error_table import (
 from flexclear.papers.wang_wang_2019.published import TABLE7, TABLE8
 from flexclear.pipeline.post.plotting.table import Table, files
 
-NEEDS = (
-    "sps4/ideal:run",
-    "sps4/far_free:run",
-    "sps4/far_fixed:run",
-    "sps4/far_cb:run",
-    "sps4/ideal:tight",
-    "sps4/far_free:tight",
-    "sps4/far_fixed:tight",
-    "sps4/far_cb:tight",
-)
+NEEDS = references((IDEAL, *FAR), "run", "tight")
 
 
 def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:

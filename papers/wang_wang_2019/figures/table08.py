@@ -8,6 +8,7 @@ import xarray as xr
 from flexclear.papers.wang_wang_2019.deviations import Deviation, max_deviation, velocity_at_events
 from flexclear.papers.wang_wang_2019.models import (
     CSJ,
+    FIRST,
     FIRST_CSJ,
     FIRST_IDEAL,
     IDEAL,
@@ -15,6 +16,7 @@ from flexclear.papers.wang_wang_2019.models import (
     PLATFORM,
     Model,
     believed_until,
+    references,
 )
 from flexclear.papers.wang_wang_2019.plotting.error_table import MEANING, comparison, heads, paper, rows, single
 from flexclear.papers.wang_wang_2019.published import TABLE8
@@ -25,16 +27,8 @@ from flexclear.pipeline.post.single_run.series import parameters
 VELOCITY = 1.5
 
 NEEDS = (
-    "sps4/ideal:run",
-    "sps4/csj:run",
-    "sps4/csj:post",
-    "sps4/ideal:tight",
-    "sps4/csj:tight",
-    "sps4/variants/first:run",
-    "sps4/variants/first_csj:run",
-    "sps4/variants/first_csj:post",
-    "sps4/variants/first:tight",
-    "sps4/variants/first_csj:tight",
+    *references((IDEAL, CSJ, *FIRST), "run", "tight"),
+    *references((CSJ, FIRST_CSJ), "post"),
 )
 
 

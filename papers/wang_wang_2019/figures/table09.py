@@ -17,27 +17,16 @@ from flexclear.papers.wang_wang_2019.models import (
     PLATFORM,
     Model,
     believed_until,
+    references,
 )
 from flexclear.papers.wang_wang_2019.plotting.error_table import MEANING, Column, heads, paper, rows, several, single
 from flexclear.papers.wang_wang_2019.published import TABLE9
 from flexclear.pipeline.post.plotting.table import Table, files
 
 NEEDS = (
-    "sps4/ideal:run",
-    "sps4/csj:post",
-    "sps4/far_csj_free:run",
-    "sps4/far_csj_free:post",
-    "sps4/far_csj_free:ensemble",
-    "sps4/far_csj_fixed:run",
-    "sps4/far_csj_fixed:post",
-    "sps4/far_csj_fixed:ensemble",
-    "sps4/far_csj_cb:run",
-    "sps4/far_csj_cb:post",
-    "sps4/far_csj_cb:ensemble",
-    "sps4/ideal:tight",
-    "sps4/far_csj_free:tight",
-    "sps4/far_csj_fixed:tight",
-    "sps4/far_csj_cb:tight",
+    *references((IDEAL, *FAR_CSJ), "run", "tight"),
+    *references((CSJ, *FAR_CSJ), "post"),
+    *references(FAR_CSJ, "ensemble"),
 )
 
 

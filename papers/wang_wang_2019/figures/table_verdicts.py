@@ -22,12 +22,14 @@ from flexclear.papers.wang_wang_2019.models import (
     FAR_CSJ_FREE,
     FAR_FIXED,
     FAR_FREE,
+    FIRST,
     FIRST_CSJ,
     FIRST_IDEAL,
     IDEAL,
     JOINT,
     PLATFORM,
     Model,
+    references,
 )
 from flexclear.papers.wang_wang_2019.plotting.error_table import NOISE
 from flexclear.papers.wang_wang_2019.published import TABLE10
@@ -36,26 +38,8 @@ from flexclear.pipeline.core.system.file_dependencies import note
 from flexclear.pipeline.post.plotting.table import Table, files
 
 NEEDS = (
-    "sps4/ideal:run",
-    "sps4/ideal:post",
-    "sps4/far_free:run",
-    "sps4/far_free:post",
-    "sps4/far_fixed:run",
-    "sps4/far_fixed:post",
-    "sps4/far_cb:run",
-    "sps4/far_cb:post",
-    "sps4/csj:run",
-    "sps4/csj:post",
-    "sps4/far_csj_free:post",
-    "sps4/far_csj_free:ensemble",
-    "sps4/far_csj_fixed:post",
-    "sps4/far_csj_fixed:ensemble",
-    "sps4/far_csj_cb:post",
-    "sps4/far_csj_cb:ensemble",
-    "sps4/variants/first:run",
-    "sps4/variants/first:post",
-    "sps4/variants/first_csj:run",
-    "sps4/variants/first_csj:post",
+    *references((IDEAL, *FAR, CSJ, *FIRST), "run", "post"),
+    *references(FAR_CSJ, "post", "ensemble"),
     "sps4:timing",
 )
 

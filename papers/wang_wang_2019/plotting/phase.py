@@ -11,10 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
-from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion
+from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion, references
 from flexclear.pipeline.core.artifacts.quantities import common_times
 from flexclear.pipeline.post.plotting import style
 
+NEEDS = references((IDEAL, CSJ, *FAR_CSJ), "run", "post")
 Values = Callable[[Motion], np.ndarray]
 #: of an axis that is logarithmic on both sides
 SPIKE_TICKS = [sign * size for size in (20.0, 50.0, 100.0, 200.0, 500.0) for sign in (-1.0, 1.0)] + [0.0]
@@ -24,6 +25,7 @@ SPIKE_TICKS = [sign * size for size in (20.0, 50.0, 100.0, 200.0, 500.0) for sig
 class Plane:
     """The two quantities of a phase plane and their axis labels.
 
+    heading: what the figure shows; {x} and {y} in it are how far impacts take either off the ideal model's.
     spikes: impacts drive y far out of the ideal model's range; it is then linear inside that range
     and logarithmic outside.
     """
@@ -32,7 +34,23 @@ class Plane:
     y: Values
     x_label: str
     y_label: str
+    heading: str
     spikes: bool = False
+
+
+def files(name: str, plane: Plane, data: dict[str, xr.Dataset]) -> dict[str, bytes]:
+    """One of the figures, as PNG and SVG."""
+    with style.style():
+        figure = maps(plane, data)
+        heading = plane.heading.format(x=f"{off_ideal(plane.x, data):.1%}", y=f"{off_ideal(plane.y, data):.0%}")
+        scale = "; grey band: linear scale, logarithmic outside" if plane.spikes else ""
+        style.heading(
+            figure,
+            heading,
+            "the paper calls these phase plots Poincaré maps; second row (added): states when an impact begins, hollow "
+            f"beyond the horizon{scale}",
+        )
+        return style.files(name, figure)
 
 
 def maps(plane: Plane, data: dict[str, xr.Dataset]) -> Figure:
