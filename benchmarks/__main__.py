@@ -102,8 +102,8 @@ def _measured(name: str, family: Family, cases: list[Case], memory: log.Memory, 
     for done, (case, records) in enumerate(family.measure(todo, jobs) if todo else (), start=1):
         found[case.name] = log.plain([{"case": case.name, **record} for record in records], digits)
         memory.learn(case, found[case.name])
-        told = "".join(f" {record[key]}" for record in records for key in ("verdict", "reason") if record.get(key))
-        say(f"{name} [{done}/{len(todo)}] {case.name}:{told} after {duration(time.monotonic() - begun)}")
+        outcome = "".join(f" {record[key]}" for record in records for key in ("verdict", "reason") if record.get(key))
+        say(f"{name} [{done}/{len(todo)}] {case.name}:{outcome} after {duration(time.monotonic() - begun)}")
     return found
 
 

@@ -1,4 +1,4 @@
-"""Processor time of one command, told apart by what it goes into: ``python -m benchmarks.command_parts run SCENE``.
+"""Processor time of one command, divided by what it goes into: ``python -m benchmarks.command_parts run SCENE``.
 
 In a process of its own, since imports are a part of it. The last line of its output is a table as JSON: part ->
 seconds; a part has none of the time of the parts inside of it. Threads that work side by side are counted each.

@@ -75,7 +75,7 @@ class Worker:
         other.close()
 
     def give(self, parameters: Any) -> None:
-        """Begin a piece of work; that the process is gone is told by `take`."""
+        """Begin a piece of work; `take` raises when the process is gone."""
         with suppress(BrokenPipeError):
             self.line.send(parameters)
 

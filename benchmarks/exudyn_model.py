@@ -69,7 +69,7 @@ class Model:
 
 def load() -> Any:
     """The exudyn package, in its version without range checks; ImportError when it is not installed."""
-    sys.exudynFast = True  # type: ignore[attr-defined]  # how the package is told, before it is imported
+    sys.exudynFast = True  # type: ignore[attr-defined]  # the package reads it when it is imported
     with contextlib.redirect_stdout(io.StringIO()):  # it prints a line on import
         import exudyn
     return exudyn

@@ -1,4 +1,4 @@
-"""How a benchmark declares itself; what is common to all of them is in the modules beside this one."""
+"""How a benchmark declares itself; what is common to all of them is in the modules next to this one."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ class Family:
     cases: all of them, called with the numbers of `settings`, which `--set` changes.
     measure: some of them, in at most so many processes, each with its records as soon as it is done.
     show: records of some or all cases as Markdown, or several parts of the page by name.
-    files: what stands beside the page, by path below docs/.
+    files: what belongs to the page, by path below docs/.
     quick: the smallest case, where it takes below 5 s warm.
     times: whether times are the subject. If so, the log keeps every measurement, with four digits, since what is
     behind them is noise; else the last one, with all digits.
-    modules: what decides about a case. With it, what was found stands until a source that they import changes; without
+    modules: what decides about a case. With it, a result is valid until a source that they import changes; without
     it, a case is measured again whenever that is asked for.
     needs: an optional library, and the extra of this project that brings it.
     children: it measures or limits child processes, which not every system can (`benchmarks.system`).

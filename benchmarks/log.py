@@ -93,7 +93,7 @@ def plain(value: Any, digits: int | None) -> Any:
 class Memory:
     """What is measured already, so that what was interrupted goes on where it stopped: a line for each case.
 
-    A line stands as long as the case, the sources that it reaches, the processor and the versions are the same.
+    A line is valid as long as the case, the sources that it reaches, the processor and the versions are the same.
     trusting: also with other sources, of cases that finished.
     """
 
@@ -120,7 +120,7 @@ class Memory:
             file.write(json.dumps(line) + "\n")
 
     def forget(self, cases: list[Case]) -> None:
-        """What is in the log is to be measured again when that is asked for, unless it stands until sources change."""
+        """Measure again what is in the log, unless it is valid until sources change."""
         if self.spec.modules is None and self.file.exists():
             for case in cases:
                 self.known.pop(_identity(case), None)

@@ -1,4 +1,4 @@
-"""The pages of docs/ that hold measurements: what stands between two marks of a page is written from the log.
+"""The pages of docs/ that hold measurements: what is between two marks of a page is written from the log.
 
     <!-- begin growth -->      until <!-- end growth -->: what that family shows, or one part of it by name
     <!-- begin measured -->    until <!-- end measured -->: when, and on what machine; nothing else says that
@@ -25,7 +25,7 @@ from flexclear.pipeline.post.plotting.table import pipe_table
 DOCS = TREE / "docs"
 #: of a table: heading, and the cell of a record
 Columns = Mapping[str, Callable[[Record], str]]
-#: what stands where nothing was measured
+#: the text where nothing was measured
 NOTHING = "Not measured."
 
 
@@ -41,10 +41,10 @@ def of_page(page: str) -> dict[str, Family]:
 
 
 def write(page: str, logs: Path = log.FOLDER, into: Path = DOCS) -> Path:
-    """Write a page, and what stands beside it, from the logs in a folder; returns the page."""
+    """Write a page, and the files next to it, from the logs in a folder; returns the page."""
     (into / page).parent.mkdir(parents=True, exist_ok=True)
     (into / page).write_text(text(page, logs), encoding="utf-8", newline="\n")
-    for path, content in beside(page, logs).items():
+    for path, content in files_of(page, logs).items():
         (into / path).parent.mkdir(parents=True, exist_ok=True)
         (into / path).write_bytes(content)
     return into / page
@@ -62,8 +62,8 @@ def text(page: str, logs: Path = log.FOLDER) -> str:
     return filled((DOCS / page).read_text(encoding="utf-8"), parts, f"docs/{page}")
 
 
-def beside(page: str, logs: Path = log.FOLDER) -> dict[str, bytes]:
-    """What stands beside a page, by path below docs/."""
+def files_of(page: str, logs: Path = log.FOLDER) -> dict[str, bytes]:
+    """The files next to a page, by path below docs/."""
     found: dict[str, bytes] = {}
     for name, family in of_page(page).items():
         if sessions := log.latest(logs / f"{name}.jsonl"):
@@ -89,17 +89,17 @@ def filled(page: str, parts: Mapping[str, str], place: str) -> str:
 
 def where(measured: Mapping[str, list[Session]]) -> str:
     """Date and machine of a page's measurements: once, if they are the same, else once for each."""
-    told: dict[str, list[str]] = {}
+    by_session: dict[str, list[str]] = {}
     for name, sessions in measured.items():
         cases: dict[str, list[str]] = {}
         for session in sessions:
             cases.setdefault(session_words(session), []).extend(record["case"] for record in session.records)
         for words, mine in cases.items():
             part = name if len(cases) == 1 else f"{name} ({', '.join(dict.fromkeys(mine))})"
-            told.setdefault(words, []).append(part)
-    if len(told) == 1:
-        return f"Measured {next(iter(told))}."
-    return "Measured:\n\n" + "\n".join(f"- {', '.join(parts)}: {session}" for session, parts in told.items())
+            by_session.setdefault(words, []).append(part)
+    if len(by_session) == 1:
+        return f"Measured {next(iter(by_session))}."
+    return "Measured:\n\n" + "\n".join(f"- {', '.join(parts)}: {session}" for session, parts in by_session.items())
 
 
 def session_words(session: Session) -> str:

@@ -122,7 +122,7 @@ class Drawn:
     """A scene of the family, and what was drawn for it."""
 
     scene: Scene
-    told: Mapping[str, Any]
+    record: Mapping[str, Any]
 
 
 def drawn(seed: int, number: int, folder: Path) -> Drawn:
@@ -160,8 +160,8 @@ def drawn(seed: int, number: int, folder: Path) -> Drawn:
     asked = _asked(random, mechanism)
     scene = edited(scene, {"accuracy": {"quantities": asked}})
     scene._name, scene._path = f"{name}-{number}", None
-    told = {"mechanism": name, "clearance": clearance, "speed": speed, "rod": material, "wanted": asked}
-    return Drawn(scene, told)
+    record = {"mechanism": name, "clearance": clearance, "speed": speed, "rod": material, "wanted": asked}
+    return Drawn(scene, record)
 
 
 def _log_uniform(random: np.random.Generator, low: float, high: float) -> float:

@@ -71,7 +71,7 @@ def kill(process: int) -> None:
 def ended_by(exit_code: int) -> str:
     """Name of the signal that ended a process, such as SIGSEGV; empty when it was none.
 
-    Real-time signals but the first and the last have no name: they are told by their number.
+    Real-time signals but the first and the last have no name: they are known by their number.
     """
     if exit_code >= 0:
         return ""

@@ -1,4 +1,4 @@
-"""Times that mean something on a machine whose speed drifts: interleaved, repeated, told with their spread."""
+"""Times that mean something on a machine whose speed drifts: interleaved, repeated, given with their spread."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Times:
         low, high = np.percentile(self.seconds, (25, 75))
         return float(0.5 * (high - low) / self.median)
 
-    def told(self, unit: str) -> dict[str, float]:
+    def record(self, unit: str) -> dict[str, float]:
         """Median, in the unit that it is called by, and spread, as the log has them."""
         return {unit: UNITS[unit] * self.median, "spread": self.spread}
 

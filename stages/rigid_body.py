@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 #: how inputs are called that hold such bodies, before the body's name
 PREFIX = "rigid/"
-#: how well a mesh tells where its frames are, as a fraction of their distance: the middle of a hole is the mean of its
-#: nodes, and with sixteen of them around, a chord leaves the circle by two percent of a radius of a twentieth of it
+#: how well a mesh determines where its frames are, as a fraction of their distance: the middle of a hole is the mean of
+#: its nodes, and with sixteen of them around, a chord leaves the circle by two percent of a radius of a twentieth of it
 LEFT_BY_MESHES = 1e-3
 
 

@@ -1,4 +1,4 @@
-"""What accuracy costs: the studies of `flexclear cost` of five scenes, with Exudyn's logged runs beside ours.
+"""What accuracy costs: the studies of `flexclear cost` of five scenes, with Exudyn's logged runs next to ours.
 
 The studies are in the store, point by point. The log has what the page says of them, and the digests of their pictures,
 which are drawn with the studies and not from the log.
@@ -54,9 +54,9 @@ def show(records: list[Record]) -> str:
     return sections(tuple(found))
 
 
-def _table(told: Mapping[str, list]) -> Table:
-    rows = tuple(tuple(row) for row in told["rows"])
-    return Table(str(told["title"]), tuple(told["columns"]), rows, tuple(told["notes"]))
+def _table(stored: Mapping[str, list]) -> Table:
+    rows = tuple(tuple(row) for row in stored["rows"])
+    return Table(str(stored["title"]), tuple(stored["columns"]), rows, tuple(stored["notes"]))
 
 
 def files(records: list[Record]) -> dict[str, bytes]:

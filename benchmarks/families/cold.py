@@ -1,6 +1,6 @@
 """The first run of a scene with nothing compiled, as a command: from an empty folder of kernels to the dataset.
 
-Meshes, modes and bundles are made before. The same command with the kernels on disk is measured beside it: the
+Meshes, modes and bundles are made before. The same command with the kernels on disk is measured next to it: the
 difference is what compiling takes. Two processes compile where there are two processors. Wall time means something on a
 machine without other work only; processor time is that of all processes together.
 """

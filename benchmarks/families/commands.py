@@ -39,7 +39,7 @@ class Command:
     """A command: arguments, in which ``{}`` is a number that is another one each time.
 
     value: that number, about.  own: whether it works on the project's results instead of on empty ones.
-    loop: whether it is a loop over `flexclear.run` in Python, of which one point is told.
+    loop: whether it is a loop over `flexclear.run` in Python, of which one point counts.
     """
 
     arguments: tuple[str, ...]
@@ -72,8 +72,8 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
             command = COMMANDS[case.name]
             parts = {} if command.loop else json.loads(_run(command, Path(folder), fresh, "benchmarks.command_parts"))
             fractions = {name: parts.pop(name, 0.0) for name in SHOWN} if parts else {}
-            wall = Times(tuple(waits[case.name][-ROUNDS:])).told("s")
-            yield case, [{"cpu": times[case.name].told("s"), "wall": wall, "processors": cores(), "parts": fractions}]
+            wall = Times(tuple(waits[case.name][-ROUNDS:])).record("s")
+            yield case, [{"cpu": times[case.name].record("s"), "wall": wall, "processors": cores(), "parts": fractions}]
 
 
 def _timed(command: Command, folder: Path, fresh: Iterator[float], waits: list[float]) -> Callable[[], float]:
@@ -81,7 +81,7 @@ def _timed(command: Command, folder: Path, fresh: Iterator[float], waits: list[f
 
     def seconds() -> float:
         if command.loop:
-            spent, wall = (float(told) for told in _run(command, folder, fresh).split())
+            spent, wall = (float(text) for text in _run(command, folder, fresh).split())
         else:
             begun = time.monotonic()
             spent = of_children(lambda: _run(command, folder, fresh))

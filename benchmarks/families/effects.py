@@ -167,30 +167,30 @@ def _answers(found: dict[str, Record]) -> str:
     ratio = place["play_added"] / place["rod_added"]
     beyond, chance = force["rod_interaction"], force["rod_interaction_uncertainty"] or 0.0
     together = beyond > max(chance, force["rod_added"], 0.1 * force["play_added"])
-    alone, beside = _cell(place, "rod_added"), _cell(place, "rod_dropped")
-    beside += _told(place, "rod_dropped") + _matters(place)
+    alone, dropped = _cell(place, "rod_added"), _cell(place, "rod_dropped")
+    dropped += _given(place, "rod_dropped") + _matters(place)
     dominates = force["play_added"] > DOMINATES * force["rod_added"]
     lines = [
         f'- "The flexible rod alone does not matter for the pose": it moves the platform by {alone}, the clearance by '
-        f"{ratio:.0f} times that. {_so(ratio > DOMINATES)} Beside the clearance, "
-        f"where it is taken from both, the mean position changes by {beside}.",
+        f"{ratio:.0f} times that. {_so(ratio > DOMINATES)} Next to the clearance, "
+        f"where it is taken from both, the mean position changes by {dropped}.",
         f'- "Clearance dominates": alone it moves the platform by {_cell(place, "play_added")} and changes the force '
         f"at A2 by {_cell(force, 'play_added')}, the rod alone by {_cell(force, 'rod_added')}. {_so(dominates)}",
         f'- "Both together are needed for forces": without the rod\'s flexibility the largest force at A1 changes by '
-        f"{_cell(peak, 'rod_dropped')}{_told(peak, 'rod_dropped')}; at A2 both do {_cell(force, 'rod_interaction')} "
-        f"beyond the sum of each{_told(force, 'rod_interaction')}. "
+        f"{_cell(peak, 'rod_dropped')}{_given(peak, 'rod_dropped')}; at A2 both do {_cell(force, 'rod_interaction')} "
+        f"beyond the sum of each{_given(force, 'rod_interaction')}. "
         f"{_so(together)}",
     ]
     return "\n".join(lines)
 
 
 def _matters(place: Record) -> str:
-    """That the rod does more to the pose beside the clearance than alone, where it is more than chance."""
+    """That the rod does more to the pose next to the clearance than alone, where it is more than chance."""
     known = place["rod_dropped"] > max(place["rod_dropped_uncertainty"] or 0.0, place["rod_added"])
     return ": with clearance the rod does matter, since it changes the impacts" if known else ""
 
 
-def _told(record: Record, name: str) -> str:
+def _given(record: Record, name: str) -> str:
     """What to think of a difference of means that chance may explain."""
     return "" if record[name] > (record[f"{name}_uncertainty"] or 0.0) else ", which chance may explain"
 

@@ -1,4 +1,4 @@
-"""What the members of an ensemble cost beside one run: alone and several at once, on one and two workers."""
+"""What the members of an ensemble cost next to one run: alone and several at once, on one and two workers."""
 
 from __future__ import annotations
 
@@ -52,7 +52,9 @@ def _beside_a_run(here: Mechanism) -> Record:
         "together, 2 workers": partial(_timed, full, workers=2),
     }
     found = _in_turn(tasks)
-    return {"members": MEMBERS} | {name: {"wall": w.told("s"), "cpu": c.told("s")} for name, (w, c) in found.items()}
+    return {"members": MEMBERS} | {
+        name: {"wall": w.record("s"), "cpu": c.record("s")} for name, (w, c) in found.items()
+    }
 
 
 def _growing(cases: Sequence[Case]) -> Measured:
@@ -60,7 +62,7 @@ def _growing(cases: Sequence[Case]) -> Measured:
     short_one = here.with_scene("short", edited(here.scene, {"time.end": UNTIL}))
     tasks = {case.name: partial(_timed, _with_members(short_one, case.of), workers=1) for case in cases}
     for case, (_, cpu) in zip(cases, _in_turn(tasks).values(), strict=True):
-        yield case, [{"members": case.of, **cpu.told("s")}]
+        yield case, [{"members": case.of, **cpu.record("s")}]
 
 
 def _with_members(here: Mechanism, members: int) -> Callable[[], Any]:
@@ -140,7 +142,7 @@ def show(records: list[Record]) -> str:
 
 
 FAMILY = Family(
-    what="members of ensembles beside one run, several at once, and growth with their number",
+    what="members of ensembles next to one run, several at once, and growth with their number",
     takes="2 min",
     page="benchmarks.md",
     cases=cases,

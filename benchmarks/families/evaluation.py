@@ -40,8 +40,8 @@ def _scene(name: str) -> Record:
     return {
         "unknowns": system.count.unknowns,
         "derivation": system.count.derivation(),
-        "dgesv": dense.told("us"),
-        "ours": {label: found.told("us") | {"ratio": dense.over(found)} for label, found in times.items()},
+        "dgesv": dense.record("us"),
+        "ours": {label: found.record("us") | {"ratio": dense.over(found)} for label, found in times.items()},
     }
 
 

@@ -232,7 +232,7 @@ def _name(rung: Rung) -> str:
 
 
 def _timers(rung: Rung, *, whole: bool) -> dict[str, Callable[[], float]]:
-    """What times a run of ours, by its name in the log; beside the whole run, in parts and by straight code."""
+    """What times a run of ours, by its name in the log; next to the whole run, in parts and by straight code."""
     parts = {"s": rung.time, "bare_s": rung.bare, "alike_s": rung.alike}
     return {"s": rung.time} if whole else parts | ({"straight_s": rung.straight} if rung.straight else {})
 
@@ -259,7 +259,7 @@ def _side_by_side(
 
 
 def show(records: list[Record]) -> str:
-    """Times needed for an accuracy, then every run of Exudyn that counts with ours beside it."""
+    """Times needed for an accuracy, then every run of Exudyn that counts with ours next to it."""
     order, runs = list(COMPARISONS), _runs(records)
     known = {r["case"]: r for r in records if "horizon" in r}
     # a log may have cases that are no longer compared

@@ -129,8 +129,8 @@ def _governor(run: xr.Dataset, scene: Scene) -> str:
 
 
 def _rotor(linear: xr.Dataset, scene: Scene) -> str:
-    told = ", ".join(f"{value:.1f}" for value in np.unique(linear["frequency"].values.round(1))[:4])
-    return f"In the axes that turn with the shaft its lowest whirls have {told} Hz."
+    listed = ", ".join(f"{value:.1f}" for value in np.unique(linear["frequency"].values.round(1))[:4])
+    return f"In the axes that turn with the shaft its lowest whirls have {listed} Hz."
 
 
 def _bracket(linear: xr.Dataset, scene: Scene) -> str:
@@ -307,7 +307,7 @@ def solved(entry: Entry, scene: Scene, reduced: Bundles) -> xr.Dataset:
 
 
 def measure(chosen: Sequence[Case], jobs: int) -> Measured:
-    """Question, answer, warm time of one run, and the picture, which is kept beside the page."""
+    """Question, answer, warm time of one run, and the picture, which is stored next to the page."""
     PICTURES.mkdir(exist_ok=True)
     for case in chosen:
         entry = ENTRIES[case.name]
@@ -332,8 +332,8 @@ def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None
 
     from flexclear.pipeline.post.render import film, mechanism
 
-    told = rendering.params(scene, "motion", "html")
-    looks = mechanism.Looks(bodies=told["bodies"], **told.get("view", {}))
+    params = rendering.params(scene, "motion", "html")
+    looks = mechanism.Looks(bodies=params["bodies"], **params.get("view", {}))
     drawn = mechanism.mechanism(run, reduced, looks)
     row = round(entry.at * (run.sizes["time"] - 1))
     picture = Image.fromarray(film.still(drawn, row))

@@ -23,11 +23,11 @@ COARSE, SHOWN = 0.02, 5
 def members_rows() -> Iterator[Record]:
     """The family on its grid: one record with its extent, and one for the layout that is taken."""
     found = identify.family()
-    told: Record = {"members": len(found), "on_the_plate": sum(identify.on_the_plate(m.layout) for m in found)}
+    record: Record = {"members": len(found), "on_the_plate": sum(identify.on_the_plate(m.layout) for m in found)}
     for name in ("ax", "ay", "bx", "by", "height", "leg"):
         values = [getattr(m.layout, name) for m in found]
-        told |= {f"{name}_least": float(min(values)), f"{name}_most": float(max(values))}
-    yield told
+        record |= {f"{name}_least": float(min(values)), f"{name}_most": float(max(values))}
+    yield record
     yield _member(identify.chosen(found))
 
 
@@ -44,8 +44,8 @@ def open_rows() -> Iterator[Record]:
     layout = identify.chosen(identify.family()).layout
     for restitution, gravity, start in product(RESTITUTION, (False, True), STARTS):
         choice = Open(restitution, gravity, start)
-        told = {"restitution": restitution, "gravity": gravity, "start": start}
-        yield told | predict.rigid(layout, choice)
+        record = {"restitution": restitution, "gravity": gravity, "start": start}
+        yield record | predict.rigid(layout, choice)
 
 
 def flexible_rows() -> Iterator[Record]:
@@ -56,10 +56,10 @@ def flexible_rows() -> Iterator[Record]:
 
 
 def _member(member: Member) -> Record:
-    layout, told = member.layout, member.answer
+    layout, answer = member.layout, member.answer
     place = {name: float(getattr(layout, name)) for name in ("ax", "ay", "bx", "by", "height", "leg")}
-    return place | {"dz": told.dz, "dangle": told.dangle, "lift": told.lift, "tilt": told.tilt,
-                    "condition": told.condition, "room": told.room}  # fmt: skip
+    return place | {"dz": answer.dz, "dangle": answer.dangle, "lift": answer.lift, "tilt": answer.tilt,
+                    "condition": answer.condition, "room": answer.room}  # fmt: skip
 
 
 ROWS: dict[str, Callable[[], Iterator[Record]]] = {
@@ -159,12 +159,12 @@ def _open(rows: list[Record]) -> str:
         **ERRORS,
     }
     refused = [r for r in rows if "velocity" not in r]
-    told = "".join(f"\nRefused: {r['restitution']:g}, {r['start']}: {r['reason']}\n" for r in refused)
-    return table([r for r in rows if "velocity" in r], columns) + ("\n" + told if told else "")
+    text = "".join(f"\nRefused: {r['restitution']:g}, {r['start']}: {r['reason']}\n" for r in refused)
+    return table([r for r in rows if "velocity" in r], columns) + ("\n" + text if text else "")
 
 
 def _flexible(rows: list[Record]) -> str:
-    """Ensembles beside Table 9."""
+    """Ensembles next to Table 9."""
     columns: Columns = {
         "mode set": lambda r: r["set"],
         "angle [mrad]": _spread("angle", 1e3, 3),

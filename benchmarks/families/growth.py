@@ -111,7 +111,7 @@ def _loops(cases: Sequence[Case]) -> Measured:
     times = interleaved(tasks, ROUNDS)
     for case in cases:
         if case.name in times:
-            yield case, [{"loops": case.of, **times[case.name].told("us")}]
+            yield case, [{"loops": case.of, **times[case.name].record("us")}]
 
 
 def _modes(cases: Sequence[Case]) -> Measured:
@@ -125,15 +125,15 @@ def _modes(cases: Sequence[Case]) -> Measured:
             "held": int(arrays.table(m.FLEXES)["n_held"][0]),
             "products": len(arrays.table(m.MOMENTS)),
         }
-    for case, told in _both_ways(cases, engines):
-        yield case, [known[case.name] | told]
+    for case, measured in _both_ways(cases, engines):
+        yield case, [known[case.name] | measured]
 
 
 def _parts(made: Callable[[int], Mechanism], what: str, cases: Sequence[Case]) -> Measured:
     """Evaluations with so many parts of a kind, in free flight."""
     mine = [case for case in cases if case.name.endswith(what)]
-    for case, told in _both_ways(mine, {case.name: made(case.of).engine() for case in mine}):
-        yield case, [{what: case.of, **told}]
+    for case, measured in _both_ways(mine, {case.name: made(case.of).engine() for case in mine}):
+        yield case, [{what: case.of, **measured}]
 
 
 def _both_ways(cases: Sequence[Case], engines: Mapping[str, Engine]) -> Iterator[tuple[Case, Record]]:
@@ -148,7 +148,7 @@ def _both_ways(cases: Sequence[Case], engines: Mapping[str, Engine]) -> Iterator
     times = interleaved(tasks, ROUNDS)
     for case in cases:
         straight = times.get(f"{case.name}, straight")
-        yield case, times[case.name].told("us") | ({"straight": straight.told("us")} if straight else {})
+        yield case, times[case.name].record("us") | ({"straight": straight.record("us")} if straight else {})
 
 
 def _outputs(cases: Sequence[Case]) -> Measured:
@@ -160,7 +160,7 @@ def _outputs(cases: Sequence[Case]) -> Measured:
         tasks[case.name] = partial(once, partial(dynamics.simulate, here.scene, here.bundles, silent))
     times = interleaved(tasks, RUNS)
     for case in cases:
-        yield case, [{"outputs": case.of, **times[case.name].told("s")}]
+        yield case, [{"outputs": case.of, **times[case.name].record("s")}]
 
 
 def with_modes(full: Mechanism, count: int) -> Mechanism:

@@ -65,7 +65,7 @@ def _of_chain(name: str, links: int) -> Record:
         "apart": float(np.abs(theirs - ours).max() / np.abs(theirs).max()),
         "evaluations": evaluations,
         "way": "articulated inertias" if engine.model.parts.articulated else "mass matrix",
-        **{label: found.told("us") for label, found in times.items()},
+        **{label: found.record("us") for label, found in times.items()},
         "ratio": times["theirs"].over(times["ours"]),
         "straight_ratio": times["theirs"].over(times["straight"]) if "straight" in times else None,
     }
@@ -88,7 +88,7 @@ def _record(name: str, loops: int) -> Record:
         "loops": loops,
         "apart": float(apart),
         "versions": {package: version(package) for package in ("pin", "mujoco")},
-        **{label: found.told("us") for label, found in times.items()},
+        **{label: found.record("us") for label, found in times.items()},
         "ratio": times["theirs"].over(times["ours"]),
         "straight_ratio": times["theirs"].over(times["straight"]),
     }

@@ -2,7 +2,7 @@
 
 The full scene, the planned one and the planning are timed alike: processor time of setting up, integrating and
 observing, code and reduced bodies being there. The true error is the difference of the planned run from the full one,
-over members that start a hair apart; what the members' spread explains is told beside it.
+over members that start a hair apart; what the members' spread explains is given next to it.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ MEMBERS = 3
 WORST, FRACTION, SECOND = 3.0, 0.2, 1.0
 #: what a run is warmed up over, as a share of its time
 WARM = 0.002
-#: processor times of full runs between which savings are told apart [s]
+#: processor times of full runs between which savings are divided [s]
 SIZES = (0.0, 0.3, 1.0, 3.0, np.inf)
 
 
@@ -55,7 +55,7 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
     from flexclear.stages.workplace import check, open_workplace
 
     made = drawn(seed, number, folder / "recipes")
-    scene, told = made.scene, dict(made.told)
+    scene, drawing = made.scene, dict(made.record)
     place = open_workplace()
     try:
         task = effect_plan.task(scene)
@@ -67,25 +67,25 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
         if planning > SECOND:  # that may have fetched code
             decided, planning = _planned(params, inputs)
     except FlexclearError as error:
-        return {**told, "verdict": REFUSED, "reason": str(error)}
+        return {**drawing, "verdict": REFUSED, "reason": str(error)}
     from flexclear.pipeline.post.answers.plan import dataset
 
     planned = plan.of(scene, dataset(decided, scene.title, {q.name: q.unit for q in scene.requested()}))
     full = edited(scene, {"accuracy": None})
-    chosen = [parse(name, scene.owners()) for name in made.told["wanted"]]
+    chosen = [parse(name, scene.owners()) for name in made.record["wanted"]]
     one, full_cpu = _run(full, inputs, chosen)
     two, planned_cpu = _run(planned, _reduced(inputs, decided.modes), chosen)
     if one.refused or two.refused:
-        return {**told, "verdict": WRONG if two.refused else REFUSED, "reason": one.refused or two.refused}
+        return {**drawing, "verdict": WRONG if two.refused else REFUSED, "reason": one.refused or two.refused}
     fractions, chances = {}, {}
     for q in chosen:
         apart = effect_size.influence(two, one, q, MEMBERS)
-        asked = made.told["wanted"][q.name]
+        asked = made.record["wanted"][q.name]
         requested = asked["absolute"] if "absolute" in asked else asked["relative"] * effect_size.size(one, q)
         fractions[q.name], chances[q.name] = apart.difference / requested, apart.uncertainty / requested
     worst = max(fractions.values())
     return {
-        **told,
+        **drawing,
         "share": worst,
         "chance": max(chances.values()),
         "kept": [d.effect.name for d in decided.decisions if d.kept],
@@ -155,7 +155,7 @@ def show(records: list[Record]) -> dict[str, str]:
         f"({np.percentile(saved, 25):.3g} to {np.percentile(saved, 75):.3g} for the middle half); planning within a "
         f"fifth of the full run or one second in {len(cheap)}, median {np.median([r['plan_s'] for r in done]):.2g} s. "
         f"In {len(unsure)} of those within, members part by more than what is wanted: there, no smaller difference "
-        "can be told."
+        "can be shown."
     )
     by_mechanism: Columns = {
         "mechanism": lambda r: r["mechanism"],
@@ -175,7 +175,7 @@ def show(records: list[Record]) -> dict[str, str]:
         for low, high in pairwise(SIZES)
         if (mine := [r for r in done if low <= r["full_s"] < high])
     ]
-    by_size: Columns = {"full run" if name == "mechanism" else name: told for name, told in by_mechanism.items()}
+    by_size: Columns = {"full run" if name == "mechanism" else name: column for name, column in by_mechanism.items()}
     missed: Columns = {
         "case": lambda r: r["case"],
         "mechanism": lambda r: r["mechanism"],
@@ -188,11 +188,11 @@ def show(records: list[Record]) -> dict[str, str]:
     }
     misses = [r for r in done if r["share"] > 1.0]
     other = [f"{r['case']}: {r['reason']}" for r in records if "share" not in r]
-    told = table(misses, missed) if misses else "None."
+    listed = table(misses, missed) if misses else "None."
     return {
         "summary": f"{text}\n\n{table(rows, by_mechanism)}\n\nBy the processor time of the full run:\n\n"
         f"{table(sizes, by_size)}",
-        "misses": "\n\n".join([told, *(["Not run: " + "; ".join(other)] if other else [])]),
+        "misses": "\n\n".join([listed, *(["Not run: " + "; ".join(other)] if other else [])]),
     }
 
 

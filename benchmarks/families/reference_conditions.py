@@ -22,7 +22,7 @@ COST: Columns = {"evaluations": lambda r: str(r["evaluations"]), "seconds": lamb
 def show(records: list[Row]) -> dict[str, str]:
     """In short, the paper's statements, and the tables of each group of rows that is there."""
     rows = {name: of for name in TABLES if (of := [r for r in records if r["case"] == name])}
-    judged = {"claims": claims.told(rows)} if "far" in rows and "clearance" in rows else {}
+    judged = {"claims": claims.judged(rows)} if "far" in rows and "clearance" in rows else {}
     return {"short": _short(rows)} | judged | {name: TABLES[name](rows) for name in rows}
 
 
@@ -175,7 +175,7 @@ def _clearance(rows: dict[str, list[Row]]) -> str:
         "v [mm/s]": lambda r: _spread(r, "velocity", 1e3, 2),
         "acceleration [m/s²]": lambda r: _spread(r, "acceleration", 1.0, 0),
     }
-    more = f"{' and '.join(map(str, MOST_COMPLETE))} coordinates beside {COUNT} show what more would change."
+    more = f"{' and '.join(map(str, MOST_COMPLETE))} coordinates next to {COUNT} show what more would change."
     return f"{_why_not_all(rows)}{more}\n\n{table(sorted(rows['clearance'], key=_order), {**SET, **columns, **COST})}"
 
 
@@ -220,7 +220,7 @@ def _is_mesh_study(row: Row) -> bool:
 
 
 def _layouts(rows: dict[str, list[Row]]) -> str:
-    return layouts.told(rows["layouts"])
+    return layouts.text(rows["layouts"])
 
 
 def _label(row: Row) -> str:

@@ -30,8 +30,8 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
         record = {
             "rtol": here.scene.solver.rtol,
             "evaluations": evaluations[here.name],
-            "integration": integration.told("s"),
-            "stage": times[f"{here.name} stage"].told("s"),
+            "integration": integration.record("s"),
+            "stage": times[f"{here.name} stage"].record("s"),
             "us_per_evaluation": 1e6 * integration.median / evaluations[here.name],
         }
         yield case, [record]

@@ -67,18 +67,18 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _body(shape: dict[str, Any]) -> Record:
-    told, begun = Parts(), time.process_time()
+    parts, begun = Parts(), time.process_time()
     recipe = {"interfaces": list(FRAMES), "shape": shape, "material": MATERIAL, "frames": FRAMES}
     mesh = of_recipe(recipe).build(recipe, Path())
-    modes = solve(mesh, "craig-bampton", COUNT, progress=told)
-    told(None, "inertia integrals")
+    modes = solve(mesh, "craig-bampton", COUNT, progress=parts)
+    parts(None, "inertia integrals")
     with tempfile.TemporaryDirectory() as folder:
         write_dataset(Path(folder) / "bundle.nc", bundle.build(mesh, modes))
-    told(None, "done")
+    parts(None, "done")
     return {
         "cells": f"{shape['element'].removeprefix('hex')}-node cells",
         "displacements": 3 * mesh.sizes["node"],
-        "seconds": told.seconds,
+        "seconds": parts.seconds,
         "together": time.process_time() - begun,
         "gibibytes": peak_memory() / 2**30,
     }

@@ -66,12 +66,12 @@ def _methods(done: Sequence[Record]) -> str:
 
 def _reasons(records: Sequence[Record]) -> str:
     """What the cases said that did not finish, with their numbers."""
-    told = [
+    lines = [
         f"- {r['verdict']} ({_place(r)}): {' '.join(r['reason'].split())}\n"
         for r in records
         if r["verdict"] != FINISHED
     ]
-    return f"What did not finish said:\n\n{''.join(told)}" if told else ""
+    return f"What did not finish said:\n\n{''.join(lines)}" if lines else ""
 
 
 def _place(record: Record) -> str:

@@ -1,1 +1,1 @@
-"""The mechanism's geometry, as far as the paper's Table 8 tells it: a family of layouts, and what it predicts."""
+"""The mechanism's geometry, as far as the paper's Table 8 determines it: a family of layouts, and what it predicts."""

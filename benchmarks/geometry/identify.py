@@ -27,13 +27,13 @@ DZ, DANGLE = 1e-3 * TABLE8.displacement / CLEARANCE, TABLE8.angle / CLEARANCE
 STEP = 0.01
 GRID = {"ay": (0.02, 0.08), "bx": (0.02, 0.36), "by": (0.02, 0.40)}
 #: limits: legs between ball centres, so that rods stay in their cylinders; joints of the platform within the circle
-#: through the corners of its plate, 200 mm square; cylinders of 20 and sockets of 25 mm beside each other [m]
+#: through the corners of its plate, 200 mm square; cylinders of 20 and sockets of 25 mm next to each other [m]
 SHORTEST, LONGEST, REACH, CYLINDERS, SOCKETS = 0.32, 0.46, 0.1 * np.sqrt(2.0), 0.04, 0.05
 WORST_CONDITION = 10.0
 #: the layout that was assumed before: joints of the platform on a circle of 100 mm, those of the base on one of 200 mm
 FIRST = Layout(0.086603, 0.05, 0.1, 0.173205, 0.35)
 #: what is printed has four digits: sensitivities within half a unit of the third, so that those count that have their
-#: largest value beside the start as well
+#: largest value next to the start as well
 AGREES = 1e-3
 
 
@@ -71,12 +71,12 @@ def family(step: float = STEP) -> list[Member]:
         if not admissible(layout):
             continue
         try:
-            told = answer(layout)
+            reached = answer(layout)
         except ValueError:
             continue
-        off = max(abs(told.dz / DZ - 1.0), abs(told.dangle / DANGLE - 1.0))
-        if off < AGREES and told.condition <= WORST_CONDITION and told.room >= CYLINDERS:
-            found.append(Member(layout, told))
+        off = max(abs(reached.dz / DZ - 1.0), abs(reached.dangle / DANGLE - 1.0))
+        if off < AGREES and reached.condition <= WORST_CONDITION and reached.room >= CYLINDERS:
+            found.append(Member(layout, reached))
     return found
 
 

@@ -108,8 +108,8 @@ def answer(layout: Layout, stroke: float = STROKE) -> Answer:
     moves = np.abs(np.linalg.inv(J)[:, :, 0]).max(axis=0)
     condition = np.linalg.cond(J @ np.diag([1.0, 1.0 / SCALE, 1.0 / SCALE, 1.0 / SCALE])).max()
     # of the angle asin R[0, 2] in a pose turned about y alone the rate is that of the rotation about y
-    told = float(moves[0]), float(moves[2]), float(np.ptp(heights)), float(np.abs(angles).max())
-    return Answer(*told, float(condition), _room(layout, heights, angles))
+    motion = float(moves[0]), float(moves[2]), float(np.ptp(heights)), float(np.abs(angles).max())
+    return Answer(*motion, float(condition), _room(layout, heights, angles))
 
 
 def _room(layout: Layout, heights: np.ndarray, angles: np.ndarray) -> float:

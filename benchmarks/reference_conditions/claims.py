@@ -15,13 +15,13 @@ from benchmarks.reference_conditions.design import FULL, PLACES, RIGID
 
 #: two answers agree, or one is right, when they differ by less than this share of the effect in question
 AGREE = 0.1
-#: an effect is small beside another below this share of it
+#: an effect is small next to another below this share of it
 SMALL = 0.01
 #: two ensembles differ when their means do by more than this many times the larger of their standard deviations
 DIFFER = 2.0
 #: FAR costs as much as ideal up to this factor (the paper: 1.15 to 1.21), FAR-CSJ twice CSJ within this factor of two
 COST = 1.5
-#: shares below this are not told apart in words
+#: shares below this are equal in words
 SHOWN = 1e-4
 #: largest deviations from the ideal mechanism: of the platform's angle, height and velocity, of the force at A1
 EFFECTS = ("angle", "displacement", "velocity", "force")
@@ -95,7 +95,7 @@ def numbers_of(groups: dict[str, list[Row]], place: int) -> Rows:
     return Rows(far, clearance)
 
 
-def told(groups: dict[str, list[Row]]) -> str:
+def judged(groups: dict[str, list[Row]]) -> str:
     """Every claim with its rule and the numbers of each place."""
     lines = []
     for claim, outcomes in verdicts(groups):
@@ -228,7 +228,7 @@ CLAIMS = (
     ),
     Claim("With ideal joints, so are fixed-fixed modes.", "The same.", _suited("fixed")),
     Claim(
-        "Beside clearance, the rod's flexibility hardly moves the platform (Tables 7 and 8).",
+        "Next to clearance, the rod's flexibility hardly moves the platform (Tables 7 and 8).",
         f"Angle and displacement change by less than {100.0 * SMALL:g} % of what clearance does to them.",
         _dominates,
     ),

@@ -36,7 +36,7 @@ COUNT, COUNTS = 13, (7, 13, 25, 49)
 FAR_COUNTS = (7, 13, 25)
 #: in the scene with clearance, where each costs an ensemble
 CLEARANCE_COUNTS = (7, 13, 25)
-#: there, the most complete sets; the last is the reference, and by the one before it is told how far it is settled
+#: there, the most complete sets; the last is the reference, and the one before it shows how far it is settled
 MOST_COMPLETE = (25, 37)
 #: ensembles of sets beyond COUNT have this share of the members: a run with 37 coordinates costs ten of those with 13
 LARGE_SETS = 0.5
@@ -44,7 +44,7 @@ LARGE_SETS = 0.5
 FINER = (1, 2, 4)
 #: layouts of the mechanism: that of the scenes, and every so manieth of the identified family on this grid [m]
 LAYOUT_GRID, EVERY = 0.02, 10
-#: there, the sets: the paper's two as few as it has them, and Craig-Bampton, of which the last stands for the full rod
+#: there, the sets: the paper's two as few as it has them, and Craig-Bampton, of which the last represents the full rod
 LAYOUT_SETS = (("free-free", 7), ("fixed-fixed", 7), ("craig-bampton", 13), ("craig-bampton", 25))
 #: times at which the assembled mechanism's frequencies are taken: the start and the full stroke [s]
 TIMES = (0.0, 0.09)
@@ -121,7 +121,7 @@ def _where(case: Case) -> str:
 
 
 def _told_apart(made: Task, case: Case) -> Task:
-    """The task and its inputs under the case's name: progress is told by name, and many cases share a scene."""
+    """The task and its inputs under the case's name: progress is shown by name, and many cases share a scene."""
     above = {name: _told_apart(task, case) for name, task in made.inputs.items()}
     return replace(made, scene=f"{made.scene}, {case.label}, elements x {case.finer}", inputs=above)
 

@@ -23,7 +23,7 @@ LAYOUT: Columns = {
 
 
 def rows_of(rows: list[Row], layout: int) -> Rows:
-    """Rows of one layout; with ideal joints the most complete set stands for the full rod."""
+    """Rows of one layout; with ideal joints the most complete set represents the full rod."""
     here = [r for r in rows if r["layout"] == layout]
     far, clearance = ([r for r in here if r["clearance"] == which] for which in (False, True))
     most = max((r for r in far if r["condition"] == "craig-bampton"), key=lambda r: r["count"])
@@ -36,10 +36,10 @@ def verdicts(rows: list[Row]) -> list[tuple[Claim, dict[int, tuple[bool, str]]]]
     return [(claim, {layout: claim.test(here) for layout, here in of.items()}) for claim in CLAIMS]
 
 
-def told(rows: list[Row]) -> str:
+def text(rows: list[Row]) -> str:
     """How many identified layouts each statement holds for, what that says of it, and the numbers behind it.
 
-    Rows that say `first` are those of the layout that was assumed before, whose verdict stands beside.
+    Rows that say `first` are those of the layout that was assumed before, whose verdict is next to it.
     """
     identified = [row for row in rows if not row.get("first")]
     before = verdicts([row for row in rows if row.get("first")])

@@ -41,7 +41,7 @@ reads them. This page is written from the schemas that every dataset is checked 
 the recipes run as tests.
 
 - **Units of entries.** Where some entries of a variable slide and others turn, as drives do, the variable has no
-  attribute `units`; the coordinate `<variable>_units` then tells the unit of each entry. Where all are of one kind, the
+  attribute `units`; the coordinate `<variable>_units` then gives the unit of each entry. Where all are of one kind, the
   attribute is there and the coordinate is not. The coordinate `<dimension>_motion` says which are which.
 - **Modal coordinates** belong to shapes with a modal mass of 1 kg, so that they have the unit m. (Texts that write
   sqrt(kg) m for mass-normalised modes mean the same numbers.)

@@ -8,6 +8,6 @@ from flexclear.pipeline.core.workflow.fingerprint import TREE
 
 
 def text() -> str:
-    """The README, with its links told from docs/."""
+    """The README, with its links as from docs/."""
     page = (TREE / "README.md").read_text(encoding="utf-8")
     return re.sub(r"\]\((docs/)?(?!http)([^)]+)\)", lambda m: f"]({'' if m[1] else '../'}{m[2]})", page)

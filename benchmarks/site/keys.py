@@ -19,7 +19,7 @@ from flexclear.pipeline.structure.fe.recipe import Recipe
 #: how `Field` describes what may be written as a number or with a unit
 _QUANTITY = re.compile(r"(?:^|; )([a-z ]+): SI number, or text with a unit$")
 _VECTORS = ("length", "angular velocity", "velocity", "number", "acceleration", "angle")
-_OWN_UNIT = "SI number, or text with a unit that fits where the law stands"
+_OWN_UNIT = "SI number, or text with a unit that fits where the law is"
 #: unit of a bare number
 SI = {
     "length": "m",
@@ -118,27 +118,27 @@ def _references(node: Any) -> Iterator[str]:
 
 def _section(name: str, definitions: dict[str, Any], examples: dict[str, str]) -> str:
     part = definitions[name]
-    told = str(part.get("description", "")).partition("\n\n")[0].replace("\n", " ")
-    told = re.split(r"(?<=\.) +\w[\w, ]*: ", told)[0]
+    entry = str(part.get("description", "")).partition("\n\n")[0].replace("\n", " ")
+    entry = re.split(r"(?<=\.) +\w[\w, ]*: ", entry)[0]
     key = _kind(part)
     example = f"```toml\n{examples[key]}\n```\n\n" if key in examples else ""
-    return f"## {_heading(name, part)}\n\n{told}\n\n{_table(part, definitions)}\n\n{example}"
+    return f"## {_heading(name, part)}\n\n{entry}\n\n{_table(part, definitions)}\n\n{example}"
 
 
 def _heading(name: str, part: dict[str, Any]) -> str:
     found = _MODULE.match(name)
     plain = (f"{found[2]} of {found[1]}" if found[2] else found[3]) if found else name
     words = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", plain)
-    told = _NAMES.get(plain, f"{words[0]}{words[1:].lower()}")
-    return f"{told} (`{_kind(part)}`)" if _kind(part) else told
+    entry = _NAMES.get(plain, f"{words[0]}{words[1:].lower()}")
+    return f"{entry} (`{_kind(part)}`)" if _kind(part) else entry
 
 
 def _kind(part: dict[str, Any]) -> str:
-    """What tells this part from others of its family: `type`, `law` or `integrator`, where it is one word."""
+    """What distinguishes this part from others of its family: `type`, `law` or `integrator`, where it is one word."""
     for key in ("type", "law", "integrator"):
-        told = part.get("properties", {}).get(key, {})
-        if "const" in told:
-            return str(told["const"])
+        entry = part.get("properties", {}).get(key, {})
+        if "const" in entry:
+            return str(entry["const"])
     return ""
 
 
@@ -150,46 +150,46 @@ def _anchor(name: str, definitions: dict[str, Any]) -> str:
 def _table(part: dict[str, Any], definitions: dict[str, Any]) -> str:
     required = part.get("required", [])
     rows = []
-    for key, told in part.get("properties", {}).items():
+    for key, entry in part.get("properties", {}).items():
         if key == "source":
             continue
-        default = "needed" if key in required else _default(told)
-        meaning = "this kind" if "const" in told else _meaning(told)
-        rows.append((f"`{key}`", _value(told, definitions), default, meaning))
+        default = "needed" if key in required else _default(entry)
+        meaning = "this kind" if "const" in entry else _meaning(entry)
+        rows.append((f"`{key}`", _value(entry, definitions), default, meaning))
     return table(("key", "value", "default", "meaning"), rows) if rows else "It has no keys."
 
 
-def _default(told: dict[str, Any]) -> str:
-    value = told.get("default")
+def _default(entry: dict[str, Any]) -> str:
+    value = entry.get("default")
     return "-" if value in (None, {}, [], "") or isinstance(value, dict) else f"`{json.dumps(value)}`"
 
 
-def _meaning(told: dict[str, Any]) -> str:
-    text = _QUANTITY.sub("", str(told.get("description", ""))).removesuffix(_OWN_UNIT).removesuffix("; ")
+def _meaning(entry: dict[str, Any]) -> str:
+    text = _QUANTITY.sub("", str(entry.get("description", ""))).removesuffix(_OWN_UNIT).removesuffix("; ")
     for vector in _VECTORS:
         text = text.removesuffix(f"; {vector}")
     return text.replace("\n", " ")
 
 
-def _value(told: dict[str, Any], definitions: dict[str, Any]) -> str:
+def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
     """What may be written there, in words."""
-    if "const" in told:
-        return f"`{json.dumps(told['const'])}`"
-    if "enum" in told:
-        return ", ".join(f"`{json.dumps(one)}`" for one in told["enum"])
-    if "$ref" in told:
-        name = told["$ref"].rpartition("/")[2]
+    if "const" in entry:
+        return f"`{json.dumps(entry['const'])}`"
+    if "enum" in entry:
+        return ", ".join(f"`{json.dumps(one)}`" for one in entry["enum"])
+    if "$ref" in entry:
+        name = entry["$ref"].rpartition("/")[2]
         return f"[{_heading(name, definitions[name])}](#{_anchor(name, definitions)})"
     for several in ("anyOf", "oneOf"):
-        if several in told:
-            kinds = [_value(one, definitions) for one in told[several] if one.get("type") != "null"]
-            if set(_references(told)) >= _LAW_KINDS and len(kinds) > 1:
+        if several in entry:
+            kinds = [_value(one, definitions) for one in entry[several] if one.get("type") != "null"]
+            if set(_references(entry)) >= _LAW_KINDS and len(kinds) > 1:
                 return f"[law of time](#{_anchor('Constant', definitions)}), or a constant value"
             return " or ".join(dict.fromkeys(kinds))
-    quantity = _QUANTITY.search(str(told.get("description", "")))
+    quantity = _QUANTITY.search(str(entry.get("description", "")))
     if quantity is not None:
         return _with_unit(quantity[1])
-    return _plain(told, definitions)
+    return _plain(entry, definitions)
 
 
 def _with_unit(quantity: str) -> str:
@@ -197,16 +197,16 @@ def _with_unit(quantity: str) -> str:
     return f"{quantity} [{SI[quantity]}]" if SI.get(quantity) else quantity
 
 
-def _plain(told: dict[str, Any], definitions: dict[str, Any]) -> str:
-    kind = told.get("type")
+def _plain(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
+    kind = entry.get("type")
     if kind == "array":
-        vector = next((v for v in _VECTORS if str(told.get("description", "")).endswith(v)), "")
+        vector = next((v for v in _VECTORS if str(entry.get("description", "")).endswith(v)), "")
         if vector:
             return f"three components, {_with_unit(vector)}"
-        inner = told.get("items") or (told.get("prefixItems") or [{}])[0]
+        inner = entry.get("items") or (entry.get("prefixItems") or [{}])[0]
         return f"list of {_value(inner, definitions)}" if inner else "list"
     if kind == "object":
-        inner = told.get("additionalProperties")
+        inner = entry.get("additionalProperties")
         return f"by name: {_value(inner, definitions)}" if isinstance(inner, dict) and inner else "table"
     words = {"string": "text", "number": "number", "integer": "whole number", "boolean": "true or false"}
     if isinstance(kind, list):

@@ -1,4 +1,4 @@
-"""A hook of MkDocs: links that lead out of docs/ lead to the sources at the project's address, or are told as text."""
+"""A hook of MkDocs: links that lead out of docs/ lead to the sources at the project's address, or become text."""
 
 from __future__ import annotations
 

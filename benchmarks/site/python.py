@@ -38,6 +38,6 @@ def text() -> str:
 def _section(name: str) -> str:
     function = getattr(fc, name)
     signature = str(inspect.signature(function)).replace("'", "")
-    told, _, example = (inspect.getdoc(function) or "").partition("\n\n>>> ")
+    text, _, example = (inspect.getdoc(function) or "").partition("\n\n>>> ")
     shown = f"```python\n>>> {example}\n```\n\n" if example else ""
-    return f"## {name}\n\n```python\nfc.{name}{signature}\n```\n\n{told}\n\n{shown}"
+    return f"## {name}\n\n```python\nfc.{name}{signature}\n```\n\n{text}\n\n{shown}"

@@ -67,7 +67,7 @@ def files(records: Sequence[Record]) -> dict[str, bytes]:
 
 
 def _axis(row: Record, name: str) -> float:
-    """Where a record stands on the axis of a parameter."""
+    """Where a record lies on the axis of a parameter."""
     value = float(row["parameters"][name])
     return 1.0 - value if name == "nearness" else value
 

@@ -60,7 +60,7 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 def run_case(parameters: Parameters, compiled: Callable[[], None] = lambda: None) -> Record:
     """What becomes of a case.
 
-    Refusals are outcomes; anything else that goes wrong is a fault of the program and told as such.
+    Refusals are outcomes; anything else that goes wrong is a fault of the program and listed as such.
     compiled: called when the kernels are there, so that a limit of time may begin.
     """
     begun = time.process_time()

@@ -77,7 +77,7 @@ def _show(name: str, settings: Sequence[str], *, quiet: bool) -> InputError | No
             scene = scenes.loaded(name, settings)
             scenes.require_names(scene)
             return show.shown(scene, quiet=quiet)[1]
-    except MISTAKES:  # told with all others
+    except MISTAKES:  # listed with all others
         pass
     return None
 

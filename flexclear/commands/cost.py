@@ -117,7 +117,7 @@ class Study:
     pace: float = 0.0
 
     def begin(self) -> None:
-        """Make the scene's own run, which tells what others will take.
+        """Make the scene's own run, which predicts what others will take.
 
         Raises FailedTasksError or SolverError where it cannot be made.
         """

@@ -29,7 +29,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
     "chaos": ("chaos.md", ("", "sps4/csj", "sps4/far_csj_cb"), (".png",)),
     "conditions": ("reference-conditions.md", ("In short", "What holds of the paper's statements"), ()),
 }
-#: of a run's attributes, those that the page tells
+#: of a run's attributes, those that the page shows
 FACTS = ("title", "method", "evaluations", "steps", "versions")
 
 

@@ -52,7 +52,7 @@ def test_make_bench_measures_all_that_stands_on_the_page_of_benchmarks(root: Pat
 def test_scenes_of_the_family_of_plans_can_be_drawn(number: int, tmp_path: Path):
     """They name scenes and recipes that are files of the program."""
     drawn = plan_scenes.drawn(3, number, tmp_path)
-    assert drawn.told["mechanism"] == plan_scenes.ORDER[number]
+    assert drawn.record["mechanism"] == plan_scenes.ORDER[number]
     assert all(Path(body.mesh).is_file() for body in drawn.scene.flexible().values())
 
 

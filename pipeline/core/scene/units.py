@@ -298,9 +298,9 @@ def _read(value: object, dimension: str) -> float:
         number, written = float(match[1]), match[2]
         factor, factor_and_dimension = (1.0, dimension) if written is None else _known_unit(written, dimension, value)
         if factor_and_dimension != dimension:
-            wanted = f"{a(dimension)} belongs here, in {_known(dimension)}"
-            wanted = "a number without a unit belongs here" if dimension == "number" else wanted
-            raise ValueError(f"'{value}' is {a(factor_and_dimension)}, but {wanted}")
+            rule = f"{a(dimension)} belongs here, in {_known(dimension)}"
+            rule = "a number without a unit belongs here" if dimension == "number" else rule
+            raise ValueError(f"'{value}' is {a(factor_and_dimension)}, but {rule}")
         result = number * factor
     else:
         result = float(value) if abs(value) <= sys.float_info.max else math.inf

@@ -24,7 +24,7 @@ def asset(name: str) -> str:
 def viewer(content: dict[str, Any], caption: str, *, play: bool = False) -> str:
     """A view that can be turned, as a figure; the page needs its script.
 
-    told: what `pipeline.post.render.player` makes.  play: whether it moves at once, unless the system asks for rest.
+    content: what `pipeline.post.render.player` makes.  play: whether it moves at once, unless the system asks for rest.
     """
     moving = "shapes" not in content
     still = moving and len(content["times"]) < 2
