@@ -19,6 +19,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
+from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.specialised import specialise
@@ -129,7 +130,7 @@ def evaluation_time(engine: Engine, state: State, repeat: int, *, straight: bool
     """
     set_state(engine, state)
     with _straight(engine) if straight else nullcontext():
-        return once(lambda: engine.evaluate(state.y, state.t, repeat)) / repeat
+        return once(lambda: singular.evaluate(engine, state.y, state.t, repeat)) / repeat
 
 
 @contextmanager

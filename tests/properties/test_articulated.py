@@ -13,6 +13,7 @@ from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.effects import Scheme
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
+from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.start import consistent_start
@@ -198,7 +199,7 @@ def test_factor_and_bias_in_full_are_those_of_the_mass_matrix(monkeypatch: pytes
     known = evaluated(tabulated(monkeypatch, scene, False), 0.0)
     one, h, w = engine(20), known.space.h, known.space.w
     y = w[h[m.Y] :][: one.model.ny]
-    one.evaluate(y, 0.0)
+    singular.evaluate(one, y, 0.0)
     L = dense_factor(known.model.arrays.table(m.ENVELOPE), w[h[m.MASS] :])
     found = mass_factor(one)
     assert apart(found @ found.T, L @ L.T) < 1e-13  # some hundred products of numbers of that size

@@ -20,6 +20,7 @@ from flexclear.pipeline.dynamics.model import initial, selection
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
+from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.specialised import specialise
@@ -125,9 +126,9 @@ def test_compiled_code_runs_as_the_kernels_do(integrator: str) -> None:
     for k in (0, len(kernels.rows) // 2):
         y = kernels.state[k]
         one.select_pieces_after(kernels.time[k])
-        generic = one.evaluate(y, kernels.time[k])
+        generic = singular.evaluate(one, y, kernels.time[k])
         one.h[m.EVALUATE], before_it = one.h[m.RATES], one.h[m.EVALUATE]
-        found = one.evaluate(y, kernels.time[k])
+        found = singular.evaluate(one, y, kernels.time[k])
         one.h[m.EVALUATE] = before_it
         assert apart(one.model, generic, found) < ROUNDING
 

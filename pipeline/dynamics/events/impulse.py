@@ -18,6 +18,7 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.interface_basis import modes_of
+from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
 from flexclear.pipeline.dynamics.run.engine import Engine
 from flexclear.pipeline.dynamics.run.observation import observe
@@ -53,7 +54,7 @@ def rows(engine: Engine, states: np.ndarray, t: float) -> np.ndarray:
 def blow(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) -> Blow:
     """The state y at time t after coordinates, by their names in records, are brought to rates [m/s or rad/s]."""
     model = engine.model
-    engine.evaluate(y, t)
+    singular.evaluate(engine, y, t)
     modes = modes_of(model.arrays)
     L = modes @ mass_factor(engine)
     M, J = L @ L.T, engine.rows(m.JACOBIAN) @ modes.T

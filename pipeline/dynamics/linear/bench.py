@@ -119,7 +119,7 @@ def drive_state(engine: Engine, time: float) -> np.ndarray:
     """Position and speed of every drive at a time, in the tree's sense, shape (known, 2)."""
     engine.select_pieces_after(time)
     # the laws say so on their way to any evaluation; the pose does not matter
-    engine.evaluate(initial.start_state(engine.model), time)
+    singular.evaluate(engine, initial.start_state(engine.model), time)
     return np.stack([engine.view(m.X)[engine.model.nq :], engine.view(m.U)[engine.model.nv :]], axis=1)
 
 
@@ -194,13 +194,16 @@ def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
 def displacement_map(bench: Bench, q: np.ndarray) -> np.ndarray:
     """Change of the positions per small displacement of each coordinate, shape (nq, nv)."""
     nq, nv = bench.model.nq, bench.model.nv
-    return np.array([bench.engine.evaluate(state(bench, q, e), bench.time)[:nq] for e in np.eye(nv)]).T.reshape(nq, nv)
+    changes = [singular.evaluate(bench.engine, state(bench, q, e), bench.time)[:nq] for e in np.eye(nv)]
+    return np.array(changes).T.reshape(nq, nv)
+        [singular.evaluate(bench.engine, state(bench, q, e), bench.time)[:nq] for e in np.eye(nv)]
+    ).T.reshape(nq, nv)
 
 
 def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance:
     """Forces, mass and closures in a state; SolverError where the equations are singular."""
     engine = bench.engine
-    engine.evaluate(state(bench, q, v), bench.time)
+    singular.evaluate(engine, state(bench, q, v), bench.time)
     forces = bias(engine)
     if not np.all(np.isfinite(forces)):
         raise SolverError(f"at t = {bench.time:.6g} s: the forces are not numbers in this pose")

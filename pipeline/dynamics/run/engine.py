@@ -23,9 +23,7 @@ from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import refuse_missed
-from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroup, Place
-from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 
 #: two breaks nearer than this fraction of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12
@@ -162,14 +160,6 @@ class Engine:
     def latched(self) -> np.ndarray:
         """Impact rates of the contacts [m/s], not copied."""
         return self.view(m.LATCHED)
-
-    def evaluate(self, y: np.ndarray, t: float, repeat: int = 1) -> np.ndarray:
-        """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
-        if not self.attempt(y, t, repeat):
-            if jammed(self):
-                raise SolverError(f"at t = {t:.6g} s: {explanation(self)}")
-            raise SolverError(f"at t = {t:.6g} s: the equations are singular in this pose: {singular.diagnosis(self)}")
-        return self.slope.copy()
 
     def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
         """Evaluate f(t, y) in the work space; whether it could be."""

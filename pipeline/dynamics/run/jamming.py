@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.engine import Engine
 
 
 def jammed(engine: Engine) -> bool:

@@ -1,32 +1,17 @@
-"""What is observed of rows of the record, their loops closed; also in singular poses, as a limit."""
+"""What is observed of rows of the record, their loops closed."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from flexclear.pipeline.core.numerics.rotations import continued
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations import observation
 from flexclear.pipeline.dynamics.equations.observation import Blocks, Frames, Observed
 from flexclear.pipeline.dynamics.integrate.recording import record_share
 from flexclear.pipeline.dynamics.run.engine import Engine
 
-if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.collocation import Collocation
-
 #: no row is projected to less than this fraction of the mechanism's size
 ROUNDING = 1e-14
-#: pivot ratios of the closures at which the equations hold eight digits of accelerations where loops are closed to
-#: 1e-14, and six, with which a row must do in whose own pose they hold nothing
-CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
-#: first distance in time from a singular pose, as fraction of the polynomial over it, its factor from try to try, and
-#: how many tries there are
-NEAREST, WIDER, TRIES = 1e-4, 2.0, 11
-#: where the state is evaluated, in units of the distance, and the weights there of the limit between: exact for
-#: quintics
-SIDES, WEIGHTS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([1.0, -6.0, 15.0, 15.0, -6.0, 1.0]) / 20.0
 
 
 def observe(engine: Engine, rows: np.ndarray, *, after: bool = False) -> Observed:
@@ -71,37 +56,3 @@ def _observe(engine: Engine, rows: np.ndarray, pieces: np.ndarray, tolerance: fl
         tolerance,
         out,
     )
-
-
-def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
-    """Whether a row of the record is so close to a singular pose that its accelerations and forces are rounding."""
-    one = m.record(row[None], len(engine.model.contacts))
-    seen = engine.attempt(one.state[0], float(one.time[0]))
-    return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear
-
-
-def observe_around(engine: Engine, row: np.ndarray, motion: Collocation, clear: float) -> Blocks | None:
-    """What is observed of such a row: the limit from both sides, of each block one row; None without one.
-
-    In the pose the closures' multipliers are not unique, and a smooth motion makes them continuous across it: the mean
-    of both sides, at a distance and at twice and thrice that, is but its sixth power from their value.  The states
-    there are those of the polynomial motion, which is also taken a little beyond its ends, under the laws that hold
-    between them.
-    clear: pivot ratio of the closures that the sides must have.
-    """
-    pieces = np.tile(engine.pieces[engine.segments(0.5 * (motion.start + motion.end), after=True)], (len(SIDES), 1))
-    for k in range(TRIES):
-        rows = np.tile(row, (len(SIDES), 1))
-        rows_around = m.record(rows, len(engine.model.contacts))
-        rows_around.time[:] += NEAREST * motion.span * WIDER**k * SIDES
-        rows_around.state[:] = motion.states(rows_around.time)
-        if not any(blurred(engine, side, clear) for side in rows):
-            seen = observe_with(engine, rows, pieces, ROUNDING)
-            if not np.any(seen["status"]):
-                turned = seen["body_quaternion"].reshape(len(SIDES), -1, 4)
-                seen["body_quaternion"] = continued(turned).reshape(len(SIDES), -1)
-                limit = {name: WEIGHTS @ block for name, block in seen.items()}
-                mean = limit["body_quaternion"].reshape(-1, 4)
-                limit["body_quaternion"] = (mean / np.linalg.norm(mean, axis=1, keepdims=True)).ravel()
-                return limit
-    return None

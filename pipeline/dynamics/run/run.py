@@ -26,9 +26,10 @@ from flexclear.pipeline.dynamics.equations.observation import Blocks, Observed
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run import trajectory as stepping
+from flexclear.pipeline.dynamics.run.collocation import CLEAR, NEARLY_CLEAR, blurred, observe_around
 from flexclear.pipeline.dynamics.run.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.observation import CLEAR, NEARLY_CLEAR, blurred, observe_around, observe_blocks
+from flexclear.pipeline.dynamics.run.observation import observe_blocks
 from flexclear.pipeline.dynamics.run.progress_rate import Judges, Panel
 from flexclear.pipeline.dynamics.run.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.projection import BLIND
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER
@@ -14,16 +13,23 @@ from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.mobility import INFINITE
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.numbering import Numbering
+from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 from flexclear.pipeline.dynamics.run.tree_factor import mass_factor
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.engine import Engine
 
 #: length that makes rows and coordinates of the closures comparable in condition numbers [m]
 SCALE = 0.1
 #: a selection is checked again when its pivot ratio has fallen to this fraction of what it was, and replaced when
 #: another is this much better; or this much, where a singular pose seems ahead that may only be one of the selection
 WORN, BETTER, CLEARLY = 1e-2, 10.0, 4.0
+
+
+def evaluate(engine: Engine, y: np.ndarray, t: float, repeat: int = 1) -> np.ndarray:
+    """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
+    if engine.attempt(y, t, repeat):
+        return engine.slope.copy()
+    why = explanation(engine) if jammed(engine) else f"the equations are singular in this pose: {diagnosis(engine)}"
+    raise SolverError(f"at t = {t:.6g} s: {why}")
 
 
 def select_rows(engine: Engine, y: np.ndarray, t: float) -> float:

@@ -83,7 +83,7 @@ def _look(engine: Engine, y: np.ndarray) -> None:
     if engine.mobility.singular_start:
         engine.attempt(y, engine.start)
     else:
-        engine.evaluate(y, engine.start)
+        singular.evaluate(engine, y, engine.start)
 
 
 def project(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -105,7 +105,7 @@ def rates_at_speeds(engine: Engine, y: np.ndarray, speeds: np.ndarray) -> np.nda
     """Rates of a state at the start with other speeds, as nearly as drives and loops allow."""
     moved = y.copy()
     moved[engine.model.speeds] = speeds
-    return engine.evaluate(project(engine, moved), engine.start)
+    return singular.evaluate(engine, project(engine, moved), engine.start)
 
 
 def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
@@ -113,7 +113,7 @@ def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
     contacts = engine.model.contacts
     if not contacts:
         return {}
-    engine.evaluate(y, engine.start)
+    singular.evaluate(engine, y, engine.start)
     gaps = engine.table(m.TOUCH)["gap"]
     return {c: -float(gaps[c]) for c, (_, joint, *_) in enumerate(contacts) if gaps[c] < -TOUCHING * joint.clearance}
 
