@@ -172,7 +172,8 @@ def test_coordinates_that_move_no_mass_are_noticed(articulated: bool, monkeypatc
     reports = []
     for coaxial in (True, False):
         model = tabulated(monkeypatch, Scene.model_validate(massless(coaxial)), articulated)
-        reports.append(evaluated(model).report)
+        with np.errstate(invalid="ignore"):  # a pivot that is rounding has either sign, and its root may be no number
+            reports.append(evaluated(model).report)
     assert reports == [m.NOT_POSITIVE, m.OK]
 
 

@@ -196,8 +196,6 @@ def displacement_map(bench: Bench, q: np.ndarray) -> np.ndarray:
     nq, nv = bench.model.nq, bench.model.nv
     changes = [singular.evaluate(bench.engine, state(bench, q, e), bench.time)[:nq] for e in np.eye(nv)]
     return np.array(changes).T.reshape(nq, nv)
-        [singular.evaluate(bench.engine, state(bench, q, e), bench.time)[:nq] for e in np.eye(nv)]
-    ).T.reshape(nq, nv)
 
 
 def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance:
