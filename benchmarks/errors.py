@@ -16,11 +16,11 @@ from flexclear.pipeline.core.scene.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.run.engine import Engine, another
-from flexclear.pipeline.dynamics.run.observation import frames
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
+from flexclear.pipeline.dynamics.run.evaluation.observation import frames
+from flexclear.pipeline.dynamics.run.evaluation.specialised import specialise
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import observed
-from flexclear.pipeline.dynamics.run.specialised import specialise
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
 #: two codes are compared at multiples of this [s], unless more rarely

@@ -19,11 +19,11 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.specialised import specialise
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
-from flexclear.pipeline.dynamics.run.specialised import specialise
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
 #: the scenes of the paper, from the least to the fullest
@@ -130,7 +130,7 @@ def evaluation_time(engine: Engine, state: State, repeat: int, *, straight: bool
     """
     set_state(engine, state)
     with _straight(engine) if straight else nullcontext():
-        return once(lambda: singular.evaluate(engine, state.y, state.t, repeat)) / repeat
+        return once(lambda: closure_rows.evaluate(engine, state.y, state.t, repeat)) / repeat
 
 
 @contextmanager

@@ -59,8 +59,8 @@ def processor_time() -> float:
 
 def warm(scene: Scene, reduced: Mapping[str, Labelled], progress: Progress) -> None:
     """Compile or fetch the kernels and call them, so that no measurement contains it."""
+    from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
     from flexclear.pipeline.dynamics.run.run import engine_of
-    from flexclear.pipeline.dynamics.run.start import consistent_start
 
     engine = engine_of(scene, reduced, progress)
     engine.entry.complete()

@@ -17,7 +17,7 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Ensemble
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow import cores
-from flexclear.pipeline.dynamics.run import specialised
+from flexclear.pipeline.dynamics.run.evaluation import specialised
 
 #: scenes, with as many members as the paper's ensembles have
 SCENES, MEMBERS = ("csj", "far_csj_cb"), 16

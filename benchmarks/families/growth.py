@@ -24,8 +24,8 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import FlexclearError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.specialised import specialise
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.specialised import specialise
 
 LOOPS = (5, 10, 20, 40, 80)
 #: of the flexible rod, of whose Craig-Bampton modes six are static; none cuts a pair of equal frequencies

@@ -20,9 +20,9 @@ from benchmarks.peers_models import CHAINS, LEAN, PEERS, bent
 from benchmarks.timing import interleaved, slope
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.specialised import specialise
-from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.specialised import specialise
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
 LOOPS = (5, 20)
@@ -53,7 +53,7 @@ def _of_chain(name: str, links: int) -> Record:
     for k, (angle, rate) in enumerate(zip(*bent(links), strict=True)):
         y[engine.model.numbering.positions[k + 1].start], y[nq + order[k]] = angle, rate
     state = State(engine.start, np.zeros(0), np.zeros(0), y)
-    ours, theirs = singular.evaluate(engine, y, state.t)[engine.model.speeds][order], peer.hinges()
+    ours, theirs = closure_rows.evaluate(engine, y, state.t)[engine.model.speeds][order], peer.hinges()
     repeat = max(EVALUATIONS // links, 10)
     tasks = {"theirs": partial(peer.time, repeat), "ours": partial(evaluation_time, engine, state, repeat)}
     specialise(engine)
@@ -77,7 +77,7 @@ def _record(name: str, loops: int) -> Record:
     state = State(engine.start, np.zeros(0), np.zeros(0), consistent_start(engine))
     links, numbering = engine.model.links, engine.model.numbering
     uprights = [numbering.coordinates[i][0] for i, link in enumerate(links) if i and link.kind == "revolute"]
-    ours = np.sort(singular.evaluate(engine, state.y, state.t)[engine.model.speeds][uprights])
+    ours = np.sort(closure_rows.evaluate(engine, state.y, state.t)[engine.model.speeds][uprights])
     repeat = max(EVALUATIONS // loops, 10)
     tasks: dict[str, Callable[[], float]] = {"theirs": partial(peer.time, repeat)}
     for label, straight in (("ours", False), ("straight", True)):

@@ -10,7 +10,7 @@ from benchmarks.page import Columns, spread, table
 from benchmarks.timing import interleaved, once
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
 ROUNDS = 5

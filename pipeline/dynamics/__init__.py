@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
     from flexclear.pipeline.dynamics.record.cost import Cost
-    from flexclear.pipeline.dynamics.run.method_selection import Suit
+    from flexclear.pipeline.dynamics.run.method_choice.method_selection import Suit
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
 __all__ = [
@@ -81,7 +81,7 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
             return once(scene, affordable(scene))
         except DearError as dear:
             progress(None, str(dear))
-    from flexclear.pipeline.dynamics.run.accuracy import by_default, deliver
+    from flexclear.pipeline.dynamics.run.method_choice.accuracy import by_default, deliver
 
     def compared(edited: Scene, judges: Judges | None = None) -> xr.Dataset:
         return once(edited, judges).to_xarray()
@@ -90,7 +90,7 @@ def simulated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress)
         return of(deliver(scene, compared, progress))
 
     def suited(edited: Scene) -> Suit:
-        from flexclear.pipeline.dynamics.run.method_selection import suit
+        from flexclear.pipeline.dynamics.run.method_choice.method_selection import suit
 
         return suit(edited, bundles)
 

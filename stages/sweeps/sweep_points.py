@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.record.point import Runner
-    from flexclear.pipeline.dynamics.run.batched_evaluation import Place
+    from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place
 
 #: runners that a worker keeps
 RUNNERS = 8

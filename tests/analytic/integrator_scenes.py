@@ -10,8 +10,8 @@ import numpy as np
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.run.engine import Engine, prepare
-from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
 #: a tolerance at which no projection is made within these short runs, so that the method alone is seen

@@ -21,8 +21,9 @@ from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import cores
 from flexclear.pipeline.dynamics.compile import stacks
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
-from flexclear.pipeline.dynamics.run import batched_evaluation, specialised, trajectory
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run import trajectory
+from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation, specialised
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.post import derive
 from tests.analytic.mechanism_runs import TREE, run
 from tests.reference import contact_solutions as exact

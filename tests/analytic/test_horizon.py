@@ -10,9 +10,9 @@ from flexclear.pipeline.core.artifacts.quantities import PERTURBATION, lasting
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.run.observation import frames
+from flexclear.pipeline.dynamics.run.evaluation.observation import frames
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 from flexclear.pipeline.post.single_run.horizon import horizon
 from tests.analytic.mechanism_runs import TREE, run

@@ -7,8 +7,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from tests.analytic.integrator_scenes import double_pendulum, engine_with, ledger_free, trajectory
 
 
@@ -18,7 +18,12 @@ def test_radau_goes_where_scipys_goes() -> None:
     start = consistent_start(engine)
     engine.select_pieces_after(0.5)
     known = solve_ivp(
-        lambda t, y: singular.evaluate(engine, y, t), (engine.start, engine.end), start, "Radau", rtol=1e-10, atol=1e-10
+        lambda t, y: closure_rows.evaluate(engine, y, t),
+        (engine.start, engine.end),
+        start,
+        "Radau",
+        rtol=1e-10,
+        atol=1e-10,
     )
     made = trajectory(double_pendulum(), {"integrator": "radau", "rtol": 1e-10})
     # both leave some hundred steps of rtol, with different norms

@@ -21,8 +21,8 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.effects import schemes
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.run import progress_rate, trajectory
-from flexclear.pipeline.dynamics.run.accuracy import FINER, Attempt, Search
-from flexclear.pipeline.dynamics.run.method_selection import Rates, Suit
+from flexclear.pipeline.dynamics.run.method_choice.accuracy import FINER, Attempt, Search
+from flexclear.pipeline.dynamics.run.method_choice.method_selection import Rates, Suit
 from flexclear.pipeline.dynamics.run.progress_rate import Look, limited, pace
 from tests.analytic.mechanism_runs import TREE, bundles
 

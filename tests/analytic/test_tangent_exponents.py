@@ -10,10 +10,10 @@ import pytest
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.run.exponent import Growth, growth, start_direction
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear.pipeline.dynamics.run.horizon.exponent import Growth, growth, start_direction
+from flexclear.pipeline.dynamics.run.horizon.tangents import differentiate
 from flexclear.pipeline.dynamics.run.run import engine_of
-from flexclear.pipeline.dynamics.run.start import consistent_start
-from flexclear.pipeline.dynamics.run.tangents import differentiate
 from tests.analytic.mechanism_runs import TREE
 from tests.analytic.test_horizon_ensembles import END, falling, horizons
 

@@ -11,7 +11,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics.record.dataset import dataset as dataset_of
-from flexclear.pipeline.dynamics.run import singular
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.run import integrate
 from tests.analytic import four_bars
 from tests.analytic.mechanism_runs import TREE, run
@@ -200,8 +200,8 @@ def test_the_motion_does_not_depend_on_which_rows_are_solved_for(monkeypatch: py
     """Rows chosen anew whenever others stand out a little more, instead of when the present ones are worn out."""
     scene = Scene.model_validate(table("bricard", **{"time.end": 2.0, "solver": {"rtol": 1e-12}}))
     once = integrate(scene, {}, lambda fraction, text: None)
-    monkeypatch.setattr(singular, "WORN", 0.99)
-    monkeypatch.setattr(singular, "BETTER", 1.0)
+    monkeypatch.setattr(closure_rows, "WORN", 0.99)
+    monkeypatch.setattr(closure_rows, "BETTER", 1.0)
     often = integrate(scene, {}, lambda fraction, text: None)
     changes = [[time for time, _ in run.trajectory.selections] for run in (once, often)]
     assert changes[0] != changes[1]
@@ -217,7 +217,7 @@ def test_rows_are_chosen_anew_before_the_present_ones_depend_on_each_other(monke
     assert not np.array_equal(first, second)
     assert not run.trajectory.collocations
     # without that they do depend on each other, and a polynomial has to lead over the time at which they do
-    monkeypatch.setattr(singular, "improve", lambda *_: False)
+    monkeypatch.setattr(closure_rows, "improve", lambda *_: False)
     (over,) = integrate(scene, {}, lambda fraction, text: None).trajectory.collocations
     assert over.start < 1.247 < over.end
 

@@ -16,9 +16,9 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear.pipeline.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest
 from flexclear.pipeline.dynamics.run.run import engine_of
-from flexclear.pipeline.dynamics.run.start import consistent_start
-from flexclear.pipeline.dynamics.run.validity import BENT, SPIN, doubts, largest
 from tests.analytic.mechanism_runs import TREE, bundles
 
 #: first clamped-free frequency of the beam in scenes/checks/spinup_beam.toml [rad/s], as its description has it

@@ -13,12 +13,12 @@ from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.effects import Scheme
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, mass_factor
 from flexclear.pipeline.dynamics.run.run import engine_of
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.dynamics.run.tree_factor import bias, mass_factor
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.articulated_chains import Evaluated, evaluated, rods, tabulated
 from tests.properties.mechanisms import Table
@@ -200,7 +200,7 @@ def test_factor_and_bias_in_full_are_those_of_the_mass_matrix(monkeypatch: pytes
     known = evaluated(tabulated(monkeypatch, scene, False), 0.0)
     one, h, w = engine(20), known.space.h, known.space.w
     y = w[h[m.Y] :][: one.model.ny]
-    singular.evaluate(one, y, 0.0)
+    closure_rows.evaluate(one, y, 0.0)
     L = dense_factor(known.model.arrays.table(m.ENVELOPE), w[h[m.MASS] :])
     found = mass_factor(one)
     assert apart(found @ found.T, L @ L.T) < 1e-13  # some hundred products of numbers of that size

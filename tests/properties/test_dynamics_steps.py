@@ -12,8 +12,8 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import trajectory as stepping
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import observed
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from tests.analytic.integrator_scenes import GRAVITY, double_pendulum, engine_with, spatial_four_bar, trajectory
 
 ADAPTIVE = [name for name, traits in INTEGRATORS.items() if traits.estimates]

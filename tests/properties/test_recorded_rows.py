@@ -13,10 +13,10 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.equations.named_bodies import put_quaternion
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.topology import topology
-from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.run import integrate as whole
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 from tests.analytic.mechanism_runs import TREE
 from tests.properties.kernels import from_python

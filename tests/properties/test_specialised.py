@@ -20,11 +20,11 @@ from flexclear.pipeline.dynamics.model import initial, selection
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.specialised import specialise
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of
-from flexclear.pipeline.dynamics.run.specialised import specialise
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 from flexclear.pipeline.dynamics.specialise import straight as straight_code
 from flexclear.pipeline.dynamics.specialise.code import Emitter
@@ -126,9 +126,9 @@ def test_compiled_code_runs_as_the_kernels_do(integrator: str) -> None:
     for k in (0, len(kernels.rows) // 2):
         y = kernels.state[k]
         one.select_pieces_after(kernels.time[k])
-        generic = singular.evaluate(one, y, kernels.time[k])
+        generic = closure_rows.evaluate(one, y, kernels.time[k])
         one.h[m.EVALUATE], before_it = one.h[m.RATES], one.h[m.EVALUATE]
-        found = singular.evaluate(one, y, kernels.time[k])
+        found = closure_rows.evaluate(one, y, kernels.time[k])
         one.h[m.EVALUATE] = before_it
         assert apart(one.model, generic, found) < ROUNDING
 

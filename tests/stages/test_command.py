@@ -200,7 +200,13 @@ def test_cite_tells_the_methods_of_every_run_from_those_that_only_some_need(comm
     some, _, _ = rest.partition("Data of")
     for module in ("integrate.dop853", "contact.normal.lankarani_nikravesh", "drives.step"):
         assert f"{module}:" in always
-    for module in ("integrate.radau", "integrate.newton", "run.periods", "linear.differences", "run.collocation"):
+    for module in (
+        "integrate.radau",
+        "integrate.newton",
+        "run.horizon.periods",
+        "linear.differences",
+        "run.singular_poses.collocation",
+    ):
         assert f"{module}:" in some
         assert f"{module}:" not in always
     assert "dynamics.compile" not in said

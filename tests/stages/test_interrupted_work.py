@@ -22,9 +22,10 @@ from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import cores, journal, schedule, stopping
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.pipeline.dynamics.run import pieces, progress_rate, specialised, trajectory
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run import pieces, progress_rate, trajectory
+from flexclear.pipeline.dynamics.run.evaluation import specialised
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.overview import comparison
 from tests.analytic.integrator_scenes import double_pendulum, engine_with

@@ -20,11 +20,12 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import cores, journal, stopping
-from flexclear.pipeline.dynamics.run import horizon, progress_rate, specialised, trajectory
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.horizon import Pair, PerturbedRun
+from flexclear.pipeline.dynamics.run import progress_rate, trajectory
+from flexclear.pipeline.dynamics.run.evaluation import specialised
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear.pipeline.dynamics.run.horizon.horizon import Pair, PerturbedRun, horizon
 from flexclear.pipeline.dynamics.run.run import engine_of, follow
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
 
 #: nobody waits longer for a thread that does what it should [s]
@@ -257,10 +258,11 @@ def test_both_are_stopped_in_good_order_and_go_on_to_the_same_bits(
 def test_what_is_kept_for_comparisons_alone_is_not_in_the_dataset(root: Path) -> None:
     """Ten outputs in the whole run, and comparisons between them."""
     scene = check(root, "bounce", **{"output.interval": 0.1})
-    run, pair = dynamics.simulate(scene, {}, silent), Pair(engine_of(scene, {}, silent))
+    engine = engine_of(scene, {}, silent)
+    run, pair = dynamics.simulate(scene, {}, silent), Pair(engine)
     assert run.sizes["separation_time"] >= len(pair.added) >= 0.9 * horizon.SAMPLES
     assert not np.isin(run.time.values, pair.added).any()
-    assert np.isin(trajectory.output_times(np.array([scene.time.start, scene.time.end]), 0.1), run.time.values).all()
+    assert np.isin(engine.output_times(0.1), run.time.values).all()
 
 
 def test_what_goes_on_meanwhile_is_ended_with_what_it_goes_on_beside(monkeypatch: pytest.MonkeyPatch) -> None:

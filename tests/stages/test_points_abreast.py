@@ -18,7 +18,8 @@ from flexclear.pipeline.dynamics.compile import stacks
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.record import point as points_of
 from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.pipeline.dynamics.run import alike, batched_evaluation
+from flexclear.pipeline.dynamics.run import alike
+from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
 from flexclear.stages.sweeps import sweep_engine, sweep_points
 
 SIDE_BY_SIDE = stacks.supported() and not INTERPRETED

@@ -26,7 +26,7 @@ from flexclear.pipeline.core.system.errors import InputError, ResourceError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
-from flexclear.pipeline.dynamics.run import engine
+from flexclear.pipeline.dynamics.run.evaluation import engine
 from flexclear.pipeline.post.overview.sweep_figures import figures
 from flexclear.stages.simulation import modules
 from flexclear.stages.sweeps import sweep_plan

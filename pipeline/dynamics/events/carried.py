@@ -14,8 +14,8 @@ from flexclear.pipeline.dynamics.effects import LOADS
 from flexclear.pipeline.dynamics.model.driving import coordinate_of, named_coordinate
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.stops import End
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.start import NO_IMPACT
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
 
 Slots = dict[tuple[str, ...], range]
 

@@ -18,12 +18,12 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.interface_basis import modes_of
-from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.observation import observe
-from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
-from flexclear.pipeline.dynamics.run.tree_factor import mass_factor
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapping
+from flexclear.pipeline.dynamics.run.evaluation.tree_factor import mass_factor
 
 #: singular values below this fraction of the largest are rounding
 RANK = 1e-9
@@ -54,7 +54,7 @@ def rows(engine: Engine, states: np.ndarray, t: float) -> np.ndarray:
 def blow(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) -> Blow:
     """The state y at time t after coordinates, by their names in records, are brought to rates [m/s or rad/s]."""
     model = engine.model
-    singular.evaluate(engine, y, t)
+    closure_rows.evaluate(engine, y, t)
     modes = modes_of(model.arrays)
     L = modes @ mass_factor(engine)
     M, J = L @ L.T, engine.rows(m.JACOBIAN) @ modes.T

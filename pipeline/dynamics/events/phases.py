@@ -23,13 +23,13 @@ from flexclear.pipeline.dynamics.events.joined import Happened, Phase, joined, s
 from flexclear.pipeline.dynamics.events.watch import Watch
 from flexclear.pipeline.dynamics.record.dataset import warnings
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.observation import observe
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges, Panel, crawls
 from flexclear.pipeline.dynamics.run.run import Run, follow, maker, observed, require_shallow
-from flexclear.pipeline.dynamics.run.start import consistent_start, mends
-from flexclear.pipeline.dynamics.run.trajectory import SLICE, Followed, Stop, Trajectory, never, output_times
+from flexclear.pipeline.dynamics.run.trajectory import SLICE, Followed, Stop, Trajectory, never
 from flexclear.pipeline.dynamics.starts.snapshot import moving
 
 if TYPE_CHECKING:
@@ -166,7 +166,7 @@ class _Plan:
         self, engine: Engine, made: Callable[[str, Progress], Engine], y: np.ndarray, watch: Watch, watched: bool
     ) -> tuple[Engine, Trajectory, str, str | None]:
         """The trajectory to the end of a phase, and the event whose condition ends it."""
-        times = output_times(engine.breaks, self.scene.output.interval, self.scene.time.start)
+        times = engine.output_times(self.scene.output.interval, self.scene.time.start)
         if not watched:
             return *self._steps(engine, made, y, never, times, SLICE), None
         span = self.scene.time.end - self.scene.time.start
@@ -185,7 +185,7 @@ class _Plan:
         if event is not None and until >= engine.end - END * span:
             event, until = None, engine.end
         short = replace(engine, end=until)
-        times = output_times(short.breaks, self.scene.output.interval, self.scene.time.start)
+        times = short.output_times(self.scene.output.interval, self.scene.time.start)
         return *self._steps(short, lambda n, p: replace(made(n, p), end=until), y, never, times, SLICE), event
 
     def _steps(

@@ -16,11 +16,11 @@ from flexclear.pipeline.dynamics.equations.observation import Blocks, by_name
 from flexclear.pipeline.dynamics.events.impulse import rows as rows_of
 from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named_coordinates
-from flexclear.pipeline.dynamics.run.engine import Engine, another
-from flexclear.pipeline.dynamics.run.observation import observe_blocks
-from flexclear.pipeline.dynamics.run.periods import Moment, handed
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe_blocks
+from flexclear.pipeline.dynamics.run.horizon.periods import Moment, handed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
 #: parts into which an interval is divided to look closer, and how often: what is left is a straight line
@@ -126,14 +126,14 @@ class Watch:
         open_events = np.array(begun).reshape(len(begun), m.EVENT.size)
         moment = Moment(first.state[0].copy(), modes, latched, watched, open_events)
         part = replace(engine, start=float(times[0]), end=float(times[-1]))
-        singular.select_rows(part, moment.y, part.start)
+        closure_rows.select_rows(part, moment.y, part.start)
         made = integrate(part, moment.y, silent, left=handed(part, moment), outputs=times)
         return made.rows[np.minimum(np.searchsorted(made.time, times), len(made.rows) - 1)]
 
     def _observed(self, rows: np.ndarray, *, after: bool = False) -> Blocks:
         one = m.record(rows[:1], len(self._engine.model.contacts))
         if self._engine.model.closures:
-            singular.select_rows(self._engine, one.state[0], float(one.time[0]))
+            closure_rows.select_rows(self._engine, one.state[0], float(one.time[0]))
         return observe_blocks(self._engine, rows, after=after)
 
     def _values(self, seen: Blocks, time: np.ndarray) -> dict[str, np.ndarray]:

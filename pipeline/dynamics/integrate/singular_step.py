@@ -1,11 +1,11 @@
 r"""Singular poses of the closures are foreseen, and passed in one step along a polynomial that lies ready.
 
-In a singular pose the closure rows depend on each other, and another branch of the motion crosses. Beside it a
-closure that is violated by C holds a state at :math:`C/\sigma` beside its branch, :math:`\sigma` being how independent
-the rows are. So what an integrator may err grows as the pose comes near: its steps shrink like the distance, never
-reach it, and at last rounding chooses the branch. What is smooth there is the motion itself, on its branch. So no
-method steps near the pose: where the zero of :math:`\sigma` is ahead the stepper stops, `run.collocation` lays the
-motion over the pose from states that are closed on both sides, and the stepper goes along that polynomial in one step,
+In a singular pose the closure rows depend on each other, and another branch of the motion crosses. Next to it a closure
+that is violated by C holds a state at :math:`C/\sigma` from its branch, :math:`\sigma` being how independent the rows
+are. So what an integrator may err grows as the pose comes near: its steps shrink like the distance, never reach it, and
+at last rounding chooses the branch. What is smooth there is the motion itself, on its branch. So no method steps near
+the pose: where the zero of :math:`\sigma` is ahead the stepper stops, `run.singular_poses.collocation` lays the motion
+over the pose from states that are closed on both sides, and the stepper goes along that polynomial in one step,
 whatever the method and its tolerance. Contacts are searched on it as on any dense output.
 """
 

@@ -21,11 +21,11 @@ from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.interface_basis import modes_of
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from flexclear.pipeline.dynamics.run import observation, singular
-from flexclear.pipeline.dynamics.run.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows, observation
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
+from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, mass_factor
 from flexclear.pipeline.dynamics.run.run import begun, driven
-from flexclear.pipeline.dynamics.run.start import NO_IMPACT
-from flexclear.pipeline.dynamics.run.tree_factor import bias, mass_factor
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
@@ -95,7 +95,7 @@ def hold(
     engine = prepare(replace(model, arrays=arrays), progress)
     start = initial.start_state(model)
     engine.select_pieces_after(engine.start)
-    singular.select_rows(engine, start, engine.start)
+    closure_rows.select_rows(engine, start, engine.start)
     at = engine.start if time is None else time
     first, last = drive_state(engine, engine.start), drive_state(engine, at)
     if not moving:
@@ -119,7 +119,7 @@ def drive_state(engine: Engine, time: float) -> np.ndarray:
     """Position and speed of every drive at a time, in the tree's sense, shape (known, 2)."""
     engine.select_pieces_after(time)
     # the laws say so on their way to any evaluation; the pose does not matter
-    singular.evaluate(engine, initial.start_state(engine.model), time)
+    closure_rows.evaluate(engine, initial.start_state(engine.model), time)
     return np.stack([engine.view(m.X)[engine.model.nq :], engine.view(m.U)[engine.model.nv :]], axis=1)
 
 
@@ -194,14 +194,14 @@ def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
 def displacement_map(bench: Bench, q: np.ndarray) -> np.ndarray:
     """Change of the positions per small displacement of each coordinate, shape (nq, nv)."""
     nq, nv = bench.model.nq, bench.model.nv
-    changes = [singular.evaluate(bench.engine, state(bench, q, e), bench.time)[:nq] for e in np.eye(nv)]
+    changes = [closure_rows.evaluate(bench.engine, state(bench, q, e), bench.time)[:nq] for e in np.eye(nv)]
     return np.array(changes).T.reshape(nq, nv)
 
 
 def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance:
     """Forces, mass and closures in a state; SolverError where the equations are singular."""
     engine = bench.engine
-    singular.evaluate(engine, state(bench, q, v), bench.time)
+    closure_rows.evaluate(engine, state(bench, q, v), bench.time)
     forces = bias(engine)
     if not np.all(np.isfinite(forces)):
         raise SolverError(f"at t = {bench.time:.6g} s: the forces are not numbers in this pose")

@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.linear.bench import Bench, balance, closed, hol
 from flexclear.pipeline.dynamics.linear.equilibrium import BALANCED, LONGEST, SHORT, Equilibrium, descend, residual
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, stiffness, tangent
 from flexclear.pipeline.dynamics.linear.vibrations import NOTHING, Vibrations, vibrations
-from flexclear.pipeline.dynamics.run.singular import built_rows
+from flexclear.pipeline.dynamics.run.evaluation.closure_rows import built_rows
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled

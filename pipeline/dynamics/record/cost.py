@@ -17,15 +17,15 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.dynamics.record.dataset import dataset
-from flexclear.pipeline.dynamics.run.engine import Engine, another
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.run import Run, engines, follow, observed
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Trajectory
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
-    from flexclear.pipeline.dynamics.run.horizon import PerturbedRun
+    from flexclear.pipeline.dynamics.run.horizon.horizon import PerturbedRun
 
 #: an integration is repeated so often, and short ones until they have taken this time together, but no more often than
 #: that: a disturbance of a millisecond is a tenth of some. What has taken LONG is an average by itself [s]
@@ -82,7 +82,7 @@ def _followed(
     """The run, and unless it runs alone the perturbed run after it: a measured run has no other next to it."""
     if alone:
         return *follow(engine, start, progress, other), None
-    from flexclear.pipeline.dynamics.run.horizon import Pair
+    from flexclear.pipeline.dynamics.run.horizon.horizon import Pair
 
     pair = Pair(engine)
     followed = pair.run(lambda *text: follow(engine, start, progress, other, None, *text))

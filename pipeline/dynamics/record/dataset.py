@@ -220,7 +220,7 @@ def _flexible_warnings(run: Run) -> list[str]:
     """Sentences about flexible bodies that left the range of linear modes."""
     if not run.model.numbering.flexible:
         return []
-    from flexclear.pipeline.dynamics.run import validity
+    from flexclear.pipeline.dynamics.run.refusals import validity
 
     return validity.warnings(run.model, run.trajectory.time, run.observed)
 

@@ -23,16 +23,16 @@ from flexclear.pipeline.core.workflow.cores import side_by_side, width
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
-from flexclear.pipeline.dynamics.run.batched_evaluation import Place
-from flexclear.pipeline.dynamics.run.engine import Engine, another
-from flexclear.pipeline.dynamics.run.horizon import offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place
+from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
+from flexclear.pipeline.dynamics.run.evaluation.specialised import abreast
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
 from flexclear.pipeline.dynamics.run.run import engines, follow, observed
-from flexclear.pipeline.dynamics.run.singular import select_rows
-from flexclear.pipeline.dynamics.run.specialised import abreast
-from flexclear.pipeline.dynamics.run.start import consistent_start
-from flexclear.pipeline.dynamics.run.trajectory import Trajectory, output_times
+from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
@@ -117,7 +117,7 @@ def kept_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> l
 
 def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Dataset:
     model = engine.model
-    regular = output_times(engine.breaks, model.scene.output.interval)
+    regular = engine.output_times(model.scene.output.interval)
     peak, count, fraction = _contact_statistics(engine, trajectory)
     rows = np.searchsorted(trajectory.time, regular)
     seen = observed(engine, trajectory)

@@ -28,15 +28,15 @@ from flexclear.pipeline.dynamics.record.ensemble import ball_offsets
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.run.alike import engines_alike
-from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroups, Place, groups
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.horizon import offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroups, Place, groups
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.specialised import side_by_side
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.horizon.periods import Cursor, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.periods import Cursor, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
 from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallow
-from flexclear.pipeline.dynamics.run.specialised import side_by_side
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -23,11 +23,18 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.ensemble import kept_bodies
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.periods import SEPARATION, Cursor, Period, periods, require_periodic, stretches
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear.pipeline.dynamics.run.horizon.periods import (
+    SEPARATION,
+    Cursor,
+    Period,
+    periods,
+    require_periodic,
+    stretches,
+)
 from flexclear.pipeline.dynamics.run.pieces import digest, memory, remember
 from flexclear.pipeline.dynamics.run.run import engines, observed
-from flexclear.pipeline.dynamics.run.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -9,8 +9,8 @@ import numpy as np
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.model.mobility import INFINITE
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
@@ -31,14 +31,14 @@ def topology(run: Run) -> tuple[Variables, dict[str, object]]:
     redundant = np.array([name in engine.mobility.redundant_joints for name in run.scene.joint], dtype=np.int8)
     variables: Variables = {"reaction_redundant": (("joint",), redundant)}
     rows, nv = len(trajectory.rows), engine.model.nv
-    indicators = _singular_values(engine, trajectory, seen, singular.scaled)
+    indicators = _singular_values(engine, trajectory, seen, closure_rows.scaled)
     rank = np.full(rows, indicators.shape[1], dtype=np.int32)
     if indicators.shape[1]:
         least = np.maximum(indicators[:, -1], indicators[:, 0] / INFINITE)
         condition = variables["condition"] = (("time",), np.minimum(indicators[:, 0] / least, INFINITE))
         singular_rows = condition[1] > WELL
         if singular_rows.any():
-            values = _singular_values(engine, trajectory, seen, singular.natural)[singular_rows]
+            values = _singular_values(engine, trajectory, seen, closure_rows.natural)[singular_rows]
             rank[singular_rows] = np.sum(values > ZERO * values[:, :1], axis=1)
     variables["rank"] = (("time",), rank)
     variables["mobility"] = (("time",), (nv - rank).astype(np.int32))

@@ -12,7 +12,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.effects import scheme_of
 from flexclear.pipeline.dynamics.model.refill import refilled
-from flexclear.pipeline.dynamics.run.engine import Engine, assemble
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, assemble
 from flexclear.pipeline.dynamics.run.run import engine_of, engines
 
 if TYPE_CHECKING:

@@ -37,11 +37,11 @@ from flexclear.pipeline.dynamics.model.driving import coordinate_of
 from flexclear.pipeline.dynamics.model.laws import NONE
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, label
-from flexclear.pipeline.dynamics.run.engine import Engine, prepare
-from flexclear.pipeline.dynamics.run.observation import observe
-from flexclear.pipeline.dynamics.run.start import consistent_start
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     names = [a for path in requested.values() for a in path.actuators or ()]
     _with_drives(scene, requested, names)  # all of them can be named, before anything is compiled
     engine, start = _started(scene, bundles, progress)
-    singular.evaluate(engine, start, engine.start)
+    closure_rows.evaluate(engine, start, engine.start)
     alone = _enough(engine, scene, requested, names)
     trajectory, *sides = _run(engine, start, progress)
     before, after = (joint_coordinates(engine.model, seen) for seen in sides)
@@ -247,7 +247,7 @@ def _least(
     least = []
     for t, state, force in zip(time, seen.state, forces, strict=True):
         engine.select_pieces_after(min(t + 1e-9 * (time[-1] - time[0]), 0.5 * (time[-1] + time[-2])))
-        singular.evaluate(engine, state, float(t))
+        closure_rows.evaluate(engine, state, float(t))
         free = null_space(_closure_jacobian(engine), rcond=RANK)
         rates = np.array([_rate(engine, scene, name) @ free for name in names])
         T = rates @ np.linalg.pinv(rates[own], rcond=RANK)

@@ -19,12 +19,12 @@ from flexclear.pipeline.core.workflow.journal import Journal, State
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.folder import processor
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.progress_rate import Look
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.collocation import Collocation
-    from flexclear.pipeline.dynamics.run.singular_pass import Pass
+    from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
 
 #: arrays of an engine that change as it works
 MEMORY = ("w", "n", "h", "selected")
@@ -153,8 +153,8 @@ class Piece:
 
     def restore(self, state: State, outputs: np.ndarray) -> None:
         """Put engine and tape into the state that was found."""
-        from flexclear.pipeline.dynamics.run.collocation import Collocation
-        from flexclear.pipeline.dynamics.run.singular_pass import Pass
+        from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
+        from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
 
         arrays, notes = state.arrays, state.notes
         remember(self.engine, arrays)

@@ -12,8 +12,8 @@ from flexclear.pipeline.core.scene.load import with_numbers
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run import refusal
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.refusals import refusal
 
 #: an explicit method is given up when it is stiff after so many evaluations and would need so many in all
 TRIAL, HOPELESS = 400_000, 10_000_000

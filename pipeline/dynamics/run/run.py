@@ -26,18 +26,18 @@ from flexclear.pipeline.dynamics.equations.observation import Blocks, Observed
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.run import trajectory as stepping
-from flexclear.pipeline.dynamics.run.collocation import CLEAR, NEARLY_CLEAR, blurred, observe_around
-from flexclear.pipeline.dynamics.run.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe_blocks
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.ledger import require_closed
-from flexclear.pipeline.dynamics.run.observation import observe_blocks
 from flexclear.pipeline.dynamics.run.progress_rate import Judges, Panel
-from flexclear.pipeline.dynamics.run.start import consistent_start, mends
+from flexclear.pipeline.dynamics.run.singular_poses.collocation import CLEAR, NEARLY_CLEAR, blurred, observe_around
 from flexclear.pipeline.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
-    from flexclear.pipeline.dynamics.run.collocation import Collocation
-    from flexclear.pipeline.dynamics.run.horizon import PerturbedRun
+    from flexclear.pipeline.dynamics.run.horizon.horizon import PerturbedRun
+    from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,7 @@ def integrate(
 
     if not engine.model.contacts:
         return checked(lambda: steps(engine, start, progress, ours, never))
-    from flexclear.pipeline.dynamics.run.horizon import Pair
+    from flexclear.pipeline.dynamics.run.horizon.horizon import Pair
 
     pair = Pair(engine)
 

@@ -13,7 +13,7 @@ from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import LOADS
 from flexclear.pipeline.dynamics.model.gauges import values
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 #: a break is a sample when it is off by no more than this fraction of the period
 NEAR = 1e-6

@@ -14,17 +14,18 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
-from flexclear.pipeline.dynamics.run import refusal, singular
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
+from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapping
 from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Piece, Selections, Tape, in_order, piece
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, crawls, look
-from flexclear.pipeline.dynamics.run.reach import require_shallow
-from flexclear.pipeline.dynamics.run.specialised import settle
-from flexclear.pipeline.dynamics.run.start import NO_IMPACT, overlapping
+from flexclear.pipeline.dynamics.run.refusals import refusal
+from flexclear.pipeline.dynamics.run.refusals.reach import require_shallow
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.collocation import Collocation
-    from flexclear.pipeline.dynamics.run.singular_pass import Pass
+    from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
@@ -47,7 +48,9 @@ def never(rows: np.ndarray) -> bool:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """What the stepper left. rows: of the record (see `memory.record`); events: of the event table, by time.
+    """What the stepper left.
+
+    rows: of the record (see `memory.record`); events: of the event table, by time.
     contacts: number of clearance joints.  selections: closure rows solved for, each from a time on.
     drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
@@ -106,18 +109,6 @@ class StiffError(SolverError):
         self.handover = handover
 
 
-def output_times(breaks: np.ndarray, interval: float, origin: float | None = None) -> np.ndarray:
-    """Regular output times and all breaks, increasing; times nearer than rounding are one.
-    origin: from which the regular ones are counted [s]; the first break by default.
-    """
-    origin = breaks[0] if origin is None else origin
-    first = int(np.ceil((breaks[0] - origin) / interval))
-    regular = origin + interval * np.arange(first, int(np.floor((breaks[-1] - origin) / interval * (1 + 1e-12))) + 1)
-    after = np.clip(np.searchsorted(breaks, regular), 1, len(breaks) - 1)
-    distinct = np.minimum(np.abs(regular - breaks[after - 1]), np.abs(regular - breaks[after])) > 1e-9 * interval
-    return np.union1d(regular[distinct], breaks)
-
-
 def integrate(
     engine: Engine,
     y: np.ndarray,
@@ -129,6 +120,7 @@ def integrate(
     jumps: Jumps | None = None,
 ) -> Trajectory:
     """The trajectory from a consistent start; SolverError when the stepper gives up.
+
     stop: asked now and then with the rows recorded so far, whether they are enough; also of what an earlier attempt has
         left.
     left: what another method left of this run; it is continued from there.
@@ -140,7 +132,7 @@ def integrate(
     """
     judge = judge or Judge(SLICE, crawls)
     if outputs is None:
-        outputs = output_times(engine.breaks, engine.model.scene.output.interval)
+        outputs = engine.output_times(engine.model.scene.output.interval)
     mine = piece(engine, y, outputs, left)
     why = stopping.requested()
     if why and (mine is None or not mine.done):  # many short integrations never pause
@@ -265,15 +257,15 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
 
 def _select(engine: Engine, y: np.ndarray, t: float) -> np.ndarray:
     """Choose the closure rows in a state, from which the integration continues; a copy of the choice."""
-    ratio = singular.select_rows(engine, y, t)
+    ratio = closure_rows.select_rows(engine, y, t)
     engine.view(m.Y)[:] = y
-    engine.view(m.PIVOT)[:] = 1.0, singular.WORN * ratio if engine.mobility.redundant else 0.0
+    engine.view(m.PIVOT)[:] = 1.0, closure_rows.WORN * ratio if engine.mobility.redundant else 0.0
     return engine.selected.copy()
 
 
 def _leave_singular_start(engine: Engine, tape: Tape) -> None:
     """Leave a way out of the singular start to the stepper, and begin with the speeds of its branch."""
-    from flexclear.pipeline.dynamics.run.singular_start import start_motion  # which few mechanisms need
+    from flexclear.pipeline.dynamics.run.singular_poses.beginning import start_motion  # which few mechanisms need
 
     first = m.record(tape.rows[:1], len(engine.model.contacts)).state[0]
     engine.select_pieces_after(engine.start)
@@ -332,7 +324,7 @@ def _segment(
         elif status == m.SINGULAR_AHEAD:
             _pass_over(engine, tape)
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
-            if singular.improve(engine, t):
+            if closure_rows.improve(engine, t):
                 tape.selections.append((t, engine.selected.copy()))
             elif status != m.WORN_ROWS and not _rescued(engine, tape):
                 raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
@@ -367,7 +359,7 @@ def _warn(engine: Engine, tape: Tape, progress: Progress) -> None:
     """Say once of each flexible body that it leaves the range of its modes, before that may end the run."""
     if not engine.model.numbering.flexible:
         return
-    from flexclear.pipeline.dynamics.run.validity import doubts
+    from flexclear.pipeline.dynamics.run.refusals.validity import doubts
 
     for sentence in doubts(engine):
         body = sentence.partition(":")[0]
@@ -382,10 +374,10 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     Other rows, if these alone do; else a polynomial over the singular pose.
     """
     t = float(engine.control[m.TIME])
-    if engine.mobility.redundant and singular.improve(engine, t, singular.CLEARLY):
+    if engine.mobility.redundant and closure_rows.improve(engine, t, closure_rows.CLEARLY):
         tape.selections.append((t, engine.selected.copy()))
         return True
-    from flexclear.pipeline.dynamics.run.singular_pass import SAME, lay_over
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import SAME, lay_over
 
     made, passes = lay_over(engine)
     if made is not None:
@@ -400,7 +392,7 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
     control, status = engine.control, engine.n[m.STATUS]
     if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
         return False
-    from flexclear.pipeline.dynamics.run.singular_pass import foresee_at_start
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import foresee_at_start
 
     ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
     return (ahead or foresee_at_start(engine)) and _pass_over(engine, tape)

@@ -17,10 +17,10 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, subject
-from flexclear.pipeline.dynamics.run.exponent import growth, start_direction
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear.pipeline.dynamics.run.horizon.exponent import growth, start_direction
+from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, differentiate
 from flexclear.pipeline.dynamics.run.run import engine_of
-from flexclear.pipeline.dynamics.run.start import consistent_start
-from flexclear.pipeline.dynamics.run.tangents import Differentiated, differentiate
 from flexclear.pipeline.dynamics.sensitivity.parameters import Family
 from flexclear.pipeline.dynamics.sensitivity.series import NORMAL_FORCE, Series, derivatives, read
 

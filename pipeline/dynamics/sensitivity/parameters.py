@@ -12,9 +12,9 @@ from flexclear.pipeline.core.scene.load import number_at, with_numbers
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.run.alike import engines_alike
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.start import consistent_start
-from flexclear.pipeline.dynamics.run.tangents import Direction
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear.pipeline.dynamics.run.horizon.tangents import Direction
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled

@@ -18,9 +18,9 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated
 from flexclear.pipeline.dynamics.run.run import observed
-from flexclear.pipeline.dynamics.run.tangents import Differentiated
 from flexclear.pipeline.dynamics.sensitivity.parameters import Family, Parameter, central
 
 #: steps along a direction, in its units: powers of ten between these; the widest also as a fraction of the size of

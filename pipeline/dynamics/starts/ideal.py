@@ -24,12 +24,12 @@ from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.engine import Engine, prepare
-from flexclear.pipeline.dynamics.run.horizon import offset_jacobian
-from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, project, rates_at_speeds
+from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian
 from flexclear.pipeline.dynamics.run.run import driven
-from flexclear.pipeline.dynamics.run.start import consistent_start, project, rates_at_speeds
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
 if TYPE_CHECKING:
@@ -128,7 +128,7 @@ def _bent(engine: Engine, y: np.ndarray, change: np.ndarray) -> np.ndarray:
 
 def _pulled(engine: Engine, y: np.ndarray, speeds: list[int]) -> np.ndarray:
     """Return the accelerations of the modal coordinates, shape (n,)."""
-    return singular.evaluate(engine, y, engine.start)[speeds].copy()
+    return closure_rows.evaluate(engine, y, engine.start)[speeds].copy()
 
 
 def _modal_speeds(engine: Engine) -> list[int]:
@@ -154,7 +154,7 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
     pins = [contact.name in loose(model.scene) for contact in model.contacts]
     bent = y[_modes(engine)]
     for _ in range(PASSES):
-        singular.evaluate(engine, y, engine.start)
+        closure_rows.evaluate(engine, y, engine.start)
         sites, missing = engine.table(m.SITE_FRAMES), []
         for row, contact, law, pin in zip(contacts, model.contacts, model.laws, pins, strict=True):
             if not pin:

@@ -16,8 +16,8 @@ from flexclear.pipeline.core.scene.start import JointStart, ModalStart, Start
 from flexclear.pipeline.core.scene.units import LARGEST
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.initial import centre_of
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 Vector = tuple[float, float, float]
 
@@ -27,7 +27,7 @@ def posed(scene: Scene, engine: Engine, y: np.ndarray, t: float) -> Scene:
 
     Velocities are those of the scene.  What the scene says of joints' positions and where to begin is left out.
     """
-    singular.evaluate(engine, y, t)
+    closure_rows.evaluate(engine, y, t)
     frames, model, bodies = engine.table(m.LINK_FRAMES), engine.model, dict[str, Any]()
     for name, body in scene.body.items():
         i = model.mechanism.link_of[name]

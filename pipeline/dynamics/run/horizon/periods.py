@@ -23,9 +23,9 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.driving import prescribed
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import project
 from flexclear.pipeline.dynamics.run.pieces import Handover
-from flexclear.pipeline.dynamics.run.start import project
 from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, integrate
 
 #: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together

@@ -15,8 +15,8 @@ import numpy as np
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.contact.validity import SHALLOW
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.start import project, rates_at_speeds
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import project, rates_at_speeds
 
 #: times ahead at which the least depth is searched for
 AHEAD = 60

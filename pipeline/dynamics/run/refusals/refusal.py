@@ -7,10 +7,10 @@ import numpy as np
 from flexclear.pipeline.core.scene.plausibility import negative_gains
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.bushings import overturned
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
-from flexclear.pipeline.dynamics.run.reach import beyond_reach, end_in_pose
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.jamming import explanation, jammed
+from flexclear.pipeline.dynamics.run.refusals.reach import beyond_reach, end_in_pose
 
 #: above this fraction of steps that stability limits, stiffness is named as the cause of a long run
 STIFF_SHARE = 0.3
@@ -33,7 +33,7 @@ def text(engine: Engine, rows: np.ndarray) -> str:
         message = beyond_reach(engine) or end_in_pose(engine, rows)
         if message:
             return message
-    where = singular.diagnosis(engine)
+    where = closure_rows.diagnosis(engine)
     culprit = contacts[n[m.CULPRIT]].words if contacts else ""
     fixed = f"{control[m.FIXED]:.2g} s"
     too_long = f"the fixed step of {fixed} is too long for it, or " if control[m.FIXED] else ""
@@ -73,7 +73,7 @@ def _doubts(engine: Engine) -> str:
         return f"; a negative gain pushes away from the reference: {', '.join(gains)}"
     if not engine.model.numbering.flexible:
         return ""
-    from flexclear.pipeline.dynamics.run.validity import doubts
+    from flexclear.pipeline.dynamics.run.refusals.validity import doubts
 
     return "".join(f"; {sentence}" for sentence in doubts(engine))
 

@@ -26,11 +26,11 @@ from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import TICK
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.engine import Engine, another
-from flexclear.pipeline.dynamics.run.observation import frames
-from flexclear.pipeline.dynamics.run.singular import select_rows
-from flexclear.pipeline.dynamics.run.start import project, rates_at_speeds
-from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop, output_times
+from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
+from flexclear.pipeline.dynamics.run.evaluation.observation import frames
+from flexclear.pipeline.dynamics.run.evaluation.start import project, rates_at_speeds
+from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
 
 #: the two are compared at about this many times, which bounds the cost; where outputs are rarer, between them as well
 SAMPLES = 180
@@ -67,7 +67,7 @@ class Pair:
     """
 
     def __init__(self, engine: Engine) -> None:
-        requested = output_times(engine.breaks, engine.model.scene.output.interval)
+        requested = engine.output_times(engine.model.scene.output.interval)
         self.added = _between(engine, requested)
         self.outputs = np.union1d(requested, self.added)
         self.times = np.union1d(self.outputs[:: max(1, len(self.outputs) // SAMPLES)], self.outputs[-1])
@@ -269,7 +269,7 @@ def _between(engine: Engine, requested: np.ndarray) -> np.ndarray:
     parts = int(np.ceil(SAMPLES * interval / (engine.end - engine.start) - 1e-9))
     if parts <= 1:
         return np.zeros(0)
-    times = output_times(engine.breaks, interval / parts)
+    times = engine.output_times(interval / parts)
     after = np.clip(np.searchsorted(requested, times), 1, len(requested) - 1)
     distance = np.minimum(np.abs(times - requested[after - 1]), np.abs(times - requested[after]))
     return times[distance > 1e-9 * interval / parts]

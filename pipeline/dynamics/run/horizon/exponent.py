@@ -15,10 +15,10 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.horizon import Metric, offset_jacobian, perturbed
-from flexclear.pipeline.dynamics.run.start import project
-from flexclear.pipeline.dynamics.run.tangents import Differentiated, Direction
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import project
+from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, Direction
 
 #: batches of the exponent's error, and Student's t of their number at 95 %
 BATCHES, STUDENT = 10, 2.262

@@ -27,9 +27,9 @@ from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
-from flexclear.pipeline.dynamics.run.engine import Engine, assemble
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, assemble
+from flexclear.pipeline.dynamics.run.evaluation.specialised import suited
 from flexclear.pipeline.dynamics.run.pieces import Tape
-from flexclear.pipeline.dynamics.run.specialised import suited
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 

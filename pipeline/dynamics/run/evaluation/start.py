@@ -11,10 +11,10 @@ from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model.given_start import moved
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.plausibility import refuse_depth
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.jamming import explanation
-from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.jamming import explanation
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe
 
 #: impact rate that a resting contact is given: the hysteresis of an impact long past has no say [m/s]
 NO_IMPACT = 1e300
@@ -30,7 +30,7 @@ def consistent_start(engine: Engine) -> np.ndarray:
     model = engine.model
     engine.select_pieces_after(engine.start)
     y = initial.start_state(model)
-    singular.select_rows(engine, y, engine.start)
+    closure_rows.select_rows(engine, y, engine.start)
     if not engine.mobility.singular_start:
         y = _closed(engine, y)
     # a singular pose has no rates to project on
@@ -83,7 +83,7 @@ def _look(engine: Engine, y: np.ndarray) -> None:
     if engine.mobility.singular_start:
         engine.attempt(y, engine.start)
     else:
-        singular.evaluate(engine, y, engine.start)
+        closure_rows.evaluate(engine, y, engine.start)
 
 
 def project(engine: Engine, y: np.ndarray) -> np.ndarray:
@@ -105,7 +105,7 @@ def rates_at_speeds(engine: Engine, y: np.ndarray, speeds: np.ndarray) -> np.nda
     """Rates of a state at the start with other speeds, as nearly as drives and loops allow."""
     moved = y.copy()
     moved[engine.model.speeds] = speeds
-    return singular.evaluate(engine, project(engine, moved), engine.start)
+    return closure_rows.evaluate(engine, project(engine, moved), engine.start)
 
 
 def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
@@ -113,7 +113,7 @@ def overlapping(engine: Engine, y: np.ndarray) -> dict[int, float]:
     contacts = engine.model.contacts
     if not contacts:
         return {}
-    singular.evaluate(engine, y, engine.start)
+    closure_rows.evaluate(engine, y, engine.start)
     gaps = engine.table(m.TOUCH)["gap"]
     return {c: -float(gaps[c]) for c, (_, joint, *_) in enumerate(contacts) if gaps[c] < -TOUCHING * joint.clearance}
 

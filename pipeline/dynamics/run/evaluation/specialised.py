@@ -6,7 +6,7 @@ met decide, no clock and no cache, so that equal scenes give equal bytes. Values
 rounding. Friction in ideal joints is solved for by iteration, from what the last evaluation found: that stays with the
 kernels.
 
-Members of an ensemble are evaluated several at once (`run.batched_evaluation`). How many depends on the
+Members of an ensemble are evaluated several at once (`run.evaluation.batched_evaluation`). How many depends on the
 machine, so the code gives the same bits for any number.
 """
 
@@ -24,8 +24,8 @@ from flexclear.pipeline.dynamics.compile import functions, stacks
 from flexclear.pipeline.dynamics.effects import Parts
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.model import selection
-from flexclear.pipeline.dynamics.run.batched_evaluation import Code, LaneGroup, LaneGroups, Place, groups
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Code, LaneGroup, LaneGroups, Place, groups
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring, wiring
 

@@ -15,12 +15,13 @@ from flexclear.pipeline.core.scene.start import Branch
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.driving import coordinate_of
-from flexclear.pipeline.dynamics.run import branches, singular
-from flexclear.pipeline.dynamics.run.branches import Direction
-from flexclear.pipeline.dynamics.run.collocation import Collocation, Lead, Sampler, collocate
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, label
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.observation import observe
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe
+from flexclear.pipeline.dynamics.run.singular_poses import branches
+from flexclear.pipeline.dynamics.run.singular_poses.branches import Direction
+from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation, Lead, Sampler, collocate
 
 #: the way is first as long as the fastest coordinate takes for this fraction of its unit, then half of that, and so on
 FIRST, HALVINGS = 0.3, 9
@@ -70,7 +71,7 @@ def _along(engine: Engine, way: Direction, turn: float) -> StartMotion | None:
     engine.control[m.END] = engine.breaks[1]
     for k in range(HALVINGS):
         span = min(way.reaching(FIRST * 0.5**k), engine.breaks[1] - engine.start)
-        singular.select_rows(engine, way.state(engine.start + span), engine.start + span)
+        closure_rows.select_rows(engine, way.state(engine.start + span), engine.start + span)
         saved, sampler = engine.selected.copy(), Sampler(engine)
         lead = Lead(way.state, turn if way.at_speed else 0.0)
         made = collocate(sampler, engine.start, way.start, span, None, lead)

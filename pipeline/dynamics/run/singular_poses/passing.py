@@ -11,10 +11,10 @@ from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.model import selection
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.collocation import Collocation, Lead, Sampler, collocate
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.reach import beyond_reach, rest
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.refusals.reach import beyond_reach, rest
+from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation, Lead, Sampler, collocate
 
 #: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this fraction of its
 #: unit, then half of that, and so on
@@ -155,7 +155,7 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
     def least(t: float) -> float:
         """The least singular value of all closures, whichever of them are solved for."""
         sampler.attempt(t, made.states(np.array([t]))[0])
-        J = singular.natural(engine.model, engine.h, engine.rows(m.JACOBIAN))
+        J = closure_rows.natural(engine.model, engine.h, engine.rows(m.JACOBIAN))
         return float(np.linalg.svd(J, compute_uv=False)[engine.mobility.rank - 1])
 
     saved = engine.selected.copy()
@@ -184,10 +184,10 @@ def _pass(sampler: Sampler, made: Collocation, t: float) -> Pass:
     engine = sampler.engine
     sampler.attempt(t, made.states(np.array([t]))[0])
     J = engine.rows(m.JACOBIAN)
-    U, values, _ = np.linalg.svd(singular.natural(engine.model, engine.h, J))
+    U, values, _ = np.linalg.svd(closure_rows.natural(engine.model, engine.h, J))
     lost = max(int(np.sum(values < VANISHED * values[0])), 1)
-    reported = np.linalg.svd(singular.scaled(engine.model, engine.h, J), compute_uv=False)
-    one = Pass(t, singular.condition(reported), lost, singular.worst_joint(engine, U[:, -1]))
+    reported = np.linalg.svd(closure_rows.scaled(engine.model, engine.h, J), compute_uv=False)
+    one = Pass(t, closure_rows.condition(reported), lost, closure_rows.worst_joint(engine, U[:, -1]))
     _refuse_rest(engine, made, one, U[:, -lost:])
     return one
 

@@ -8,7 +8,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations import observation
 from flexclear.pipeline.dynamics.equations.observation import Blocks, Frames, Observed
 from flexclear.pipeline.dynamics.integrate.recording import record_share
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 #: no row is projected to less than this fraction of the mechanism's size
 ROUNDING = 1e-14

@@ -27,7 +27,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.method_selection import Suit
+    from flexclear.pipeline.dynamics.run.method_choice.method_selection import Suit
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
 #: the estimate compares with a run at this fraction of the tolerance

@@ -13,9 +13,9 @@ from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.mobility import INFINITE
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.numbering import Numbering
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
-from flexclear.pipeline.dynamics.run.tree_factor import mass_factor
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.jamming import explanation, jammed
+from flexclear.pipeline.dynamics.run.evaluation.tree_factor import mass_factor
 
 #: length that makes rows and coordinates of the closures comparable in condition numbers [m]
 SCALE = 0.1

@@ -23,11 +23,12 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run import refusal, singular
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges, Look, Panel, limited, pace
+from flexclear.pipeline.dynamics.run.refusals import refusal
 from flexclear.pipeline.dynamics.run.run import engine_of
-from flexclear.pipeline.dynamics.run.start import consistent_start
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
@@ -272,7 +273,7 @@ def rates(engine: Engine, y: np.ndarray) -> Rates:
         for sign in (1.0, -1.0):
             z = y.copy()
             z[k] += sign * step
-            sides.append(singular.evaluate(engine, z, engine.start)[:n])
+            sides.append(closure_rows.evaluate(engine, z, engine.start)[:n])
         J[:, k] = (sides[0] - sides[1]) / (2.0 * step)
     bodies = model.arrays.table(m.FLEXES)
     modes = [b["q0"] + j for b in bodies for j in range(b["n_modes"])]

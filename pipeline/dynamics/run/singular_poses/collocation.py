@@ -21,9 +21,9 @@ from numpy.polynomial import chebyshev
 from flexclear.pipeline.core.numerics.rotations import continued
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Blocks
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.observation import ROUNDING as CLOSED
-from flexclear.pipeline.dynamics.run.observation import observe_with
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.observation import ROUNDING as CLOSED
+from flexclear.pipeline.dynamics.run.evaluation.observation import observe_with
 
 #: points of the polynomial; the end is one of them, the start is not
 POINTS = m.COLLOCATION_ROWS - 1

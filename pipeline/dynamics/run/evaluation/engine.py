@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import refuse_missed
-from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroup, Place
+from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
 
 #: two breaks nearer than this fraction of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12
@@ -31,7 +31,7 @@ SHORTEST_SEGMENT = 1e-12
 
 @dataclass
 class Straight:
-    """Code for one wiring (`run.specialised`), shared by the engines of one work space.
+    """Code for one wiring (`run.evaluation.specialised`), shared by the engines of one work space.
 
     requested: whether all integrations shall use it.  used: whether the present one does.
     exact: whether it is to give the same bits for one state as for several at once.
@@ -104,6 +104,18 @@ class Engine:
         """Number of the segment between breaks that holds each time; on a break, that before it or that `after` it."""
         index = np.searchsorted(self.breaks, times, side="right" if after else "left") - 1
         return np.asarray(np.minimum(np.maximum(index, 0), len(self.breaks) - 2))
+
+    def output_times(self, interval: float, origin: float | None = None) -> np.ndarray:
+        """Regular output times and all breaks [s], increasing; times nearer than rounding are one.
+
+        origin: from which the regular ones are counted [s]; the first break by default.
+        """
+        breaks, origin = self.breaks, self.breaks[0] if origin is None else origin
+        first, last = (np.ceil((breaks[0] - origin) / interval), (breaks[-1] - origin) / interval * (1 + 1e-12))
+        regular = origin + interval * np.arange(int(first), int(np.floor(last)) + 1)
+        after = np.clip(np.searchsorted(breaks, regular), 1, len(breaks) - 1)
+        distinct = np.minimum(np.abs(regular - breaks[after - 1]), np.abs(regular - breaks[after])) > 1e-9 * interval
+        return np.union1d(regular[distinct], breaks)
 
     def select_pieces_after(self, t: float) -> None:
         """Put the pieces in force that hold right after `t`; an earlier run leaves those of its end."""

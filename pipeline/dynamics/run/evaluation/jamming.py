@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 
 def jammed(engine: Engine) -> bool:

@@ -8,8 +8,8 @@ import numpy as np
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import selection
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 #: least singular value of the closures, as fraction of the largest, above which a pose is not yet at the end of reach;
 #: and above which it is not singular
@@ -42,7 +42,7 @@ def require_shallow(engine: Engine) -> None:
     shorter steps: the run would be refused at its end, if it ever came there.  The memory stays as it is.
     """
     from flexclear.pipeline.dynamics.contact.validity import SHALLOW, pressed_through
-    from flexclear.pipeline.dynamics.run.overtravel import forced_depth
+    from flexclear.pipeline.dynamics.run.refusals.overtravel import forced_depth
 
     model, saved = engine.model, (engine.w.copy(), engine.n.copy())
     t = float(engine.control[m.TIME])
@@ -79,8 +79,8 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
     model, saved = engine.model, (engine.w.copy(), engine.n.copy())
     t, y = float(engine.control[m.TIME]), engine.view(m.Y).copy()
     engine.attempt(y, t)
-    J = singular.natural(model, engine.h, engine.rows(m.JACOBIAN))
-    where = singular.diagnosis(engine) if J.size else ""
+    J = closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN))
+    where = closure_rows.diagnosis(engine) if J.size else ""
     U, values, _ = np.linalg.svd(J) if J.size else (np.eye(1), np.ones(1), None)
     moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > FRACTION)
     engine.w[:], engine.n[:] = saved
@@ -129,8 +129,8 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[model.nv :])
     still[model.speeds] = 0.0
     engine.attempt(still, t)
-    U, values, _ = np.linalg.svd(singular.natural(model, engine.h, engine.rows(m.JACOBIAN)))
-    along = singular.built_rows(model, engine.h) == 0
+    U, values, _ = np.linalg.svd(closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN)))
+    along = closure_rows.built_rows(model, engine.h) == 0
     pulled = engine.view(m.RESIDUAL_RATE)[selection.kept_places(model, engine.h)]
     pulled = np.where(along, pulled / model.length, pulled)
     if values[-1] > NEAR * values[0]:
@@ -138,7 +138,7 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     if not abs(U[:, len(values) - 1] @ pulled) > FASTER * values[-1] * np.linalg.norm(pulled) > 0.0:
         return ""
     drive = model.drives[int(np.argmax(powers))]
-    joint = singular.worst_joint(engine, U[:, len(values) - 1])
+    joint = closure_rows.worst_joint(engine, U[:, len(values) - 1])
     return (
         f"at t = {t:.6g} s: drive {drive} leads out of reach: the loop closed at joint {joint} is stretched or folded "
         f"as far as it goes; shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"

@@ -14,10 +14,10 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import initial
-from flexclear.pipeline.dynamics.run import singular
-from flexclear.pipeline.dynamics.run.collocation import Sampler
-from flexclear.pipeline.dynamics.run.engine import Engine
-from flexclear.pipeline.dynamics.run.start import start_motions
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import start_motions
+from flexclear.pipeline.dynamics.run.singular_poses.collocation import Sampler
 
 #: way off, in units of the coordinates, and singular values below this fraction of the largest, which are zero
 WAY, ZERO = 1e-2, 1e-6
@@ -189,7 +189,7 @@ class _Pose:
     def _fall(self, step: np.ndarray) -> list[Direction]:
         """From rest under the forces, if they push this way along the branch."""
         t, y = self.engine.start, self.moved(step)
-        singular.select_rows(self.engine, y, t)
+        closure_rows.select_rows(self.engine, y, t)
         if not self.engine.attempt(y, t):
             return []
         push = self.engine.slope[self.engine.model.speeds] / self.units @ step / (step @ step)

@@ -15,7 +15,7 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.run.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 #: displacement of a point in its body frame, as fraction of the body's length, above which linear modes are doubted
 BENT = 0.05

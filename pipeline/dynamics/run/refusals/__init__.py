@@ -1,0 +1,1 @@
+"""What ends a run, or is doubted in it, in words."""

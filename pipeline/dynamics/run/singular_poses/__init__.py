@@ -1,0 +1,1 @@
+"""Over singular poses, and out of them."""
