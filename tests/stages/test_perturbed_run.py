@@ -24,7 +24,8 @@ from flexclear.pipeline.dynamics.run import progress_rate, trajectory
 from flexclear.pipeline.dynamics.run.evaluation import specialised
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.horizon.horizon import Pair, PerturbedRun, horizon
+from flexclear.pipeline.dynamics.run.horizon import horizon
+from flexclear.pipeline.dynamics.run.horizon.horizon import Pair, PerturbedRun
 from flexclear.pipeline.dynamics.run.run import engine_of, follow
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
 
