@@ -14,6 +14,7 @@ NAMES = {
     "accuracy": "accuracy:FAMILY",
     "solids": "solids:FAMILY",
     "stability": "stability:FAMILY",
+    "classes": "classes:FAMILY",
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
     "sweep": "sweep:FAMILY",
