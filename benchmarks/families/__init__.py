@@ -15,6 +15,7 @@ NAMES = {
     "solids": "solids:FAMILY",
     "stability": "stability:FAMILY",
     "classes": "classes:FAMILY",
+    "faults": "faults:FAMILY",
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
     "sweep": "sweep:FAMILY",

@@ -89,7 +89,7 @@ def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
+    "options, words",
     [
         (("--bundle", "four_bar", "--out", "x.csv"), "'.csv' is no known format"),
         (("--bundle", "four_bar", "--out", "none/x.zip"), "its folder does not exist"),
