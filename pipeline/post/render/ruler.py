@@ -45,9 +45,11 @@ def round_length(most: float) -> float:
 
 
 def exaggeration(drawn: Mechanism) -> list[str]:
-    """What is drawn larger than it is, and by which factor."""
+    """What is drawn larger than it is, and by which factor; what the colours of deflection say."""
     scale = max((body.scale for body in drawn.flexible), default=0.0)
     said = [f"deformation {rounded(scale, 3)} times larger"] if drawn.flexible else []
+    if any(body.color is None and not body.stressed for body in drawn.flexible):
+        said.append("light where a body deflects most")
     factors = []
     for joint in parameters(drawn.run).get("joint", {}).values():
         radius = joint.get("ball_radius", joint.get("pin_radius"))
