@@ -53,13 +53,32 @@ def children(process: int) -> list[int]:
     """Numbers of the processes that a process has started and that still run (Linux); none elsewhere.
 
     Python's own tracker of semaphores is left out: without it nothing is lost, but Python prints tracebacks at its end.
+    So are processes that still have their parent's command line: any of them may become the tracker.
     """
-    numbers: list[int] = []
+    numbers, own = list[int](), _command_line(process)
     for task in Path(f"/proc/{process}/task").glob("*/children"):
         with suppress(OSError):
             started = map(int, task.read_text(encoding="utf-8").split())
-            numbers += [n for n in started if b"resource_tracker" not in Path(f"/proc/{n}/cmdline").read_bytes()]
+            lines = {n: _command_line(n) for n in started}
+            numbers += [n for n, line in lines.items() if line not in (b"", own) and b"resource_tracker" not in line]
     return numbers
+
+
+def _command_line(process: int) -> bytes:
+    """Empty where the process has ended."""
+    try:
+        return Path(f"/proc/{process}/cmdline").read_bytes()
+    except OSError:
+        return b""
+
+
+def seconds_of(process: int) -> float:
+    """Processor time that a process has used [s] (Linux); 0 where it has ended."""
+    try:
+        fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def kill(process: int) -> None:

@@ -14,6 +14,8 @@ NAMES = {
     "accuracy": "accuracy:FAMILY",
     "solids": "solids:FAMILY",
     "stability": "stability:FAMILY",
+    "classes": "classes:FAMILY",
+    "faults": "faults:FAMILY",
     "reference-conditions": "reference_conditions:FAMILY",
     "geometry": "geometry:FAMILY",
     "sweep": "sweep:FAMILY",

@@ -21,8 +21,8 @@ from flexclear.pipeline.post import derive
 from flexclear.stages import rendering
 
 PICTURES = DOCS / "gallery"
-#: of the pictures: pixels, and colours that are kept, so that a page of them stays small
-WIDTH, COLOURS = 640, 64
+#: of the pictures: pixels, how much finer they are drawn first, and colours, so that a page of them stays small
+WIDTH, HEIGHT, FINER, COLOURS = 640, 480, 2, 128
 Bundles = Mapping[str, xr.Dataset]
 
 
@@ -330,15 +330,16 @@ def _draw(entry: Entry, scene: Scene, reduced: Bundles, run: xr.Dataset) -> None
         return
     from PIL import Image
 
-    from flexclear.pipeline.post.render import film, mechanism
+    from flexclear.pipeline.post.render import film, mechanism, ruler
 
     params = rendering.params(scene, "motion", "html")
     looks = mechanism.Looks(bodies=params["bodies"], **params.get("view", {}))
     drawn = mechanism.mechanism(run, reduced, looks)
     row = round(entry.at * (run.sizes["time"] - 1))
-    picture = Image.fromarray(film.still(drawn, row))
-    small = picture.resize((WIDTH, round(WIDTH * picture.height / picture.width)), Image.Resampling.LANCZOS)
-    small.quantize(COLOURS).save(PICTURES / f"{entry.name}.png", optimize=True)
+    large = Image.fromarray(film.still(drawn, row, (FINER * WIDTH, FINER * HEIGHT)))
+    small = np.asarray(large.resize((WIDTH, HEIGHT), Image.Resampling.LANCZOS))
+    noted = Image.fromarray(ruler.annotated(small, drawn))
+    noted.quantize(COLOURS).save(PICTURES / f"{entry.name}.png", optimize=True)
 
 
 def show(records: list[Record]) -> str:

@@ -12,10 +12,10 @@ from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 
-from flexclear.commands import reproduction
+from flexclear.commands import export, reproduction, scenes
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
 from flexclear.pipeline.core.system import machine, platforms
-from flexclear.pipeline.core.system.errors import FlexclearError
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
 from flexclear.stages.workplace import add_options, open_workplace
 
@@ -58,7 +58,7 @@ pose = {{}}
 #: run apart, where nothing is compiled: that would take longer than all else
 RUN = """import sys
 import flexclear as fc
-from flexclear.pipeline.core.system.errors import FlexclearError
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 try:
     result = fc.run(sys.argv[1])
 except FlexclearError as error:
@@ -94,6 +94,11 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Print the findings line by line; raise UnwellError at the end when something is wrong."""
+    if options.out is not None:
+        if options.bundle is None:
+            raise InputError(f"--out {options.out}", "is where --bundle writes, which is not given", "add --bundle SCENE")
+        export.check_format(options.out, (".zip",))
+        scenes.check_target(options.out)
     if options.bundle is not None:
         path = reproduction.make(options.bundle, options.set, (*LIBRARIES, *OPTIONAL), options.out)
         print(f"{path}: the scene's files, versions and what was said; flexclear doctor --repeat {path.name}")

@@ -86,3 +86,16 @@ def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(
 ) -> None:
     assert main(["doctor", "--compile", str(tmp_path / "none.toml")]) == 2
     assert "none.toml" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "options, words",
+    [
+        (("--bundle", "four_bar", "--out", "x.csv"), "'.csv' is no known format"),
+        (("--bundle", "four_bar", "--out", "none/x.zip"), "its folder does not exist"),
+        (("--out", "x.zip"), "--bundle writes, which is not given"),
+    ],
+)
+def test_out_is_a_bundle_or_refused(options: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", *options]) == 2
+    assert words in capsys.readouterr().err

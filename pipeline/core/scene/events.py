@@ -12,6 +12,7 @@ from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import Drive, JointDrive, PathDrive
 from flexclear.pipeline.core.scene.event_kinds import CHANGES
 from flexclear.pipeline.core.scene.fields import Part, PartName
+from flexclear.pipeline.core.scene.formulas import formula
 from flexclear.pipeline.core.scene.loads import Load, SampledPid
 from flexclear.pipeline.core.scene.owners import COORDINATES
 from flexclear.pipeline.core.scene.quantity import condition
@@ -43,8 +44,8 @@ class Event(Part):
     release: part that ceases: joint.NAME, drive.NAME, load.NAME, stop.NAME, gear.NAME, or event.NAME of a lock.
     lock: joint.NAME, whose coordinates stop and stay where they are.
     switch: load.NAME, or drive.NAME of a joint, that becomes another one.
-    to: the keys that change; with another type, all keys of the part; laws count time from the event, and those of
-    drives positions from where the coordinate is.
+    to: the keys that change; with another type, all keys of the part; laws and expressions count time from the event,
+    and laws of drives positions from where the coordinate is.
     """
 
     at: When
@@ -149,7 +150,7 @@ def _problems(scene: Any, name: str, event: Event) -> Iterator[tuple[str, str]]:
     elif kind == "lock":
         yield from _of_lock(scene, name, scene.joint[part])
     elif kind == "switch":
-        yield from _of_switch(getattr(scene, family)[part], event)
+        yield from _of_switch(scene, getattr(scene, family)[part], event)
     for other in event.before:
         if other not in scene.event:
             yield "after", f"there is no event '{other}' ({suggestion(other, scene.event)})"
@@ -174,12 +175,14 @@ def _of_lock(scene: Any, name: str, joint: Any) -> Iterator[tuple[str, str]]:
         yield "", f"a drive is called '{name}', too, and the lock is recorded as one: choose another name"
 
 
-def _of_switch(part: Any, event: Event) -> Iterator[tuple[str, str]]:
+def _of_switch(scene: Any, part: Any, event: Event) -> Iterator[tuple[str, str]]:
     if isinstance(part, PathDrive):
         yield "switch", "is the path of a frame; drives of joints can be switched"
         return
     try:
         new = switched(part, event)
+        if event.part[0] == "load":
+            formula(scene.model_copy(update={"load": {**scene.load, event.part[1]: new}}), event.part[1])
     except ValueError as error:
         yield "to", str(error)
         return

@@ -58,6 +58,11 @@ def measure(steps: Sequence[Any]) -> tuple[units.Exponents, str]:
     return exponents or NUMBER, dim
 
 
+def with_name(text: str, name: str, other: str) -> str:
+    """The expression with another text wherever it has a name."""
+    return _TOKEN.sub(lambda token: f" {other} " if token["name"] == name else token[0], text)
+
+
 def check_unit(steps: Sequence[Any], dimension: str, *, vector: bool = False) -> None:
     """ValueError unless an expression is a number, or a vector, of this dimension; a bare zero is of any."""
     exponents, dim, _ = fold(steps, _measured, _combined)

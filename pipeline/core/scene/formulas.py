@@ -22,7 +22,7 @@ from flexclear.pipeline.core.scene.expression import (
     fold,
     measure,
 )
-from flexclear.pipeline.core.scene.loads import JointExpression, LineExpression, PointExpression
+from flexclear.pipeline.core.scene.loads import EXPRESSIONS, JointExpression, LineExpression, PointExpression
 from flexclear.pipeline.core.scene.owners import turns
 from flexclear.pipeline.core.scene.parts import FlexibleBody
 from flexclear.pipeline.core.scene.quantity import KINDS, Quantity, read
@@ -85,8 +85,8 @@ def formula(scene: Any, name: str) -> Formula | None:
 
     Raises ValueError, in words, for what cannot be computed, and for values of another unit.
     """
-    load = scene.forces()[name]
-    if not isinstance(load, (JointExpression, LineExpression, PointExpression)):
+    load = scene.load[name]
+    if not isinstance(load, EXPRESSIONS):
         return None
     known = constants_of(load.values)
     require_used(known, load.texts)

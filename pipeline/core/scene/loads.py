@@ -255,6 +255,8 @@ class SampledPid(_Controller):
     period: Annotated[Time, Field(gt=0.0)]
 
 
+#: loads whose force is an expression
+EXPRESSIONS = (JointExpression, LineExpression, PointExpression)
 Load = Annotated[
     Gravity
     | PointForce

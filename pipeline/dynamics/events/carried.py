@@ -2,33 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
+from flexclear.pipeline.core.scene.formulas import formula
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import LOADS
-from flexclear.pipeline.dynamics.model.driving import coordinate_of, named_coordinate
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
+from flexclear.pipeline.dynamics.model.driving import coordinate_of, joint_class, named_coordinate
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.stops import End
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
 
-Slots = dict[tuple[str, ...], range]
+#: key of an angle with its turns, before the coordinate's name in records
+TURNS = "turns"
 
 
-def carry(old: Model, before: np.ndarray, new: Model, y: np.ndarray) -> np.ndarray:
+def carry(old: Model, before: np.ndarray, new: Model, y: np.ndarray, known: Mapping[str, float]) -> np.ndarray:
     """State y of a model with the internal states of the parts that it has in common with an old one in state before.
 
     These are angles with their turns, integral parts of controllers, rotation vectors and deflections of bristles.
+    known: joint coordinates, by name in records, for turns that no part of the old model counts.
     """
     there, y = dict(_slots(old)), y.copy()
     for key, slots in _slots(new):
         if key in there and len(there[key]) == len(slots):
             y[slots] = before[there[key]]
+        elif key[0] == TURNS and key[1] in known:
+            y[slots] = known[key[1]]
     return y
 
 
@@ -51,19 +57,30 @@ def _slots(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
     arrays, scene = model.arrays, model.scene
     first, gauges = model.ny - arrays.size(m.N_INTERNAL), arrays.table(m.GAUGES)
 
-    def turns(gauge: int) -> range:
+    def turns(gauge: int, joint: str, coordinate: Coordinate) -> Iterator[tuple[tuple[str, ...], range]]:
         at = int(gauges[gauge]["turns"]) if gauge >= 0 else -1
-        return range(first + at, first + at + 1) if at >= 0 else range(0)
+        if at >= 0:
+            single = len(joint_class(scene.joint[joint].type).COORDINATES) == 1
+            yield (TURNS, joint if single else f"{joint}.{coordinate.name}"), range(first + at, first + at + 1)
 
+    looks = arrays.table(m.LOOKS)["index"]
     for (name, _), row in zip(model.loads, arrays.table(m.LOADS), strict=True):
-        for key in ("gauge", "measured"):
-            yield ("load", name, key), turns(int(row[key]))
+        along, measured = _coordinates(scene, name)
+        for key, one in (("gauge", along), ("measured", measured)):
+            if one is not None:
+                yield from turns(int(row[key]), *one)
+        written = formula(scene, name)
+        for look, (sort, what) in enumerate(written.reads if written else (), int(row["look0"])):
+            if sort == "coordinate":
+                yield from turns(int(looks[look]), *named_coordinate(scene, what, ""))
         if row["internal0"] >= 0:
             at = first + int(row["internal0"])
             yield ("load", name, scene.load[name].type), range(at, at + _states(scene, name))
     for contact, row in zip(model.contacts, arrays.table(m.CONTACTS), strict=True):
         if isinstance(contact.joint, End):
-            yield ("stop", contact.name), turns(int(row["surfaces"]))
+            stop = scene.stop[contact.joint.stop]
+            joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, "")
+            yield from turns(int(row["surfaces"]), joint, coordinate)
         elif row["bristle"] >= 0:
             yield ("contact", contact.name), range(int(row["bristle"]), int(row["bristle"]) + 3)
     joints = list(scene.rubbing())
@@ -73,12 +90,19 @@ def _slots(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
             yield ("joint", joints[int(row["joint"])], *where), range(int(row["bristle"]), int(row["bristle"]) + 3)
 
 
+def _coordinates(scene: Scene, name: str) -> list[tuple[str, Coordinate] | None]:
+    """Joint and coordinate along which a load acts, and those that it measures."""
+    load: Any = scene.load[name]
+    if not hasattr(load, "joint"):
+        return [None, None]
+    joint, _, coordinate = coordinate_of(scene, load.joint, load.coordinate, "")
+    if not hasattr(load, "measured"):
+        return [(joint, coordinate), None]
+    return [(joint, coordinate), named_coordinate(scene, load.measured, "") if load.measured else (joint, coordinate)]
+
+
 def _states(scene: Scene, name: str) -> int:
     """Number of internal states of a load, but for turns."""
     load: Any = scene.load[name]
-    given = []
-    if hasattr(load, "joint"):
-        given.append(coordinate_of(scene, load.joint, load.coordinate, "")[2])
-    if hasattr(load, "measured"):
-        given.append(named_coordinate(scene, load.measured, "")[1] if load.measured else given[0])
+    given = [one[1] for one in _coordinates(scene, name) if one is not None]
     return int(lookup(LOADS, load.type, where="[load]").row(load, "", *given).states)

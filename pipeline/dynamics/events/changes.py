@@ -8,8 +8,11 @@ from typing import Any
 
 from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.events import Event, switched
+from flexclear.pipeline.core.scene.expression import with_name
 from flexclear.pipeline.core.scene.fields import Part
+from flexclear.pipeline.core.scene.formulas import formula
 from flexclear.pipeline.core.scene.laws import KINDS, Constant, Delayed, Sum
+from flexclear.pipeline.core.scene.loads import EXPRESSIONS
 from flexclear.pipeline.core.scene.owners import COORDINATES, locked
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
@@ -36,7 +39,7 @@ class Held:
 
 
 def released(scene: Scene, event: Event) -> Scene:
-    """The scene without a part; what acts along the coordinates of a joint goes with it."""
+    """The scene without a part; what acts along the coordinates of a joint, or reads them, goes with it."""
     family, name = event.part
     if family == "event":
         kept = {n: d for n, d in scene.drive.items() if n != name and not n.startswith(f"{name}.")}
@@ -48,11 +51,19 @@ def released(scene: Scene, event: Event) -> Scene:
         kind: {n: part for n, part in getattr(scene, kind).items() if not _acts_along(part, keys, name)}
         for kind, keys in ALONG.items()
     }
+    left["load"] = {n: load for n, load in left["load"].items() if not _reads(scene, n, name)}
     return scene.model_copy(update={"joint": {**scene.joint, name: free}, **left})
 
 
 def _acts_along(part: Any, keys: tuple[str, ...], joint: str) -> bool:
     return any((getattr(part, key, None) or "").partition(".")[0] == joint for key in keys)
+
+
+def _reads(scene: Scene, load: str, joint: str) -> bool:
+    """Whether a load by an expression reads a coordinate of a joint."""
+    written = formula(scene, load)
+    reads = written.reads if written else ()
+    return any(sort == "coordinate" and what.partition(".")[0] == joint for sort, what in reads)
 
 
 def driven(scene: Scene, name: str, event: Event) -> list[Held]:
@@ -104,10 +115,14 @@ def rates(scene: Scene, held: Iterable[Held], t: float) -> dict[str, float]:
 
 
 def exchanged(scene: Scene, event: Event, t: float) -> Scene:
-    """The scene with a load switched at time t [s], from which the laws that are given there count."""
+    """The scene with a load switched at time t [s], from which laws and expressions that are given there count."""
     name, keys = event.part[1], event.to or {}
     new = switched(scene.load[name], event)
-    new = new.model_copy(update={key: _later(getattr(new, key), t) for key in keys})
+    changed = {key: _later(getattr(new, key), t) for key in keys}
+    if isinstance(new, EXPRESSIONS) and "force" in keys:
+        late = tuple(with_name(text, "t", f"(t - {t!r} s)") for text in new.texts)
+        changed["force"] = late[0] if isinstance(new.force, str) else late
+    new = new.model_copy(update=changed)
     return scene.model_copy(update={"load": {**scene.load, name: new}})
 
 

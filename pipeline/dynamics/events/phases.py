@@ -120,9 +120,9 @@ class _Plan:
         engine = made("", self.progress)
         y = consistent_start(engine)
         mended = tuple(mends(engine, y)) if start.before is None else ()
-        if start.before is not None:
-            y = carry(start.before[0].model, start.before[1], engine.model, y)
         known = before[-1].coordinates if before else {}
+        if start.before is not None:
+            y = carry(start.before[0].model, start.before[1], engine.model, y, known)
         conditions = {n: self._condition(e) for n, e in due.items() if not isinstance(e.at, float)}
         watch = Watch(engine, y, conditions, known)
         begins = _energies(engine, y, t)

@@ -45,9 +45,12 @@ def round_length(most: float) -> float:
 
 
 def exaggeration(drawn: Mechanism) -> list[str]:
-    """What is drawn larger than it is, and by which factor."""
+    """What is drawn larger than it is, and by which factor; what the colours of deflection say."""
     scale = max((body.scale for body in drawn.flexible), default=0.0)
-    said = [f"deformation {rounded(scale, 3)} times larger"] if drawn.flexible else []
+    larger = "true deformation" if scale == 1.0 else f"deformation {rounded(scale, 3)} times larger"
+    said = [larger] if drawn.flexible else []
+    if any(body.color is None and not body.stressed for body in drawn.flexible):
+        said.append("light where a body deflects most")
     factors = []
     for joint in parameters(drawn.run).get("joint", {}).values():
         radius = joint.get("ball_radius", joint.get("pin_radius"))
@@ -68,8 +71,8 @@ def annotated(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarr
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.imshow(pixels, extent=(0, width, height, 0), aspect="auto", interpolation="nearest")
-    text = " · ".join(exaggeration(drawn))
-    axes.text(20, height - 26, text, fontsize=10.5, color=style.SOFT, va="center", parse_math=False)
+    text = "\n".join(exaggeration(drawn))
+    axes.text(20, height - 18, text, fontsize=10.5, color=style.SOFT, va="bottom", parse_math=False)
     ruler(axes, drawn, (width, height), margin)
     axes.set(xlim=(0, width), ylim=(height, 0))
     canvas.draw()

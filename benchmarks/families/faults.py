@@ -1,28 +1,29 @@
 """A campaign of faults: damaged files, folders instead of files, killed commands and helpers, full disks.
 
-``python -m benchmarks.faults --flips 200 --cuts 50 --kills 50`` prints the table of docs/reliability.md. With
-``--minutes 10`` it begins nothing after ten minutes. A fault is *detected* when what was damaged counts as absent, or
-when a command ends with an exit code of its own and a sentence. It is *harmless* when nothing is lost. It is *used*
-when damaged content would be used, or a command ends with a traceback: there must be none. The project's own results
-stay untouched.
+A fault is *detected* when what was damaged counts as absent, or when a command ends with an exit code of its own and a
+sentence. It is *harmless* when nothing is lost. It is *used* when damaged content would be used, or a command ends with
+a traceback: there must be none. The project's own results stay untouched.
 """
 
 from __future__ import annotations
 
-import argparse
 import os
 import random
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from benchmarks import system
+from benchmarks.family import FINISHED, WRONG, Case, Family, Measured, Record
+from benchmarks.page import Columns, table
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import read_checked
 from flexclear.pipeline.core.artifacts.store import Store, read_record
@@ -41,7 +42,9 @@ COMMANDS = {
     "plan": (0.1, ["plan", SCENE]),
 }
 #: commands that have helpers, of which one is killed in their stead, and how often in proportion to their own kills
-HELPED, PER_KILL = ("run", "sweep", "report"), 0.5
+HELPED, PER_KILL = ("run", "sweep", "cost", "report"), 0.5
+#: while a helper takes less processor time than this within so many seconds it is idle [s]
+IDLE, LOOK = 0.01, 0.1
 #: exit codes that a command may have which lost a helper: it did without, or says that its memory may be full
 SAID = (0, 4)
 SWEEP = """
@@ -58,58 +61,79 @@ FULL, CONCURRENT = (0, 200, 2_000, 8_000, 20_000, 40_000, 80_000, 200_000), 8
 #: stages whose artifacts are computed, not measured
 COMPUTED = ("mesh", "modes", "bundle", "simulate", "post")
 Judge = Callable[[], str]
+DAMAGED = (
+    "artifacts",
+    "records",
+    "shown files",
+    "memo of imports",
+    "generated sources",
+    "digests of kernels",
+    "compiled code",
+    "unfinished work",
+)
+FOLDERS, FILES = "folders instead of files", "files instead of folders"
+FULL_DISKS, AT_ONCE = "disks full (files of at most so many bytes)", "equal commands at once"
+COLUMNS: Columns = {
+    "fault in": lambda r: r["case"],
+    "faults": lambda r: str(r["faults"]),
+    "detected": lambda r: str(r["detected"]),
+    "harmless": lambda r: str(r["harmless"]),
+    "used": lambda r: str(r["used"]),
+}
 
 
-def main(arguments: list[str] | None = None) -> int:
-    """Run it; the exit code is 1 when damage was used as a result."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.faults")
-    parser.add_argument("--flips", type=int, default=200, help="bits flipped, for each kind of file")
-    parser.add_argument("--cuts", type=int, default=50, help="files cut, for each kind of file")
-    parser.add_argument("--kills", type=int, default=50, help="commands killed")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--minutes", type=float, default=float("inf"), help="begin nothing after so many")
-    parser.add_argument("--only", nargs="+", choices=COMMANDS, metavar="VERB", help="only kills, and of these commands")
-    options = parser.parse_args(arguments)
-    if why := system.lacking():
-        parser.error(why)
-    rng, end = random.Random(options.seed), time.monotonic() + 60.0 * options.minutes
+@dataclass(frozen=True)
+class Faults:
+    """How many faults of a kind. flips, cuts: of files; kills: of commands or helpers; seed: of what is chosen."""
+
+    seed: int
+    flips: int = 0
+    cuts: int = 0
+    kills: int = 0
+
+
+def cases(seed: int, flips: int, cuts: int, kills: int) -> list[Case]:
+    """All kinds of faults."""
+    made = [Case(kind, Faults(seed, flips, cuts)) for kind in DAMAGED]
+    made += [Case(kind, Faults(seed)) for kind in (FOLDERS, FILES, FULL_DISKS, AT_ONCE)]
+    for verb, (fraction, _) in COMMANDS.items():
+        count = max(1, round(fraction * kills))
+        made.append(Case(f"`{verb}` killed", Faults(seed, kills=count)))
+        if verb in HELPED:
+            helpers = Faults(seed, kills=max(1, round(PER_KILL * count)))
+            made += [Case(f"{which} of `{verb}` killed", helpers) for which in ("helpers", "idle helpers")]
+    return made
+
+
+def measure(todo: Sequence[Case], jobs: int) -> Measured:
+    """A record for each kind of fault, in folders of its own."""
+    del jobs
     with tempfile.TemporaryDirectory(prefix="faults_") as name:
         folder = Path(name)
         (folder / "sweep.toml").write_text(SWEEP, encoding="utf-8", newline="\n")
         environment = {**os.environ, "FLEXCLEAR_RESULTS": f"{folder}/results", "FLEXCLEAR_KERNELS": f"{folder}/kernels"}
-        print("| fault in | faults | detected | harmless | used |\n|---|---:|---:|---:|---:|")
-        rows = list[Counter[str]]()
-        for kind, judge in _campaign(folder, environment, rng, options):
-            if time.monotonic() < end:
-                rows.append(_printed(kind, judge()))
-    return int(any(count["used"] for count in rows))
+        if any("killed" not in case.name for case in todo):
+            _run(environment)
+        for case in todo:
+            yield case, [_recorded(_counted(case, folder, environment))]
 
 
-def _campaign(
-    folder: Path, environment: dict[str, str], rng: random.Random, options: argparse.Namespace
-) -> Iterator[tuple[str, Callable[[], Counter[str]]]]:
-    """Kinds of faults, and what brings about so many of each and counts what became of them."""
-    if not options.only:
-        _run(environment)
-        for kind, files in _damaged(folder).items():
-            yield kind, partial(_damage, rng, files, options.flips, options.cuts)
-        yield "folders instead of files", partial(_folders, folder, environment)
-        yield "disks full (files of at most so many bytes)", partial(_full, folder, environment)
-        yield "equal commands at once", partial(_concurrent, folder, environment)
-    for verb in options.only or COMMANDS:
-        fraction, words = COMMANDS[verb]
-        count = max(1, round(fraction * options.kills))
-        yield f"`{verb}` killed", partial(_kills, folder, verb, words, environment, rng, count)
-        if verb in HELPED:
-            helpers = max(1, round(PER_KILL * count))
-            yield f"helpers of `{verb}` killed", partial(_helpers, folder, verb, words, environment, rng, helpers)
+def _recorded(count: Counter[str]) -> Record:
+    kinds = {name: count[name] for name in ("detected", "harmless", "used")}
+    return {"verdict": WRONG if count["used"] else FINISHED, "faults": sum(count.values()), **kinds}
 
 
-def _printed(kind: str, count: Counter[str]) -> Counter[str]:
-    """Print a row."""
-    row = [kind, sum(count.values()), count["detected"], count["harmless"], count["used"]]
-    print("|", " | ".join(map(str, row)), "|", flush=True)
-    return count
+def _counted(case: Case, folder: Path, environment: dict[str, str]) -> Counter[str]:
+    """Bring about the faults of a case, and count what became of them."""
+    of, rng = case.of, random.Random(f"{case.of.seed} {case.name}")
+    if case.name in DAMAGED:
+        return _damage(rng, _damaged(folder)[case.name], of.flips, of.cuts)
+    for kind, bring_about in ((FOLDERS, _folders), (FILES, _files), (FULL_DISKS, _full), (AT_ONCE, _concurrent)):
+        if case.name == kind:
+            return bring_about(folder, environment)
+    which, verb, _ = case.name.split("`")
+    kill = partial(_helpers, idle="idle" in which) if which else _kills
+    return kill(folder, verb, COMMANDS[verb][1], environment, rng, of.kills)
 
 
 def _run(environment: dict[str, str]) -> float:
@@ -162,6 +186,31 @@ def _folders(folder: Path, environment: dict[str, str]) -> Counter[str]:
         lost = not any(left.read_text(encoding="utf-8") == "stays" for left in path.parent.glob(f"{path.name}*/mine"))
         sound = code == 0 and not lost and _artifacts(store) == before and _shown(store) == "used"
         count["detected" if sound else "used"] += 1
+    return count
+
+
+def _files(folder: Path, environment: dict[str, str]) -> Counter[str]:
+    """A file instead of each folder of a run in turn: it is renamed, or named in a sentence, and stays."""
+    store, count = Store(folder / "results"), Counter[str]()
+    before = _artifacts(store)
+    for path in [
+        store.root / "runs" / SCENE,
+        *sorted(path for path in (store.root / "cache").iterdir() if path.is_dir()),
+    ]:
+        away = path.rename(folder / "away")
+        path.write_text("stays", encoding="utf-8", newline="\n")
+        process = _start(["run", SCENE], environment, stderr=subprocess.PIPE)
+        said = process.communicate()[1].decode(errors="replace")
+        left = [one for one in path.parent.glob(f"{path.name}*") if one.is_file()]
+        sound = process.returncode in (0, 2, 4) and "Traceback" not in said
+        count["detected" if sound and any(one.read_text() == "stays" for one in left) else "used"] += 1
+        if path.is_file():
+            path.unlink()
+            away.rename(path)
+        else:
+            shutil.rmtree(away)
+    code = _start(["run", SCENE], environment).wait()
+    count["used"] += code != 0 or _artifacts(store) != before
     return count
 
 
@@ -258,24 +307,33 @@ def _whole(folder: Path, verb: str, words: list[str], environment: dict[str, str
 
 
 def _helpers(
-    folder: Path, verb: str, words: list[str], environment: dict[str, str], rng: random.Random, count: int
+    folder: Path,
+    verb: str,
+    words: list[str],
+    environment: dict[str, str],
+    rng: random.Random,
+    count: int,
+    *,
+    idle: bool = False,
 ) -> Counter[str]:
     """One of the processes that a command has started is killed, as the system does where memory is full.
 
-    The command does without it, or ends with exit code 4 and a sentence; the next one makes the same results.
+    idle: one that does nothing then, where there is one.  The command does without it, or ends with exit code 4 and a
+    sentence; the next one makes the same results.
     """
     words, counts = [word.format(folder=folder) for word in words], Counter[str]()
-    seconds, whole = _whole(folder, f"{verb}_helped", words, environment)
+    label = f"{verb}_{'idle' if idle else 'helped'}"
+    seconds, whole = _whole(folder, label, words, environment)
     for k in range(count):
-        here = {**environment, "FLEXCLEAR_RESULTS": f"{folder}/helpless_{verb}_{k}"}
+        here = {**environment, "FLEXCLEAR_RESULTS": f"{folder}/helpless_{label}_{k}"}
         store = Store(Path(here["FLEXCLEAR_RESULTS"]))
         process = _start(words, here, stderr=subprocess.PIPE)
         end = time.monotonic() + min(LATEST, seconds) * rng.random()
         while process.poll() is None and (time.monotonic() < end or not system.children(process.pid)):
             time.sleep(0.01)
         children = system.children(process.pid)
-        if children:
-            system.kill(rng.choice(children))
+        if waiting := _idle(children) if idle else children:
+            system.kill(rng.choice(waiting))
         said = process.communicate()[1].decode(errors="replace")
         sound = (
             process.returncode in SAID and "Traceback" not in said and not upkeep.inventory(store, whole=True).damaged
@@ -285,6 +343,13 @@ def _helpers(
             print(f"{verb}: {process.returncode}, then {again}: {said[-500:]}", file=sys.stderr)
         counts["used" if not (sound and again) else "detected" if process.returncode else "harmless"] += 1
     return counts
+
+
+def _idle(processes: Sequence[int]) -> list[int]:
+    """Those that take no processor time for a moment."""
+    before = {process: system.seconds_of(process) for process in processes}
+    time.sleep(LOOK)
+    return [process for process in processes if system.seconds_of(process) - before[process] < IDLE]
 
 
 def _artifacts(store: Store) -> dict[tuple[str, str], str]:
@@ -315,5 +380,19 @@ def _concurrent(folder: Path, environment: dict[str, str]) -> Counter[str]:
     return Counter("detected" if code == 0 and sound else "used" for code in codes)
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def show(records: list[Record]) -> str:
+    """The table."""
+    return table(records, COLUMNS)
+
+
+FAMILY = Family(
+    what="damaged files, killed commands and helpers, full disks: what is detected, and what would be used",
+    takes="20 min",
+    page="reliability.md",
+    cases=cases,
+    measure=measure,
+    show=show,
+    settings={"seed": 1, "flips": 200, "cuts": 50, "kills": 20},
+    times=False,
+    children=True,
+)
