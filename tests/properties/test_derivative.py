@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.specialise import straight
+from flexclear.pipeline.dynamics.specialise import dual, straight
 from flexclear.pipeline.dynamics.specialise.code import Program
 from flexclear.pipeline.dynamics.specialise.derivative import tangent
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Tape, UnsuitedError
@@ -35,8 +36,13 @@ ROUNDING = 1e-10
 STEP = 1e-40
 
 
-def changes(scene: Scene, reduced: dict[str, Any], closed: int, seed: int = 2) -> tuple[np.ndarray, np.ndarray]:
-    """Changes of rates and contacts along a random direction, by the tangent and by a complex step of the tape."""
+def changes(
+    scene: Scene, reduced: dict[str, Any], closed: int, seed: int = 2, *, duals: bool = False
+) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of rates and contacts along a random direction, by the tangent and by a complex step of the tape.
+
+    duals: instead of the tangent by kernels that run on numbers with changes.
+    """
     model = tabulate(build(scene, reduced))
     space, random = model.arrays.work_space(lambda _: m.Room(4, 0, 0)), np.random.default_rng(seed)
     h, y = space.h, int(space.h[m.Y])
@@ -62,8 +68,14 @@ def changes(scene: Scene, reduced: dict[str, Any], closed: int, seed: int = 2) -
     tapes.run(made, h, moved, y, dy, operations=tapes.COMPLEX)
     assert np.allclose(exact["w"][dy : dy + model.ny], moved["w"][dy : dy + model.ny].real, rtol=1e-9, atol=1e-9)
     touch = slice(h[m.TOUCH.place], h[m.TOUCH.place] + m.TOUCH.size * len(model.contacts))
-    ways = [(exact["w"][vdy : vdy + model.ny], exact["dw"][touch])]
-    ways.append((moved["w"][dy : dy + model.ny].imag / STEP, moved["w"][touch].imag / STEP))
+    stepped = moved["w"][dy : dy + model.ny].imag / STEP, moved["w"][touch].imag / STEP
+    if duals:
+        dw[y : y + model.ny] = direction
+        numbers, given = dual.seeded(w, dw[None, :]), dual.seeded(f, df[None, :])
+        dual.plain(kernel)(h.tolist(), given, numbers, n.tolist(), y, dy)
+        ways = [(dual.changes(numbers[dy : dy + model.ny], 1)[0], dual.changes(numbers[touch], 1)[0]), stepped]
+    else:
+        ways = [(exact["w"][vdy : vdy + model.ny], exact["dw"][touch]), stepped]
     nq, end = model.nq, model.speeds.stop
     parts = [[way[0][:nq], way[0][nq:end], way[0][end:], way[1]] for way in ways]
     sizes = [np.abs(part).max(initial=0.0) or 1.0 for part in parts[1]]
@@ -72,19 +84,21 @@ def changes(scene: Scene, reduced: dict[str, Any], closed: int, seed: int = 2) -
 
 
 @pytest.mark.parametrize("path", RIGID, ids=lambda path: path.stem)
+@pytest.mark.parametrize("duals", [False, True], ids=["tangent", "duals"])
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_every_scene_is_differentiated(path: Path) -> None:
+def test_every_scene_is_differentiated(path: Path, duals: bool) -> None:
     """Along state, numbers, laws of time and impact rates at once; contacts open and closed."""
     for closed in (0, 1):
-        exact, stepped = changes(load_scene(path), {}, closed)
+        exact, stepped = changes(load_scene(path), {}, closed, duals=duals)
         assert np.abs(exact - stepped).max() < ROUNDING
 
 
+@pytest.mark.parametrize("duals", [False, True], ids=["tangent", "duals"])
 @pytest.mark.parametrize("name", ["sps4/csj", "sps4/far_csj_cb", "checks/flexible_slider_crank"])
-def test_the_papers_mechanism_and_flexible_bodies_are_differentiated(name: str) -> None:
+def test_the_papers_mechanism_and_flexible_bodies_are_differentiated(name: str, duals: bool) -> None:
     scene = load_scene(TREE / "scenes" / f"{name}.toml")
     for closed in (0, 1):
-        exact, stepped = changes(scene, bundles(scene), closed)
+        exact, stepped = changes(scene, bundles(scene), closed, duals=duals)
         assert np.abs(exact - stepped).max() < ROUNDING
 
 
@@ -102,7 +116,7 @@ def single(operation: str, *numbers: float) -> tuple[float, complex]:
     return w[7], stepped[3].imag / STEP
 
 
-@pytest.mark.parametrize(
+OPERATIONS = pytest.mark.parametrize(
     "operation, numbers",
     [
         *(
@@ -119,9 +133,37 @@ def single(operation: str, *numbers: float) -> tuple[float, complex]:
         ),
     ],
 )
+
+
+@OPERATIONS
 def test_each_operation_has_its_rule(operation: str, numbers: tuple[float, ...]) -> None:
     exact, stepped = single(operation, *numbers)
     assert exact == pytest.approx(stepped, rel=1e-13, abs=1e-300)
+
+
+#: operations as Python writes them
+WRITTEN = {
+    "add": operator.add, "sub": operator.sub, "mul": operator.mul, "pow": operator.pow, "neg": operator.neg,
+    "fabs": abs, "reciprocal": lambda a: 1.0 / a,
+}  # fmt: skip
+
+
+@OPERATIONS
+def test_numbers_with_changes_follow_the_same_rules(operation: str, numbers: tuple[float, ...]) -> None:
+    """Of all arguments, of each alone next to a plain number, and along two directions."""
+    function = WRITTEN.get(operation) or getattr(dual.plain(np), operation)
+
+    def at(*given: Any) -> np.ndarray:
+        return dual.changes([function(*given)], 2)[0 if len(given) == 1 else slice(None), 0]
+
+    plain = [np.float64(x) for x in numbers]
+    whole = at(*(dual.Dual(x, np.array([k + 1.0, -k - 1.0])) for k, x in enumerate(plain)))
+    known = single(operation, *numbers)[1]
+    assert np.ravel(whole)[0] == pytest.approx(known, rel=1e-13, abs=1e-300)
+    if len(plain) == 2:
+        parts = at(dual.Dual(plain[0], np.array([1.0, -1.0])), plain[1])
+        parts = parts + at(plain[0], dual.Dual(plain[1], np.array([2.0, -2.0])))
+        assert parts == pytest.approx([known, -known], rel=1e-12, abs=1e-15)
 
 
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")

@@ -87,10 +87,7 @@ def specialised(parts: Parts, wiring: Wiring, lanes: int = 0, *, changes: bool =
     lanes: 0 for runs; of members of ensembles how many are evaluated at once, with equal bits whatever their number.
     changes: with its tangent, of one state.
     """
-    given, imports = _forces(parts)
-    given["tree"] = _tree(imports, parts)
-    if parts.closures:
-        given["closures"] = _closures(imports, parts)
+    given, imports = _equations(parts)
     maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_rates")
     _import(imports, f"{DYNAMICS}.equations.prescribed_motion", "make_laws")
     function = LANES if lanes > 1 else SPECIALISED
@@ -113,11 +110,24 @@ def specialised(parts: Parts, wiring: Wiring, lanes: int = 0, *, changes: bool =
     return _file(what, imports, "rates", maker, given, function.format(**values), _formulas(parts))
 
 
-def _evaluate(parts: Parts) -> str:
+def rates(parts: Parts) -> str:
+    """Source of the kernel `rates` alone, which Python runs (`specialise.dual`), without friction of ideal joints."""
+    given, imports = _equations(parts)
+    maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_rates")
+    return _file("right-hand side for Python", imports, "rates", maker, given, "", _formulas(parts))
+
+
+def _equations(parts: Parts) -> tuple[dict[str, str], Imports]:
+    """What makes accelerations, but for friction of ideal joints."""
     given, imports = _forces(parts)
     given["tree"] = _tree(imports, parts)
     if parts.closures:
         given["closures"] = _closures(imports, parts)
+    return given, imports
+
+
+def _evaluate(parts: Parts) -> str:
+    given, imports = _equations(parts)
     if parts.harmonics:
         given["harmonics"] = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate")
     if parts.joint_frictions:
@@ -298,7 +308,7 @@ def _import(imports: Imports, module: str, name: str) -> str:
 def _file(
     what: str, imports: Imports, result: str, maker: str, given: dict[str, str], function: str, kernels: str = ""
 ) -> str:
-    lines = sorted({f"from {module} import {name}" for module, name in [CALLS, *imports]})
+    lines = sorted({f"from {module} import {name}" for module, name in [*([CALLS] if function else []), *imports]})
     arguments = [f"    {key}={value}," for key, value in given.items()]
     return "\n".join(
         [f'"""Generated: {what}."""', *lines, "", kernels, f"{result} = {maker}(", *arguments, ")", "", "", function]

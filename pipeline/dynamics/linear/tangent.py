@@ -13,13 +13,11 @@ import numpy as np
 import scipy.linalg
 
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, displacement_map, set_drives
-from flexclear.pipeline.dynamics.linear.differences import Rounding, derivative
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, displacement_map
+from flexclear.pipeline.dynamics.linear.changes import force_changes
 
 #: singular values of the closures below this fraction of the largest are redundant rows
 RANK = 1e-9
-#: widest step of a derivative, as a fraction of the mechanism's size, or of one radian
-WIDEST = 1e-2
 #: rounding of a sum of some dozens of terms
 EPSILON = 1e-15
 
@@ -74,52 +72,26 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
 
 
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Forces per displacement along motions (columns), shape (n, n) [1/s^2], and an error estimate of each column."""
-    size = bench.model.speed_scales
-    noise = EPSILON * magnitude(motions, at.bias)
-
-    def columns(direction: np.ndarray) -> tuple[np.ndarray, float]:
-        step = at.moves @ direction
-        grain = EPSILON * float(np.max(np.abs(at.q)) / np.max(np.abs(step)))
-
-        def force(s: float) -> np.ndarray:
-            b = balance(bench, at.q + s * step)
-            return motions.T @ (b.bias - b.jacobian.T @ at.multipliers)
-
-        return derivative(force, WIDEST / float(np.max(np.abs(direction) / size)), Rounding(noise, grain))
-
-    return _stacked([columns(d) for d in motions.T], motions.shape[1])
+    """Forces per displacement along motions (columns), shape (n, n) [1/s^2], and what rounding does to each column."""
+    directions = np.zeros((motions.shape[1], bench.model.ny))
+    directions[:, : len(at.q)] = (at.moves @ motions).T
+    return _along(motions, at, bench, force_changes(bench, at.q, directions, at.multipliers))
 
 
 def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Forces per speed along motions (columns), gyroscopic ones included, shape (n, n) [1/s], and errors."""
-    # forces that balance those of the drives' motion leave nothing of their size in the sum, only their rounding
-    noise = Rounding(EPSILON * (magnitude(motions, at.bias) + magnitude(motions, _at_rest(bench, at))))
-    size = bench.model.speed_scales
+    """Forces per speed along motions (columns), gyroscopic ones included, shape (n, n) [1/s], and rounding likewise."""
+    directions = np.zeros((motions.shape[1], bench.model.ny))
+    directions[:, bench.model.speeds] = motions.T
+    return _along(motions, at, bench, force_changes(bench, at.q, directions, np.zeros_like(at.multipliers)))
 
-    def columns(direction: np.ndarray) -> tuple[np.ndarray, float]:
-        def force(s: float) -> np.ndarray:
-            return motions.T @ balance(bench, at.q, s * direction).bias
 
-        return derivative(force, WIDEST / float(np.max(np.abs(direction) / size)), noise)
-
-    return _stacked([columns(d) for d in motions.T], motions.shape[1])
+def _along(motions: np.ndarray, at: Tangent, bench: Bench, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of forces along motions, (n, n), and rounding of each column: of all terms, whatever is left of them."""
+    reach = np.max(np.abs(motions) / bench.model.speed_scales[:, None], axis=0, initial=0.0)
+    terms = np.linalg.norm(np.abs(motions).T @ np.abs(changes).T, axis=0) + magnitude(motions, at.bias) * reach
+    return motions.T @ changes.T, EPSILON * terms
 
 
 def magnitude(motions: np.ndarray, bias: np.ndarray) -> float:
     """Size of the terms of which the forces along motions are sums."""
     return float(np.linalg.norm(np.abs(motions).T @ np.abs(bias)))
-
-
-def _at_rest(bench: Bench, at: Tangent) -> np.ndarray:
-    """Return the bias of the same pose with its drives at rest, shape (nv,)."""
-    drives = bench.drives.copy()
-    set_drives(bench, drives * [1.0, 0.0])
-    bias = balance(bench, at.q).bias
-    set_drives(bench, drives)
-    return bias
-
-
-def _stacked(columns: list[tuple[np.ndarray, float]], n: int) -> tuple[np.ndarray, np.ndarray]:
-    """A matrix and the errors of its columns, each with its error."""
-    return np.array([c for c, _ in columns]).T.reshape(n, n), np.array([e for _, e in columns])

@@ -57,10 +57,8 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
     """All small motions about a pose in balance."""
     if not at.Z.shape[1]:
         return Vibrations(np.zeros(0, dtype=complex), np.zeros((len(at.bias), 0), dtype=complex), 0, np.zeros(0))
-    motions = at.Z
-    for _ in range(2):
-        K, error = stiffness(bench, at, motions)
-        motions = motions @ _principal(_symmetric(K, error), _limp(K, error))[1]
+    first, error = stiffness(bench, at, at.Z)
+    motions = at.Z @ _principal(_symmetric(first, error), _limp(first, error))[1]
     K, error = stiffness(bench, at, motions)
     D, rate_error = damping(bench, at, motions)
     limp = _limp(K, error)

@@ -58,7 +58,7 @@ def rotation_vector(R):
         q = (R[3] - R[1], R[2] + R[6], R[5] + R[7], 1.0 + z - x - y)
     axis = (q[1], q[2], q[3]) if q[0] >= 0.0 else (-q[1], -q[2], -q[3])
     size, cosine = np.sqrt(dot(axis, axis)), abs(q[0])
-    return scale(2.0 * np.arctan2(size, cosine) / size if size > 0.0 else 2.0, axis)
+    return scale(2.0 * np.arctan2(size, cosine) / size if size > 0.0 else 2.0 / cosine, axis)
 
 
 @kernel

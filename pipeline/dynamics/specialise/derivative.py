@@ -10,12 +10,12 @@ Source: Griewank & Walther, *Evaluating Derivatives*, 2nd ed. (2008), sec. 3.1.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Program
+from flexclear.pipeline.dynamics.specialise.rules import RULES
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
 
 #: a tangent has at most this many operations per operation of its tape
@@ -106,67 +106,3 @@ class _Forward:
 
 def _undecided(condition: Symbol) -> bool:
     raise Undecided(condition)  # no rule asks
-
-
-# Rules: (tape, value of the operation, its arguments, their changes) -> its change
-
-
-def _product(tape: Tape, z: Any, x: Any, dx: Any) -> Any:
-    (a, b), (da, db) = x, dx
-    return tape.add(_times(tape, da, b), _times(tape, db, a))
-
-
-def _times(tape: Tape, change: Any, factor: Any) -> Any:
-    """Return a product in which a change that is zero is zero whatever the factor is."""
-    return tape.multiply(change, factor) if isinstance(change, Symbol) else 0.0
-
-
-def _root(tape: Tape, z: Any, x: Any, dx: Any) -> Any:
-    return tape.select(z > 0.0, tape.divide(tape.multiply(0.5, dx[0]), z), 0.0)
-
-
-def _power(tape: Tape, z: Any, x: Any, dx: Any) -> Any:
-    (a, b), (da, db) = x, dx
-    lower = tape.write(FLOAT, "pow", a, tape.subtract(b, 1.0) if isinstance(b, Symbol) else b - 1.0)
-    change = _times(tape, da, tape.multiply(b, lower))
-    if isinstance(db, Symbol):
-        change = tape.add(change, tape.multiply(db, tape.multiply(z, tape.write(FLOAT, "log", a))))
-    return tape.select(a > 0.0, change, 0.0) if isinstance(a, Symbol) else change
-
-
-def _arctan2(tape: Tape, z: Any, x: Any, dx: Any) -> Any:
-    (a, b), (da, db) = x, dx
-    square = tape.add(tape.multiply(a, a), tape.multiply(b, b))
-    return tape.divide(tape.subtract(_times(tape, da, b), _times(tape, db, a)), square)
-
-
-def _sign(tape: Tape, a: Any) -> Any:
-    return tape.write(FLOAT, "copysign", 1.0, a)
-
-
-def _copysign(tape: Tape, z: Any, x: Any, dx: Any) -> Any:
-    if not isinstance(x[0], Symbol):
-        return 0.0
-    return _times(tape, dx[0], tape.multiply(_sign(tape, x[0]), _sign(tape, x[1])))
-
-
-RULES: dict[str, Callable[[Tape, Any, Any, Any], Any]] = {
-    "add": lambda tape, z, x, dx: tape.add(*dx),
-    "sub": lambda tape, z, x, dx: tape.subtract(*dx),
-    "neg": lambda tape, z, x, dx: tape.negate(dx[0]),
-    "mul": _product,
-    "reciprocal": lambda tape, z, x, dx: tape.negate(tape.multiply(dx[0], tape.multiply(z, z))),
-    "pow": _power,
-    "sqrt": _root,
-    "fabs": lambda tape, z, x, dx: tape.multiply(_sign(tape, x[0]), dx[0]),
-    "sin": lambda tape, z, x, dx: tape.multiply(tape.write(FLOAT, "cos", x[0]), dx[0]),
-    "cos": lambda tape, z, x, dx: tape.negate(tape.multiply(tape.write(FLOAT, "sin", x[0]), dx[0])),
-    "tan": lambda tape, z, x, dx: tape.multiply(tape.add(1.0, tape.multiply(z, z)), dx[0]),
-    "log": lambda tape, z, x, dx: tape.multiply(tape.write(FLOAT, "reciprocal", x[0]), dx[0]),
-    "exp": lambda tape, z, x, dx: tape.multiply(z, dx[0]),
-    "tanh": lambda tape, z, x, dx: tape.multiply(tape.subtract(1.0, tape.multiply(z, z)), dx[0]),
-    "arctan2": _arctan2,
-    "copysign": _copysign,
-    "round": lambda tape, z, x, dx: 0.0,
-    "select": lambda tape, z, x, dx: tape.select(x[0], dx[1], dx[2]),
-}

@@ -8,18 +8,13 @@ repeated.
 
 from __future__ import annotations
 
-import builtins
 from collections.abc import Callable
-from types import CellType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.kernels import Kernel
+from flexclear.pipeline.dynamics.specialise.plain import Plain
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
-
-#: of NumPy, that kernels apply
-FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "log", "tanh", "arctan2", "round", "copysign")
 
 
 class Memory:
@@ -60,8 +55,7 @@ class Trace:
         self.tape = Tape(self.decide, longest)
         self.journal: list[Any] = []
         self.runs = [Run([], [])]
-        self._plain: dict[int, Any] = {}
-        self._alive: list[Any] = []
+        self.plain = Plain(self._function, self._largest, self._smallest, self.call)
 
     def decide(self, condition: Symbol) -> bool:
         """How a branch goes in the run that is under way; Undecided when it goes both ways."""
@@ -125,43 +119,6 @@ class Trace:
             return tuple(self._joined_results(branch, x, y) for x, y in zip(a, b, strict=True))
         return None if a is None else self.tape.join(branch, a, b)
 
-    # Kernels as Python --------------------------------------------------------------------------------------------
-
-    def plain(self, value: Any) -> Any:
-        """What a kernel refers to, with kernels that run on symbols instead of compiled ones."""
-        if id(value) not in self._plain:
-            self._alive.append(value)
-            self._plain[id(value)] = self._made_plain(value)
-        return self._plain[id(value)]
-
-    def _made_plain(self, value: Any) -> Any:
-        if isinstance(value, Kernel):
-            return self._kernel(value.py_func)
-        if isinstance(value, ModuleType):
-            return self._functions() if value is np else _Names(self, value)
-        if isinstance(value, tuple):
-            entries = [self.plain(entry) for entry in value]
-            return type(value)(*entries) if hasattr(value, "_fields") else tuple(entries)
-        return value
-
-    def _kernel(self, function: FunctionType) -> Callable:
-        scope: dict[str, Any] = {"__builtins__": builtins, "max": self.largest, "min": self.smallest}
-        cells = tuple(CellType(self.plain(cell.cell_contents)) for cell in function.__closure__ or ())
-        run = FunctionType(function.__code__, scope, function.__name__, function.__defaults__, cells)
-
-        def traced(*arguments: Any) -> Any:
-            if len(scope) == 3:  # at its first call, for kernels and what they are named like refer to each other
-                known = function.__globals__
-                scope.update({name: self.plain(known[name]) for name in function.__code__.co_names if name in known})
-                scope["_"] = None
-            return self.call(run, arguments)
-
-        return traced
-
-    def _functions(self) -> SimpleNamespace:
-        made = {name: self._function(name) for name in FUNCTIONS}
-        return SimpleNamespace(pi=np.pi, inf=np.inf, **made)
-
     def _function(self, name: str) -> Callable:
         def apply(*arguments: Any) -> Any:
             if any(isinstance(a, Symbol) for a in arguments):
@@ -170,22 +127,8 @@ class Trace:
 
         return apply
 
-    def largest(self, a: Any, b: Any) -> Any:
-        """The larger of two."""
+    def _largest(self, a: Any, b: Any) -> Any:
         return self.tape.select(b > a, b, a)
 
-    def smallest(self, a: Any, b: Any) -> Any:
-        """The smaller of two."""
+    def _smallest(self, a: Any, b: Any) -> Any:
         return self.tape.select(b < a, b, a)
-
-
-class _Names:
-    """A module's names, each made plain when it is asked for."""
-
-    def __init__(self, trace: Trace, module: ModuleType) -> None:
-        self._trace, self._module = trace, module
-
-    def __getattr__(self, name: str) -> Any:
-        attribute = self._trace.plain(getattr(self._module, name))
-        setattr(self, name, attribute)
-        return attribute

@@ -1,0 +1,143 @@
+"""Kernels run on numbers with their changes along several directions: exact derivatives without a compiler.
+
+Every number that depends on what is changed carries its derivatives. Kernels run in Python (`plain`), so iterations are
+differentiated, too, and no mechanism is too long. A run takes some microseconds per operation for all directions
+together; where one mechanism is differentiated thousands of times, compiled tangents (`derivative`) are faster.
+
+Source: Griewank & Walther, *Evaluating Derivatives*, 2nd ed. (2008), sec. 3.1 (vector mode) and 6.1 (by overloading).
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from flexclear.pipeline.dynamics.specialise.plain import FUNCTIONS, Plain
+from flexclear.pipeline.dynamics.specialise.rules import RULES
+
+
+class Dual:
+    """A number and its changes along all directions, shape (directions,)."""
+
+    __slots__ = ("change", "value")
+    __hash__ = None  # type: ignore[assignment]
+
+    def __init__(self, value: Any, change: Any) -> None:
+        self.value, self.change = value, change
+
+    def __add__(self, other: Any) -> Dual:
+        if isinstance(other, Dual):
+            return Dual(self.value + other.value, self.change + other.change)
+        return Dual(self.value + other, self.change)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Dual:
+        if isinstance(other, Dual):
+            return Dual(self.value - other.value, self.change - other.change)
+        return Dual(self.value - other, self.change)
+
+    def __rsub__(self, other: Any) -> Dual:
+        return Dual(other - self.value, -self.change)
+
+    def __mul__(self, other: Any) -> Dual:
+        if isinstance(other, Dual):
+            return Dual(self.value * other.value, self.change * other.value + other.change * self.value)
+        return Dual(self.value * other, self.change * other)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Dual:
+        if isinstance(other, Dual):
+            quotient = self.value / other.value
+            return Dual(quotient, (self.change - quotient * other.change) / other.value)
+        return Dual(self.value / other, self.change / other)
+
+    def __rtruediv__(self, other: Any) -> Dual:
+        quotient = other / self.value
+        return Dual(quotient, -quotient / self.value * self.change)
+
+    def __pow__(self, other: Any) -> Any:
+        return self * self if not isinstance(other, Dual) and other == 2 else _apply("pow", operator.pow, self, other)
+
+    def __rpow__(self, other: Any) -> Any:
+        return _apply("pow", operator.pow, other, self)
+
+    def __neg__(self) -> Dual:
+        return Dual(-self.value, -self.change)
+
+    def __abs__(self) -> Dual:
+        return -self if self.value < 0.0 else self
+
+    def __lt__(self, other: Any) -> bool:
+        return bool(self.value < value(other))
+
+    def __le__(self, other: Any) -> bool:
+        return bool(self.value <= value(other))
+
+    def __gt__(self, other: Any) -> bool:
+        return bool(self.value > value(other))
+
+    def __ge__(self, other: Any) -> bool:
+        return bool(self.value >= value(other))
+
+    def __eq__(self, other: object) -> bool:
+        return bool(self.value == value(other))
+
+
+def value(number: Any) -> Any:
+    """Return a number without its changes."""
+    return number.value if isinstance(number, Dual) else number
+
+
+class _Numbers:
+    """Calculates what a tape writes down, for `RULES`."""
+
+    add, subtract, multiply = operator.add, operator.sub, operator.mul
+    divide, negate = operator.truediv, operator.neg
+
+    @staticmethod
+    def select(condition: Any, a: Any, b: Any) -> Any:
+        return a if condition else b
+
+    @staticmethod
+    def write(kind: str, operation: str, *arguments: Any) -> Any:
+        return np.power(*arguments) if operation == "pow" else getattr(np, operation)(*arguments)
+
+
+def _apply(name: str, function: Callable, *arguments: Any) -> Any:
+    """Return a function of numbers, with changes where one of them has some."""
+    if not any(isinstance(a, Dual) for a in arguments):
+        return function(*arguments)
+    values = tuple(map(value, arguments))
+    result = function(*values)
+    changes = tuple(a.change if isinstance(a, Dual) else 0.0 for a in arguments)
+    change = RULES[name](_Numbers, result, values, changes)
+    return Dual(result, change) if isinstance(change, np.ndarray) else result
+
+
+def _function(name: str) -> Callable:
+    return lambda *arguments: _apply(name, getattr(np, name), *arguments)
+
+
+def plain(kernel: Any) -> Callable:
+    """Return the kernel as a function of Python that takes such numbers."""
+    assert set(FUNCTIONS) <= RULES.keys()
+    made: Callable = Plain(_function, lambda a, b: b if b > a else a, lambda a, b: b if b < a else a)(kernel)
+    return made
+
+
+def seeded(values: np.ndarray, changes: np.ndarray) -> list[Any]:
+    """Return numbers of an array with their changes, shape (directions, len(values)); none where all are zero."""
+    moving = changes.any(axis=0)
+    return [Dual(v, changes[:, k].copy()) if moving[k] else v for k, v in enumerate(values)]
+
+
+def changes(numbers: Sequence[Any], directions: int) -> np.ndarray:
+    """Return the changes of numbers, shape (directions, len(numbers))."""
+    nothing = np.zeros(directions)
+    made = [number.change if isinstance(number, Dual) else nothing for number in numbers]
+    return np.array(made).reshape(len(made), directions).T.copy()
