@@ -173,7 +173,7 @@ def make_advance(
         return used >= 0
 
     @kernel
-    def carry_on(d, step, t_new, tolerance):
+    def carry_on(d, step, t_new, outputs):
         """The step to Y_NEW up to the next evaluation: PENDING, or what `try_step` gives."""
         if d.stage < ENDING:
             come = proceed(d, step)
@@ -192,18 +192,18 @@ def make_advance(
                 await_rates(d, t_new, d.at_y_new, d.at_slopes + d.ny * last)
                 d.stage = ENDING
                 return PENDING
-        if not finish(d, t_new, tolerance):
+        if not finish(d, t_new, open_loops(d, outputs, t_new)):
             return FAILED
         detect_stiffness(d, step)
         return d.norm
 
     @kernel
-    def try_step(d, step, t_new, tolerance):
+    def try_step(d, step, t_new, outputs):
         """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made, or PENDING."""
         if ready(d):
             arrive(d, step, t_new)
             return 0.0
-        norm = carry_on(d, step, t_new, tolerance)
+        norm = carry_on(d, step, t_new, outputs)
         if norm != PENDING:
             d.stage = 0
         return norm
@@ -274,7 +274,7 @@ def make_advance(
                 return False
             final = t + 1.0001 * step >= d.end
             t_new = d.end if final else t + step
-            norm = try_step(d, step, t_new, open_loops(d, outputs, t_new))
+            norm = try_step(d, step, t_new, outputs)
             if norm == PENDING:
                 return True
             if norm > 1.0:
