@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from functools import cached_property
+from functools import cache, cached_property
+from importlib import import_module
 from typing import Any
 
 #: releases of Numba with which `lowering` has been tested
@@ -24,11 +25,18 @@ LOOKED_AT = ("0.67.", "0.68.")
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "") not in ("", "0")
 
 
-def known_release() -> bool:
-    """Whether the release of Numba is known to take `lowering`."""
+@cache
+def lowering() -> Any:
+    """The module of that name; None where Numba is another release, or its inner parts are not what they were."""
     import numba
 
-    return str(numba.__version__).startswith(LOOKED_AT)
+    if not str(numba.__version__).startswith(LOOKED_AT):
+        return None
+    try:
+        made = import_module("flexclear.pipeline.dynamics.lowering")
+        return made if made.works() else None
+    except Exception:  # whatever Numba raises where it finds what it does not know
+        return None
 
 
 class Kernel:
@@ -64,10 +72,7 @@ def _compiled(function: Callable) -> Any:
         "no_cfunc_wrapper": True,
         "no_cpython_wrapper": True,
     }
-    if known_release():
-        from flexclear.pipeline.dynamics.lowering import KernelDispatcher
-
-        return KernelDispatcher.of(function, options)
     from numba import njit
 
-    return njit(**options)(function)
+    made = lowering()
+    return njit(**options, **({"pipeline_class": made.KernelCompiler} if made else {}))(function)

@@ -8,7 +8,6 @@ once, and so is the integrator, for all mechanisms. A call costs some nanosecond
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
 from llvmlite import ir
@@ -19,7 +18,7 @@ import flexclear.pipeline.dynamics.field_types  # noqa: F401  (Numba knows named
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.files import compiles, interpreted
 from flexclear.pipeline.dynamics.fields import data
-from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, known_release
+from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, lowering
 
 _INTEGERS, _FLOATS, _PLACE = types.CPointer(types.int64), types.CPointer(types.float64), types.int64
 _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
@@ -59,8 +58,8 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 def exported(name: str) -> Callable[[Callable], int]:
     """Decorator: compiles a C function; its address."""
     options: dict[str, Any] = {"error_model": "numpy"}
-    if not INTERPRETED and known_release():  # before anything is compiled: it spares Numba an import
-        options["pipeline_class"] = import_module("flexclear.pipeline.dynamics.lowering").WholeCompiler
+    if not INTERPRETED and lowering():
+        options["pipeline_class"] = lowering().WholeCompiler
     return compiles(cfunc(SIGNATURES[name], **options))
 
 
