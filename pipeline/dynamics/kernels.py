@@ -20,22 +20,27 @@ from importlib import import_module
 from typing import Any
 
 #: releases of Numba with which `lowering` has been tested
-LOOKED_AT = ("0.67.", "0.68.")
+TESTED = ("0.67.", "0.68.")
 #: for debugging: kernels are the functions of Python that they look like, as Numba's own setting has it
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "") not in ("", "0")
+
+
+def release_is_tested() -> bool:
+    """Whether `lowering` has been tested with the release of Numba that is there."""
+    import numba
+
+    return str(numba.__version__).startswith(TESTED)
 
 
 @cache
 def lowering() -> Any:
     """The module of that name; None where Numba is another release, or its inner parts are not what they were."""
-    import numba
-
-    if not str(numba.__version__).startswith(LOOKED_AT):
+    if not release_is_tested():
         return None
     try:
         made = import_module("flexclear.pipeline.dynamics.lowering")
         return made if made.works() else None
-    except Exception:  # whatever Numba raises where it finds what it does not know
+    except Exception:  # whatever Numba raises where it is given what it does not know
         return None
 
 
@@ -54,7 +59,10 @@ class Kernel:
     @cached_property
     def _numba_type_(self) -> Any:
         """What Numba takes it for where other kernels name it."""
-        return self.dispatcher._numba_type_
+        from numba import typeof
+
+        made = lowering()
+        return made.KernelType(self.dispatcher) if made else typeof(self.dispatcher)
 
 
 def kernel(function: Callable) -> Any:
@@ -74,5 +82,6 @@ def _compiled(function: Callable) -> Any:
     }
     from numba import njit
 
+    import_module("flexclear.pipeline.dynamics.field_types")  # named fields, which kernels use
     made = lowering()
     return njit(**options, **({"pipeline_class": made.KernelCompiler} if made else {}))(function)

@@ -12,15 +12,14 @@ from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba import cfunc, njit
-from numba.core import typed_passes as typed
-from numba.core import untyped_passes as untyped
+from numba import cfunc, njit, types
 from numba.core.cgutils import normalize_ir_text
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.registry import cpu_target
 from numba.core.typed_passes import NativeLowering
+from numba.extending import models, register_model
 
 
 class Part(JITCodeLibrary):
@@ -134,52 +133,42 @@ class WholeLowering(PartLowering):
     library_class = Whole
 
 
-#: Numba's steps that kernels have a use for, in Numba's order. What is left out makes functions of comprehensions and
-#: closures, fuses expressions of arrays, lifts loops and lists what could run in parallel: kernels have none of these,
-#: and each step takes its time on each of some hundred kernels.
-STEPS = (
-    untyped.TranslateByteCode,
-    untyped.FixupArgs,
-    untyped.IRProcessing,
-    untyped.RewriteSemanticConstants,
-    untyped.DeadBranchPrune,
-    untyped.GenericRewrites,
-    untyped.ReconstructSSA,
-    untyped.DeadBranchPrune,
-    typed.NopythonTypeInference,
-    typed.PreLowerStripPhis,
-    typed.NoPythonSupportedFeatureValidation,
-    typed.IRLegalization,
-    typed.AnnotateTypes,
-    PartLowering,
-    typed.NoPythonBackend,
-)
+def _pipeline(state: Any, lowering: type[NativeLowering]) -> list[PassManager]:
+    """Numba's pipeline with another lowering; there is no object mode to fall back to."""
+    manager = PassManager(lowering.__name__)
+    for step, what in DefaultPassBuilder.define_nopython_pipeline(state).passes:
+        manager.add_pass(lowering if step is NativeLowering else step, what)
+    manager.finalize()
+    return [manager]
 
 
 class KernelCompiler(CompilerBase):
-    """Numba's pipeline, less the steps that kernels have no use for, with `PartLowering`."""
-
-    def define_pipelines(self) -> list[PassManager]:
-        """The only one; there is no object mode to fall back to."""
-        # h, f, w and n are four arrays: what is written into w changes nothing that was read from h
-        self.state.flags.noalias = True
-        manager = PassManager("kernel")
-        for step in STEPS:
-            manager.add_pass(step, step.__name__)
-        manager.finalize()
-        return [manager]
-
-
-class WholeCompiler(CompilerBase):
-    """Numba's pipeline with `WholeLowering`."""
+    """Compiles a kernel into a `Part`."""
 
     def define_pipelines(self) -> list[PassManager]:
         """The only one."""
-        manager = PassManager("whole")
-        for step, what in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
-            manager.add_pass(WholeLowering if step is NativeLowering else step, what)
-        manager.finalize()
-        return [manager]
+        # h, f, w and n are four arrays: what is written into w changes nothing that was read from h
+        self.state.flags.noalias = True
+        return _pipeline(self.state, PartLowering)
+
+
+class WholeCompiler(CompilerBase):
+    """Compiles a function that Python calls into a `Whole`."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """The only one."""
+        return _pipeline(self.state, WholeLowering)
+
+
+class KernelType(types.Dispatcher):
+    """A kernel where others name it: compiled for integers, not anew for each integer that is written out."""
+
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        """Signature of a call."""
+        return super().get_call_type(context, tuple(map(types.unliteral, args)), kws)
+
+
+register_model(KernelType)(models.OpaqueModel)
 
 
 def works() -> bool:
