@@ -1,6 +1,6 @@
 """Named fields (`fields`) as Numba types: a pointer each, and loads and stores where a kernel names a field.
 
-Only what Numba documents for extensions is used; but for `make_intrinsic_template`.
+Only what Numba documents for extensions is used.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from typing import Any
 
 from numba import types
 from numba.core import cgutils
-from numba.core.typing.templates import AttributeTemplate, make_intrinsic_template
+from numba.core.typing.templates import AttributeTemplate
 from numba.extending import (
     infer_getattr,
     lower_builtin,
@@ -22,6 +22,7 @@ from numba.extending import (
 )
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.fields import data
 
 POINTERS = {
     "h": types.CPointer(types.int64),
@@ -78,22 +79,22 @@ class _PointerModel(models.StructModel):
         super().__init__(manager, kind, [("begin", kind.pointer)])
 
 
-def _constructed(typing_context: Any, h: Any, f: Any, w: Any, n: Any) -> Any:
-    """Type and code of the four arrays with named fields."""
+@type_callable(data)
+def _of_arrays(context: Any) -> Any:
+    def typed(h: Any, f: Any, w: Any, n: Any) -> Any:
+        return DATA
 
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        made = cgutils.create_struct_proxy(DATA)(context, builder)
-        for (name, _), kind, value in zip(POINTERS.items(), signature.args, values, strict=True):
-            if isinstance(kind, types.Array):
-                value = context.make_array(kind)(context, builder, value).data
-            setattr(made, name, value)
-        return made._getvalue()
-
-    return DATA(h, f, w, n), generate
+    return typed
 
 
-#: what Numba takes `fields.data` for
-CONSTRUCTOR = types.Function(make_intrinsic_template(_constructed, _constructed, "data"))
+@lower_builtin(data, types.Any, types.Any, types.Any, types.Any)
+def _construct(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+    made = cgutils.create_struct_proxy(DATA)(context, builder)
+    for (name, _), kind, value in zip(POINTERS.items(), signature.args, values, strict=True):
+        if isinstance(kind, types.Array):
+            value = context.make_array(kind)(context, builder, value).data
+        setattr(made, name, value)
+    return made._getvalue()
 
 
 @infer_getattr

@@ -17,10 +17,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
-
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.kernels import INTERPRETED, Kernel
 
 
 class Stretch:
@@ -135,19 +132,6 @@ for _name in m.NAMED:
     setattr(Data, _name, _rows(_name))
 
 
-def _data(h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray) -> Data:
+def data(h: Any, f: Any, w: Any, n: Any) -> Any:
+    """The four arrays with named fields; what compiled code calls is in `field_types`."""
     return Data(h, f, w, n)
-
-
-class _Constructor(Kernel):
-    """`data` where it is called by compiled code."""
-
-    @property
-    def _numba_type_(self) -> Any:
-        from flexclear.pipeline.dynamics.field_types import CONSTRUCTOR
-
-        return CONSTRUCTOR
-
-
-#: data(h, f, w, n): the four arrays with named fields
-data: Any = _data if INTERPRETED else _Constructor(_data, lambda function: None)

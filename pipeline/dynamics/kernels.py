@@ -15,20 +15,33 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from functools import cached_property
+from functools import cache, cached_property
+from importlib import import_module
 from typing import Any
 
 #: releases of Numba with which `lowering` has been tested
-LOOKED_AT = ("0.67.", "0.68.")
+TESTED = ("0.67.", "0.68.")
 #: for debugging: kernels are the functions of Python that they look like, as Numba's own setting has it
 INTERPRETED = os.environ.get("NUMBA_DISABLE_JIT", "") not in ("", "0")
 
 
-def known_release() -> bool:
-    """Whether the release of Numba is known to take `lowering`."""
+def release_is_tested() -> bool:
+    """Whether `lowering` has been tested with the release of Numba that is there."""
     import numba
 
-    return str(numba.__version__).startswith(LOOKED_AT)
+    return str(numba.__version__).startswith(TESTED)
+
+
+@cache
+def lowering() -> Any:
+    """The module of that name; None where Numba is another release, or its inner parts are not what they were."""
+    if not release_is_tested():
+        return None
+    try:
+        made = import_module("flexclear.pipeline.dynamics.lowering")
+        return made if made.works() else None
+    except Exception:  # whatever Numba raises where it is given what it does not know
+        return None
 
 
 class Kernel:
@@ -46,7 +59,10 @@ class Kernel:
     @cached_property
     def _numba_type_(self) -> Any:
         """What Numba takes it for where other kernels name it."""
-        return self.dispatcher._numba_type_
+        from numba import typeof
+
+        made = lowering()
+        return made.KernelType(self.dispatcher) if made else typeof(self.dispatcher)
 
 
 def kernel(function: Callable) -> Any:
@@ -64,10 +80,8 @@ def _compiled(function: Callable) -> Any:
         "no_cfunc_wrapper": True,
         "no_cpython_wrapper": True,
     }
-    if known_release():
-        from flexclear.pipeline.dynamics.lowering import KernelDispatcher
-
-        return KernelDispatcher.of(function, options)
     from numba import njit
 
-    return njit(**options)(function)
+    import_module("flexclear.pipeline.dynamics.field_types")  # named fields, which kernels use
+    made = lowering()
+    return njit(**options, **({"pipeline_class": made.KernelCompiler} if made else {}))(function)

@@ -1,56 +1,25 @@
-"""A step of Numba's compiler in another form: kernels become code without being optimised, so that what is called
-through n kernels is optimised once, and not n times.
+"""Kernels become code without being optimised, so that what is called through n kernels is optimised once, and not n
+times.
 
-It needs parts of Numba that nobody promises to keep, and is taken with releases that it has been tested with;
-`kernels` says which. With others kernels are compiled as Numba does it: longer, and just as right.
+It needs parts of Numba that nobody promises to keep, and is taken where they do what they did (`works`), with releases
+that it has been tested with; `kernels` says which. Else kernels are compiled as Numba does it: three times as long, and
+just as right.
 """
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
 from functools import cache
-from types import ModuleType
-from typing import Any, ClassVar
+from typing import Any
 
 import llvmlite.binding as llvm
-from numba import types
-from numba.core import ir
-from numba.core import typed_passes as typed
-from numba.core import untyped_passes as untyped
+from numba import cfunc, njit, types
 from numba.core.cgutils import normalize_ir_text
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import PassManager, _pass_registry, register_pass
-from numba.core.errors import TypingError
-from numba.core.ir_utils import build_definitions
-from numba.core.lowering import Lower
-from numba.core.registry import CPUDispatcher, cpu_target
-from numba.core.rewrites import rewrite_registry
-from numba.core.sigutils import normalize_signature
-from numba.core.ssa import reconstruct_ssa
-from numba.core.transforms import canonicalize_cfg
+from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.registry import cpu_target
 from numba.core.typed_passes import NativeLowering
-from numba.core.typeinfer import ConstraintNetwork, TypeInferer
-
-
-@contextmanager
-def _taken_for_there(name: str) -> Iterator[None]:
-    """Whoever looks meanwhile whether there is a module, finds one, and need not import it."""
-    if name in sys.modules:
-        yield
-        return
-    sys.modules[name] = ModuleType(name)
-    try:
-        yield
-    finally:
-        del sys.modules[name]
-
-
-# Numba asks whether SciPy has a BLAS by importing SciPy's linear algebra, which takes as long as a dozen kernels
-with _taken_for_there("scipy.linalg.cython_blas"):
-    import numba.np.arraymath  # noqa: F401
+from numba.extending import models, register_model
 
 
 class Part(JITCodeLibrary):
@@ -143,125 +112,10 @@ def _function_passes() -> Any:
 
 
 @register_pass(mutates_CFG=True, analysis_only=False)
-class Flow(untyped.IRProcessing):
-    """Loops have one way back."""
-
-    _name = "flow"
-
-    def run_pass(self, state: Any) -> bool:
-        """What lives how long is of interest at the end only (`IRLegalization`); Numba finds it five times over."""
-        state.func_ir.blocks = canonicalize_cfg(state.func_ir.blocks)
-        return True
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class Rewrites(untyped.GenericRewrites):
-    """Indices, powers and the like that are written out are distinguished from those that are computed."""
-
-    _name = "rewrites"
-
-    def run_pass(self, state: Any) -> bool:
-        """Each rewriting of each block until it finds nothing more."""
-        blocks = state.func_ir.blocks
-        for kind in rewrite_registry.rewrites["before-inference"]:
-            rewrite, left = kind(state), list(blocks)
-            while left:
-                block = left.pop()
-                if rewrite.match(state.func_ir, blocks[block], state.typemap, state.calltypes):
-                    blocks[block] = rewrite.apply()
-                    left.append(block)
-        return True
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class Versions(untyped.ReconstructSSA):
-    """A variable that is assigned more than once becomes several."""
-
-    _name = "versions"
-
-    def run_pass(self, state: Any) -> bool:
-        """As of any function."""
-        state.func_ir = reconstruct_ssa(state.func_ir)
-        state.func_ir._definitions = build_definitions(state.func_ir.blocks)
-        return True
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class Joins(typed.PreLowerStripPhis):
-    """Where ways meet, a variable has its value from the way that was taken."""
-
-    _name = "joins"
-
-    def run_pass(self, state: Any) -> bool:
-        """As of any function."""
-        state.func_ir = self._strip_phi_nodes(state.func_ir)
-        state.func_ir._definitions = build_definitions(state.func_ir.blocks)
-        return True
-
-
-class Constraints(ConstraintNetwork):
-    """What follows for the types of variables; what Numba would warn of does not occur between numbers."""
-
-    def propagate(self, infer: Any) -> list[Exception]:
-        """Errors, which may be for want of a type that is found later."""
-        errors: list[Exception] = []
-        for constraint in self.constraints:
-            try:
-                constraint(infer)
-            except TypingError as error:
-                errors.append(error)
-        return errors
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
-class KernelTypes(typed.NopythonTypeInference):
-    """Types of a kernel's variables."""
-
-    _name = "kernel_types"
-
-    def run_pass(self, state: Any) -> bool:
-        """As of any function, but for the warnings that nobody waits for."""
-        context, code = state.typingctx, state.func_ir
-        infer = TypeInferer(context, code, None)
-        infer.constraints = Constraints()
-        with context.callstack.register(state.targetctx.target, infer, code.func_id, state.args):
-            for index, (name, kind) in enumerate(zip(code.arg_names, state.args, strict=True)):
-                infer.seed_argument(name, index, kind)
-            infer.build_constraint()
-            infer.propagate()
-            state.typemap, state.return_type, state.calltypes = infer.unify()
-        return True
-
-
-class KernelLower(Lower):
-    """Numba's lowering without the words for messages that it forms at each statement."""
-
-    def lower_block(self, block: Any) -> None:
-        """Statement by statement."""
-        self.pre_block(block)
-        for statement in block.body:
-            self.loc = statement.loc
-            self.lower_inst(statement)
-        self.post_block(block)
-
-    def lower_inst(self, statement: Any) -> None:
-        """Most assign a value, or say that one is not needed any more."""
-        if isinstance(statement, ir.Assign):
-            name, value = statement.target.name, statement.value
-            argument = value.index + 1 if isinstance(value, ir.Arg) else None
-            self.storevar(self.lower_assign(self.typeof(name), statement), name, argidx=argument)
-        elif isinstance(statement, ir.Del):
-            self.delvar(statement.value)
-        else:
-            super().lower_inst(statement)
-
-
-@register_pass(mutates_CFG=True, analysis_only=False)
 class PartLowering(NativeLowering):
     """Lowers a kernel into a `Part`."""
 
     _name = "part_lowering"
-    lowering_class = KernelLower
     library_class: type[JITCodeLibrary] = Part
 
     def run_pass(self, state: Any) -> bool:
@@ -279,129 +133,48 @@ class WholeLowering(PartLowering):
     library_class = Whole
 
 
-#: Numba's steps that kernels have a use for, in Numba's order. What is left out makes functions of comprehensions and
-#: closures, fuses expressions of arrays, lifts loops and lists what could run in parallel: kernels have none of these,
-#: and each step takes its time on each of some hundred kernels.
-STEPS = (
-    untyped.TranslateByteCode,
-    untyped.FixupArgs,
-    Flow,
-    untyped.RewriteSemanticConstants,
-    untyped.DeadBranchPrune,
-    Rewrites,
-    Versions,
-    untyped.DeadBranchPrune,
-    KernelTypes,
-    Joins,
-    typed.NoPythonSupportedFeatureValidation,
-    typed.IRLegalization,
-    typed.AnnotateTypes,
-    PartLowering,
-    typed.NoPythonBackend,
-)
-
-
-class Steps(PassManager):
-    """One after another; Numba's own manager works the flow of control out again after each."""
-
-    def run(self, state: Any) -> None:
-        """All of them."""
-        for step, _ in self.passes:
-            _pass_registry.get(step).pass_inst.run_pass(state)
-
-
-def _pipeline() -> Steps:
-    steps = Steps("kernel")
-    for step in STEPS:
-        steps.add_pass(step, step._name)
-    steps.finalize()
-    return steps
-
-
-PIPELINE = _pipeline()
-
-
-#: types of what kernels compute with
-PLAIN = (types.Number, types.Boolean, types.Literal, types.UniTuple, types.CPointer)
-
-
-class Target:
-    """Numba's context of code, as it was when the function that reaches the kernels began to be compiled.
-
-    Looking through all registries for news before each kernel took a twentieth of the time.
-    """
-
-    def __init__(self, context: Any) -> None:
-        self._context = context
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._context, name)
-
-    def refresh(self) -> None:
-        """Nothing."""
-
-
-class Typing(Target):
-    """Numba's context of types, which remembers what operators and functions make of numbers.
-
-    Numba tries all that is ever called `+`, arrays first, at each `+` anew.
-    """
-
-    types: ClassVar[dict[tuple[Any, Any], Any]] = {}
-
-    def resolve_function_type(self, function: Any, arguments: Any, names: Any) -> Any:
-        """Signature of a call; kernels are compiled for integers, not anew for each integer that is written out."""
-        if isinstance(function, types.Dispatcher):
-            return self._context.resolve_function_type(function, tuple(map(types.unliteral, arguments)), names)
-        plain = not names and all(isinstance(kind, PLAIN) for kind in arguments)
-        if not plain or not isinstance(function, types.Function):
-            return self._context.resolve_function_type(function, arguments, names)
-        if (function, arguments) not in self.types:
-            self.types[function, arguments] = self._context.resolve_function_type(function, arguments, names)
-        return self.types[function, arguments]
-
-
-class KernelDispatcher(CPUDispatcher):
-    """Compiles a kernel by the types of its arguments; nobody listens how long that takes."""
-
-    @classmethod
-    def of(cls, function: Any, options: Mapping[str, Any]) -> KernelDispatcher:
-        """What compiles a function; options: as `numba.njit` has them."""
-        return cls(
-            function, targetoptions={"nopython": True, "boundscheck": None, **options}, pipeline_class=KernelCompiler
-        )
-
-    def compile(self, sig: Any) -> Any:
-        """Entry point of what has been compiled for these types."""
-        arguments, returned = normalize_signature(sig)
-        overload = self.overloads.get(tuple(arguments))
-        if overload is None:
-            with self._compiling_counter:
-                overload = self._compiler.compile(arguments, returned)
-                self.add_overload(overload)
-        return overload.entry_point
+def _pipeline(state: Any, lowering: type[NativeLowering]) -> list[PassManager]:
+    """Numba's pipeline with another lowering; there is no object mode to fall back to."""
+    manager = PassManager(lowering.__name__)
+    for step, what in DefaultPassBuilder.define_nopython_pipeline(state).passes:
+        manager.add_pass(lowering if step is NativeLowering else step, what)
+    manager.finalize()
+    return [manager]
 
 
 class KernelCompiler(CompilerBase):
-    """Numba's pipeline, less the steps that kernels have no use for, with `PartLowering`."""
-
-    def __init__(self, typing: Any, target: Any, *others: Any) -> None:
-        super().__init__(Typing(typing), Target(target), *others)
-        # h, f, w and n are four arrays: what is written into w changes nothing that was read from h
-        self.state.flags.noalias = True
-
-    def define_pipelines(self) -> list[PassManager]:
-        """The only one; there is no object mode to fall back to."""
-        return [PIPELINE]
-
-
-class WholeCompiler(CompilerBase):
-    """Numba's pipeline with `WholeLowering`."""
+    """Compiles a kernel into a `Part`."""
 
     def define_pipelines(self) -> list[PassManager]:
         """The only one."""
-        manager = PassManager("whole")
-        for step, what in DefaultPassBuilder.define_nopython_pipeline(self.state).passes:
-            manager.add_pass(WholeLowering if step is NativeLowering else step, what)
-        manager.finalize()
-        return [manager]
+        # h, f, w and n are four arrays: what is written into w changes nothing that was read from h
+        self.state.flags.noalias = True
+        return _pipeline(self.state, PartLowering)
+
+
+class WholeCompiler(CompilerBase):
+    """Compiles a function that Python calls into a `Whole`."""
+
+    def define_pipelines(self) -> list[PassManager]:
+        """The only one."""
+        return _pipeline(self.state, WholeLowering)
+
+
+class KernelType(types.Dispatcher):
+    """A kernel where others name it: compiled for integers, not anew for each integer that is written out."""
+
+    def get_call_type(self, context: Any, args: Any, kws: Any) -> Any:
+        """Signature of a call."""
+        return super().get_call_type(context, tuple(map(types.unliteral, args)), kws)
+
+
+register_model(KernelType)(models.OpaqueModel)
+
+
+def works() -> bool:
+    """Whether a function of two kernels is compiled this way and gives what it should; raises what Numba raises."""
+    compiled = njit(no_cfunc_wrapper=True, no_cpython_wrapper=True, _nrt=False, pipeline_class=KernelCompiler)
+    inner = compiled(lambda x: x + 1.0)
+    outer = compiled(lambda x: 2.0 * inner(x))
+    whole = cfunc("float64(float64)", pipeline_class=WholeCompiler)(lambda x: outer(x) - inner(x))
+    return bool(whole.ctypes(2.0) == 3.0)

@@ -353,33 +353,37 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # row has left of the most that it had, steps in a row that ended blindly close to a pose;
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
 # what the last first step with a contact closed could have been, whether the next accepted step is the first one of a
-# segment
+# segment;
+# then what an attempt leaves that waits for rates (`method.await_rates`): its length, its error norm, the state's time
 # fmt: off
 (
     TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST,
     SIGMA, PAST_TIME, PASS_TIME, REACH, MOST_REACH, COLLOCATED, FRACTION, LEFT, BLIND_STEPS,
-    REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST,
+    REJECTED_STEP, REJECTED_NORM, TOUCHED_STEP, FIRST, TRIED, NORM, AWAITED_TIME,
 ) = _floats(
     CONTROL,
     "time step end rtol span length drift last_norm most_growth fixed parameter rate_drift steepest "
     "sigma past_time pass_time reach most_reach collocated fraction left blind_steps "
-    "rejected_step rejected_norm touched_step first",
+    "rejected_step rejected_norm touched_step first tried norm awaited_time",
 )
 # fmt: on
-N_CONTROLS = FIRST + 1
+N_CONTROLS = AWAITED_TIME + 1
 
 # Integers in n -------------------------------------------------------------------------------------------------------
 # report of the last evaluation; where the laws' active pieces and the contacts' modes start in n; where the state
-# being evaluated starts in w; whether the last evaluation left no more than the steps read; then the stepper's own
+# being evaluated starts in w; whether the last evaluation left no more than the steps read; whether the stepper comes
+# back wherever an attempt waits for rates; then the stepper's own, at the end how far an attempt has come (0: there is
+# none) and where in w the state is whose rates it waits for, and these shall be
 _INTEGERS = _numbered(
-    "evaluation active mode state abridged status evaluations steps rejected next_output n_recorded n_events budget "
-    "cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps"
+    "evaluation active mode state abridged together status evaluations steps rejected next_output n_recorded n_events "
+    "budget cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps stage awaited "
+    "awaited_slope"
 )
 # fmt: off
 (
-    EVALUATION, ACTIVE, MODE, STATE, ABRIDGED,
+    EVALUATION, ACTIVE, MODE, STATE, ABRIDGED, TOGETHER,
     STATUS, EVALUATIONS, STEPS, REJECTED, NEXT_OUTPUT, N_RECORDED, N_EVENTS, BUDGET, CAP, FRESH, IMMEDIATE,
-    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS,
+    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, STAGE, AWAITED, AWAITED_SLOPE,
 ) = _INTEGERS.values()
 # fmt: on
 INTEGERS = len(_INTEGERS)

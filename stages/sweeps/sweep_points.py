@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from pathlib import Path
@@ -96,15 +97,13 @@ def _abreast(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]], 
     """Points side by side, each in a thread, where that can be."""
     from flexclear.pipeline.core.workflow.cores import side_by_side
 
-    with runner.abreast(scene, len(points)) as groups:
+    places = runner.abreast(scene, len(points))
 
-        def one(k: int, alive: Progress) -> Point:
-            if groups is None:
-                return _point(runner, scene, points[k], own[k], alive=alive)
-            with groups.place() as where:
-                return _point(runner, scene, points[k], own[k], where, alive)
+    def one(k: int, alive: Progress) -> Point:
+        with places.place() if places else nullcontext() as where:
+            return _point(runner, scene, points[k], own[k], where, alive)
 
-        return side_by_side(one, len(points), lambda _: None, 1 if groups is None else groups.lanes)
+    return side_by_side(one, len(points), lambda _: None, places.seats if places else 1)
 
 
 def _point(

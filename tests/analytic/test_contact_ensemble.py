@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import itertools
 import threading
-from collections.abc import Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +17,6 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import cores
-from flexclear.pipeline.dynamics.compile import stacks
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.run import trajectory
 from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation, specialised
@@ -75,16 +72,21 @@ def test_members_are_the_same_to_the_last_bit_however_many_are_evaluated_at_once
     """Also with fewer lanes than members, and with fewer members than lanes; that lanes are used is looked at."""
     monkeypatch.setattr(cores, "cores", lambda: 1)
     monkeypatch.setattr(specialised, "LANES", (lanes,))
-    known, made = six(), list[int]()
-    proper = batched_evaluation.LaneGroup
+    known, made = six(), listened(monkeypatch)
+    assert dynamics.ensemble(scene(members=6), {}, silent).identical(known)
+    assert [len(group._words) for group in made] == ([] if INTERPRETED else [lanes])
 
-    def noted(kept: bytes, code: batched_evaluation.Code, width: int) -> batched_evaluation.LaneGroup:
-        made.append(width)
-        return proper(kept, code, width)
+
+def listened(monkeypatch: pytest.MonkeyPatch) -> list[batched_evaluation.LaneGroup]:
+    """The groups that will be made."""
+    proper, made = batched_evaluation.LaneGroup, list[batched_evaluation.LaneGroup]()
+
+    def noted(*given: Any) -> batched_evaluation.LaneGroup:
+        made.append(proper(*given))
+        return made[-1]
 
     monkeypatch.setattr(batched_evaluation, "LaneGroup", noted)
-    assert dynamics.ensemble(scene(members=6), {}, silent).identical(known)
-    assert made == ([lanes] if stacks.supported() and not INTERPRETED else [])
+    return made
 
 
 @cache
@@ -103,23 +105,16 @@ def test_impacts_with_friction_in_a_closed_mechanism_are_the_same_to_the_last_bi
     asked = {"members": 4, "perturbation": "1 um"}
     paper = load_scene(TREE / "scenes/sps4/csj.toml", override={"ensemble": asked, "time.end": "60 ms"})
     monkeypatch.setattr(cores, "cores", lambda: 1)
+    made = listened(monkeypatch)
     together = dynamics.ensemble(paper, {}, silent)
+    assert [bool(group._places.any()) for group in made] == ([] if INTERPRETED else [True])  # several at once
     assert (together.impact_count.values > 5).all()
     assert not np.array_equal(together.position[0], together.position[1])
     monkeypatch.setattr(specialised, "FEW", 5)
     assert dynamics.ensemble(paper, {}, silent).identical(together)
 
 
-def test_stacks_are_not_switched_where_the_processor_keeps_a_second_one(tmp_path: Path) -> None:
-    """As Linux 6.6 and later tell of it; others and other systems tell nothing."""
-    told = tmp_path / "status"
-    assert not stacks.shadowed(told)
-    for line, known in (("x86_Thread_features:\tshstk wrss ", True), ("x86_Thread_features_locked:\tshstk ", False)):
-        told.write_text(f"Name:\tpython\n{line}\n", encoding="utf-8", newline="\n")
-        assert stacks.shadowed(told) == known
-
-
-def test_steps_in_a_crew_end_when_one_of_its_members_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_members_together_end_when_one_of_them_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     """The others are told at their next pause; nobody waits for ever."""
     monkeypatch.setattr(cores, "cores", lambda: 1)
     proper, begun = trajectory._begin_closed, itertools.count()
@@ -132,20 +127,7 @@ def test_steps_in_a_crew_end_when_one_of_its_members_fails(monkeypatch: pytest.M
     monkeypatch.setattr(trajectory, "_begin_closed", fails)
     with pytest.raises(SolverError, match="the third"):
         dynamics.ensemble(scene(), {}, silent)
-    assert not [one for one in threading.enumerate() if one.name == "steps side by side"]
-
-
-@pytest.mark.skipif(INTERPRETED or not stacks.supported(), reason="each member takes its own steps here")
-def test_nobody_waits_for_a_crew_whose_thread_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cores, "cores", lambda: 1)
-
-    def none_left(self: stacks.Stacks, k: int, function: int, arguments: Sequence[int]) -> None:
-        raise MemoryError("the first")
-
-    monkeypatch.setattr(stacks.Stacks, "begin", none_left)
-    with pytest.raises(MemoryError, match="the first"):
-        dynamics.ensemble(scene(), {}, silent)
-    assert not [one for one in threading.enumerate() if one.name == "steps side by side"]
+    assert threading.active_count() == 1
 
 
 def test_of_members_side_by_side_the_first_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -12,11 +12,11 @@ from numba import carray, cfunc, njit
 from numba.core.codegen import CPUCodeLibrary
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.kernels import kernel, known_release
+from flexclear.pipeline.dynamics.kernels import kernel, release_is_tested
 from flexclear.pipeline.dynamics.lowering import Part, Whole, WholeCompiler
 
 #: with other releases kernels compile as Numba does it, to the same results
-needs_lowering = pytest.mark.skipif(not known_release(), reason="this release of Numba has not been looked at")
+needs_lowering = pytest.mark.skipif(not release_is_tested(), reason="`lowering` has not been tested with this release")
 
 
 def tower() -> tuple[Callable, Callable, Callable]:

@@ -1,4 +1,4 @@
-"""The compiler's step in another form is a gain of time, and no need."""
+"""What is taken from inside Numba is a gain of time, and no need: hidden, the same comes out of its public ways."""
 
 from __future__ import annotations
 
@@ -6,21 +6,93 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import cfunc
+
+from flexclear.pipeline.dynamics import kernels
+from flexclear.pipeline.dynamics.compile import machine_code
 
 RUN = """
-import numba
-numba.__version__ = "0.99.0"
+{hide}
+from flexclear.pipeline.dynamics import kernels
 from flexclear.pipeline.dynamics.vectors import cross
 from numba import njit
 @njit
 def probe(a, b):
     return cross(a, b)
-print(probe((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "flexclear.pipeline.dynamics.lowering" in __import__("sys").modules)
+print(probe((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), kernels.lowering() is not None)
 """
+#: hidden from `lowering` alone: Numba itself needs it
+HERE = """
+import flexclear.pipeline.dynamics.lowering as lowering
+@property
+def hidden(self):
+    raise AttributeError
+"""
+#: another release, and this one with something that `lowering` needs hidden or of another shape
+HIDDEN = (
+    "import numba; numba.__version__ = '0.99.0'",
+    "from numba.core import codegen; del codegen.JITCodeLibrary",
+    *(f"{HERE}lowering.Part.{name} = hidden" for name in ("_codegen", "_linking_libraries", "_raise_if_finalized")),
+    f"{HERE}lowering._function_passes = lambda: 0",
+    f"{HERE}lowering.DefaultPassBuilder = None",
+    f"{HERE}lowering.normalize_ir_text = lambda text: ''",
+    f"{HERE}lowering.Whole._optimize_final_module = hidden",
+    f"{HERE}lowering.works = lambda: False",
+)
 
 
-def test_with_an_unknown_release_of_numba_kernels_are_compiled_as_it_does(root: Path) -> None:
+@pytest.mark.parametrize("hide", HIDDEN)
+def test_with_another_numba_kernels_are_compiled_as_it_does(root: Path, hide: str) -> None:
+    code = RUN.format(hide=hide)
     done = subprocess.run(
-        [sys.executable, "-c", RUN], cwd=root, env={**os.environ}, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code], cwd=root, env={**os.environ}, capture_output=True, text=True, check=False
     )
     assert done.stdout.split("\n")[0] == "(0.0, 0.0, 1.0) False", done.stderr
+
+
+def test_with_a_release_is_tested_they_are_compiled_in_parts() -> None:
+    """So that what is hidden above is what makes the difference."""
+    made = kernels.lowering()
+    assert (made is not None) == kernels.release_is_tested()
+    assert made is None or made.works()
+
+
+class Hidden:
+    """A compiled function of which only what Numba documents is there, or a library of another shape."""
+
+    def __init__(self, function: Any, **private: Any) -> None:
+        self.native_name, self.inspect_llvm = function.native_name, function.inspect_llvm
+        for name, value in private.items():
+            setattr(self, name, value)
+
+
+class Other:
+    """A library that names its module alike, and keeps nothing else."""
+
+    def __init__(self, library: Any) -> None:
+        self._final_module = library._final_module
+
+
+@pytest.mark.parametrize("shape", ["hidden", "without code", "with other code"])
+def test_code_is_stored_without_what_numba_keeps_to_itself(shape: str) -> None:
+    """From the text of LLVM that it shows, to the same values; what is called by it is called."""
+
+    def function(x, y):
+        return np.sin(x) * y + np.exp(x)
+
+    made = cfunc("float64(float64, float64)", error_model="numpy")(function)
+    private: dict[str, Any] = {"hidden": {}, "without code": {"_library": Other(made._library)}}.get(shape, {})
+    if shape == "with other code":
+        private = {"_library": Other(made._library)}
+        private["_library"]._get_compiled_object = lambda: "text"
+    stored = machine_code.image(Hidden(made, **private))
+    known = machine_code.image(made)
+    assert stored.partition(b"\n")[2] != b""
+    for image in (stored, known):
+        code = machine_code.load(image)
+        loaded = type(made.ctypes)(code.address)
+        assert [loaded(x, 3.0) for x in (0.1, 0.7, 40.0)] == [made.ctypes(x, 3.0) for x in (0.1, 0.7, 40.0)]

@@ -14,7 +14,6 @@ from flexclear.pipeline.core.scene.load import load_scene, with_numbers
 from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import journal
-from flexclear.pipeline.dynamics.compile import stacks
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.record import point as points_of
 from flexclear.pipeline.dynamics.record.point import Runner
@@ -22,7 +21,6 @@ from flexclear.pipeline.dynamics.run import alike
 from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
 from flexclear.stages.sweeps import sweep_engine, sweep_points
 
-SIDE_BY_SIDE = stacks.supported() and not INTERPRETED
 BALL = ("ball.velocity.largest", "contact.peak_force", "contact.impact_times.last", "ball.position.final")
 
 
@@ -49,12 +47,12 @@ def assert_same(found: Sequence[Point], known: Sequence[Point]) -> None:
 
 @pytest.fixture
 def evaluations_abreast(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """How many engines each crew lets step side by side."""
+    """The lanes of each group."""
     proper, made = batched_evaluation.LaneGroup, list[int]()
 
-    def noted(kept: bytes, code: batched_evaluation.Code, lanes: int) -> batched_evaluation.LaneGroup:
-        made.append(lanes)
-        return proper(kept, code, lanes)
+    def noted(rows: bytes, address: int, numbers: int, width: int) -> batched_evaluation.LaneGroup:
+        made.append(width)
+        return proper(rows, address, numbers, width)
 
     monkeypatch.setattr(batched_evaluation, "LaneGroup", noted)
     return made
@@ -71,10 +69,12 @@ def test_points_are_the_same_to_the_last_bit_whoever_is_beside_them(root: Path, 
     assert_same(abreast(ball, points, error=True), known)
     assert_same(abreast(ball, points[::-1], error=True), known[::-1])
     assert_same(abreast(ball, points[:3], error=True), known[:3])
-    assert evaluations_abreast == ([points_of.ABREAST] * 3 if SIDE_BY_SIDE else [])
+    assert evaluations_abreast == ([points_of.ABREAST] * 3 if not INTERPRETED else [])
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "exponential"])  # that evaluates with the kernels now and then
+@pytest.mark.parametrize(
+    "integrator", ["dop853", "dopri5", "exponential"]
+)  # that evaluates with the kernels now and then
 def test_points_of_a_closed_mechanism_with_friction_are_the_same_to_the_last_bit(
     root: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
 ) -> None:

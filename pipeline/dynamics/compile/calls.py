@@ -8,7 +8,6 @@ once, and so is the integrator, for all mechanisms. A call costs some nanosecond
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib import import_module
 from typing import Any
 
 from llvmlite import ir
@@ -18,7 +17,8 @@ from numba.extending import intrinsic
 import flexclear.pipeline.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.files import compiles, interpreted
-from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, known_release
+from flexclear.pipeline.dynamics.fields import data
+from flexclear.pipeline.dynamics.kernels import INTERPRETED, kernel, lowering
 
 _INTEGERS, _FLOATS, _PLACE = types.CPointer(types.int64), types.CPointer(types.float64), types.int64
 _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
@@ -27,14 +27,14 @@ _TABLE = (_FLOATS, _INTEGER, _INTEGER)  #: a table of floats: its first entry, r
 #: C signatures. Of what compiled code calls: (h, f, w, n, t, y, dy), with tolerance; (h, f, w, n, y, retractment, out,
 #: total). Of what Python calls (`functions`): (h, f, w, n, rows, pieces with rows and columns, tolerance, out with its
 #: length); (h, f, w, n, t, repeat, outputs with their number, rows, events);
-#: (table, places, numbers, address of `stacks`' function)
+#: (table, places, numbers)
 SIGNATURES = {
     "evaluate": types.int64(*_TABLES, types.float64, _PLACE, _PLACE),
     "project": types.int64(*_TABLES, types.float64, _PLACE, _PLACE, types.float64),
     "retract": types.int64(*_TABLES, _PLACE, _PLACE, _PLACE, _PLACE),
     "observe": types.int64(*_TABLES, *_TABLE, _INTEGERS, _INTEGER, _INTEGER, _FLOAT, _FLOATS, _INTEGER),
     "advance": types.int64(*_TABLES, _FLOAT, _INTEGER, _FLOATS, _INTEGER, *_TABLE, *_TABLE),
-    "lanes": types.int64(_INTEGERS, _INTEGERS, _FLOATS, _INTEGER),
+    "lanes": types.int64(_INTEGERS, _INTEGERS, _FLOATS),
 }
 
 
@@ -58,8 +58,8 @@ def call(typingctx: Any, address: Any, arguments: Any) -> Any:
 def exported(name: str) -> Callable[[Callable], int]:
     """Decorator: compiles a C function; its address."""
     options: dict[str, Any] = {"error_model": "numpy"}
-    if not INTERPRETED and known_release():  # before anything is compiled: it spares Numba an import
-        options["pipeline_class"] = import_module("flexclear.pipeline.dynamics.lowering").WholeCompiler
+    if not INTERPRETED and lowering():
+        options["pipeline_class"] = lowering().WholeCompiler
     return compiles(cfunc(SIGNATURES[name], **options))
 
 
@@ -84,6 +84,13 @@ def evaluate(h, f, w, n, t, y, dy):
 def rates(d, t, y, dy):
     """The right-hand side of which steps need only the rates."""
     call(d.h[m.RATES], (d.h, d.f, d.w, d.n, float(t), y, dy))
+
+
+@kernel
+def awaited(h, f, w, n):
+    """The rates that an attempt waits for: `integrate.method.await_rates`."""
+    d = data(h, f, w, n)
+    rates(d, d.awaited_time, d.awaited, d.awaited_slope)
 
 
 @kernel

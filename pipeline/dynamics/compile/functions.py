@@ -62,7 +62,7 @@ PROTOTYPES = {
     "observe": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, *_TABLE_AT, *_TABLE_AT, _FLOAT, _PLACE, _INTEGER),
     "advance": ctypes.CFUNCTYPE(_INTEGER, *_TABLES, _FLOAT, _INTEGER, _PLACE, _INTEGER, *_TABLE_AT, *_TABLE_AT),
 }
-LANES = ctypes.CFUNCTYPE(_INTEGER, _PLACE, _PLACE, _PLACE, _INTEGER)
+LANES = ctypes.CFUNCTYPE(_INTEGER, _PLACE, _PLACE, _PLACE)
 
 
 def place(array: np.ndarray, kind: type = np.float64) -> Any:
@@ -107,7 +107,8 @@ class Entry:
     ) -> None:
         """Step to the end of the segment or of the budget.
 
-        by: what is to call the compiled function, given its address and a word for each of its arguments.
+        by: what is to call the compiled function, given its address, and a word for each of its arguments but t and
+        repeat.
         """
         self._advance(_tables(h, f, w, n), 0, -1, outputs, rows, events, by)
 
@@ -125,7 +126,7 @@ class Entry:
         if by is None:
             self._function("advance")(*tables, t, repeat, *record)
         else:
-            by(self.addresses["advance"], [*tables, 0, repeat, *record])  # steps have their time in w
+            by(self.addresses["advance"], [*tables, *record])
 
     def observe(
         self,
@@ -199,7 +200,7 @@ def specialised(
 ) -> int:
     """Address of the right-hand side for one wiring; UnsuitedError when there is none.
 
-    lanes, changes: see `sources.specialised`; of several lanes that of what lets as many steppers run
+    lanes, changes: see `sources.specialised`; of several lanes that of what lets as many steppers proceed
     (`compile.lanes`).
     """
     folder, began = writable(kernel_root(), tell), time.monotonic()

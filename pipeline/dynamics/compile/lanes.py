@@ -1,7 +1,8 @@
-"""Steppers side by side: each runs until it needs an evaluation, then all those are made at once.
+"""Attempts of several steppers made together, one in each lane of the processor's vectors.
 
-Whatever a stepper is at (a first step, a stage, a rejected step, an event that is searched for), what it waits for is
-an evaluation, and so all lanes are in use as long as there is a stepper for each. None knows of the others.
+Each stepper proceeds alone until an attempt waits for the rates of a state (`integrate.method.await_rates`): the next
+stage, or the end of the step. All those are then evaluated at once. First steps, searches for events and projections a
+stepper evaluates by itself, while the others wait. None knows of the others, and they may be at different stages.
 """
 
 from __future__ import annotations
@@ -12,23 +13,18 @@ from typing import Any
 from numba import types
 from numba.extending import intrinsic
 
-from flexclear.pipeline.dynamics.compile.calls import call
-from flexclear.pipeline.dynamics.compile.stacks import (
-    ALONE,
-    DONE,
-    GIVEN,
-    HEAD,
-    READY,
-    STATE,
-    TIME,
-    WAITING,
-    WANTED,
-)
+from flexclear.pipeline.dynamics.compile.calls import awaited, call
+from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.specialise.straight import exactly
 
 #: all lanes at once take as long as this fraction of them does one by one
 FEW = 4
+#: a lane: nobody is in it; its stepper may proceed, waits for rates, has come to its end
+IDLE, READY, WAITING, DONE = range(4)
+#: words of the table: whether to return at once, then of each lane its state, the address of what takes its steps, and
+#: the arguments of that: h, f, w, n, and eight of the record
+WANTED, HEAD, FUNCTION, ARGUMENTS, WORDS = 0, 1, 1, 2, 14
 
 
 def _pointer(kind: Any) -> Any:
@@ -48,70 +44,75 @@ integers, floats = _pointer(types.int64), _pointer(types.float64)
 
 
 def make_lanes(laws: Callable, note: Callable, abreast: Callable, lanes: int) -> Callable:
-    """The kernel run(table, places, numbers, resume), which comes back when a function has, or when it is called back.
+    """The kernel run(table, places, numbers), which comes back when a stepper has, or when it is called back.
 
-    table: HEAD, then addresses of the records.  places: room for 6 lanes words, then for whose numbers are in which
-    lane, 0 where they are to be put there again.  numbers: as of `straight.abreast`.  resume: address of `stacks`'
-    function.
+    table: see `WORDS`.  places: room for 6 lanes words, then for whose numbers are in which lane, 0 where they are to
+    be put there again.  numbers: as of `straight.abreast`.
     """
     few = lanes // FEW
 
     @kernel
-    def let_run(table, resume):
-        """Each function on to its next evaluation: how many have come back and how many wait, the record of one."""
+    def engine(table, own):
+        """The arrays of a lane's stepper."""
+        o = own + ARGUMENTS
+        return data(integers(table[o]), floats(table[o + 1]), floats(table[o + 2]), integers(table[o + 3]))
+
+    @kernel
+    def proceed(table):
+        """Each stepper on to its next rates: how many have come to their end and how many wait, the lane of one."""
         done, waiting, last = 0, 0, 0
         for k in range(lanes):
-            record = integers(table[HEAD + k])
-            if record[STATE] == READY:
-                call(resume, (table[HEAD + k],))
-            if record[STATE] == DONE:
+            own = HEAD + WORDS * k
+            o, d = own + ARGUMENTS, engine(table, own)
+            if table[own] == READY:
+                arrays = (table[o], table[o + 1], table[o + 2], table[o + 3])
+                record = (table[o + 4], table[o + 5], table[o + 6], table[o + 7], table[o + 8])
+                call(table[own + FUNCTION], (*arrays, 0.0, -1, *record, table[o + 9], table[o + 10], table[o + 11]))
+                table[own] = WAITING if d.stage > 0 else DONE
+            if table[own] == DONE:
                 done += 1
-            elif record[STATE] == WAITING:
-                waiting, last = waiting + 1, table[HEAD + k]
+            elif table[own] == WAITING:
+                waiting, last = waiting + 1, own
         return done, waiting, last
 
     @kernel
     def one_by_one(table):
-        """All evaluations that are awaited, each alone."""
+        """All rates that are awaited, each alone."""
         for k in range(lanes):
-            own = integers(table[HEAD + k])
-            if own[STATE] == WAITING:
-                h, f, w, n = (
-                    integers(own[GIVEN]),
-                    floats(own[GIVEN + 1]),
-                    floats(own[GIVEN + 2]),
-                    integers(own[GIVEN + 3]),
-                )
-                call(table[ALONE], (h, f, w, n, floats(table[HEAD + k])[TIME], own[GIVEN + 4], own[GIVEN + 5]))
-                own[STATE] = READY
+            own = HEAD + WORDS * k
+            if table[own] == WAITING:
+                d = engine(table, own)
+                awaited(d.h, d.f, d.w, d.n)
+                table[own] = READY
 
     @kernel
-    def evaluate(table, places, numbers, spare):
-        """All evaluations that are awaited; lanes without one repeat another's, to the same places."""
+    def together(table, places, numbers, spare):
+        """All rates that are awaited; lanes without a stepper repeat another's, to the same places."""
         for k in range(lanes):
-            own = integers(table[HEAD + k])
-            record = own if own[STATE] == WAITING else integers(spare)
-            for e in range(6):
-                places[e * lanes + k] = record[GIVEN + e]
-            if places[6 * lanes + k] != record[GIVEN + 1]:
-                places[6 * lanes + k] = record[GIVEN + 1]
-                note(integers(record[GIVEN]), floats(record[GIVEN + 1]), numbers, k)
-            if own[STATE] == WAITING:
-                h, f = integers(own[GIVEN]), floats(own[GIVEN + 1])
-                w, n = floats(own[GIVEN + 2]), integers(own[GIVEN + 3])
-                laws(h, f, w, n, floats(table[HEAD + k])[TIME])
-                own[STATE] = READY
+            own = HEAD + WORDS * k
+            waits = table[own] == WAITING
+            stepper = own if waits else spare
+            d = engine(table, stepper)
+            for e in range(4):
+                places[e * lanes + k] = table[stepper + ARGUMENTS + e]
+            places[4 * lanes + k], places[5 * lanes + k] = d.awaited, d.awaited_slope
+            if places[6 * lanes + k] != places[lanes + k]:
+                places[6 * lanes + k] = places[lanes + k]
+                note(d.h, d.f, numbers, k)
+            if waits:
+                laws(d.h, d.f, d.w, d.n, d.awaited_time)
+                table[own] = READY
         abreast(places, numbers)
 
     @kernel
-    def run(table, places, numbers, resume):
+    def run(table, places, numbers):
         while True:
-            done, waiting, last = let_run(table, resume)
+            done, waiting, last = proceed(table)
             if done > 0 or table[WANTED] != 0 or waiting == 0:
                 return
-            if waiting <= few and table[ALONE] != 0:
+            if waiting <= few:
                 one_by_one(table)
             else:
-                evaluate(table, places, numbers, last)
+                together(table, places, numbers, last)
 
     return exactly(run)

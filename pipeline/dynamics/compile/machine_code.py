@@ -38,16 +38,26 @@ class Code:
 
 def image(function: Any) -> bytes:
     """The code of a C function that Numba has compiled (`numba.cfunc`), for storage."""
-    library = function._library
-    foreign = [used.name for used in library._final_module.functions if used.is_declaration]
-    foreign += [used.name for used in library._final_module.global_variables if used.is_declaration]
-    binary = bytes(library._get_compiled_object())
+    try:  # what Numba has made, where it keeps that in the release that this was written with
+        module, binary = function._library._final_module, bytes(function._library._get_compiled_object())
+    except (AttributeError, TypeError, ValueError, RuntimeError):
+        module, binary = _assembled(function.inspect_llvm())
+    foreign = [used.name for used in (*module.functions, *module.global_variables) if used.is_declaration]
     facts = {
         "name": function.native_name,
         "foreign": sorted(name for name in foreign if not name.startswith("llvm.")),
         "sha256": hashlib.sha256(binary).hexdigest(),
     }
     return json.dumps(facts, sort_keys=True).encode() + b"\n" + binary
+
+
+def _assembled(code: str) -> tuple[Any, bytes]:
+    """LLVM's module of a text, and its object file for this processor."""
+    import llvmlite.binding as llvm
+
+    module, features = llvm.parse_assembly(code), llvm.get_host_cpu_features().flatten()
+    machine = _target().create_target_machine(llvm.get_host_cpu_name(), features, opt=3, jit=True)
+    return module, bytes(machine.emit_object(module))
 
 
 def load(stored: bytes) -> Code:
@@ -97,7 +107,7 @@ def _provide(llvm: Any, name: str) -> None:
 
 @cache
 def _ask_numba() -> None:
-    """Let Numba tell LLVM the functions of its own that code may call."""
-    from numba.core.registry import cpu_target
+    """Let Numba tell LLVM the functions of its own that code may call, as it does before it compiles."""
+    from numba import cfunc
 
-    cpu_target.target_context.refresh()
+    cfunc("int64()")(lambda: 0)

@@ -353,8 +353,8 @@ run = make_lanes({laws}, *abreast(rates, WIRING, {lanes}), {lanes})
 
 
 @calls.exported("lanes")
-def lanes(table, places, numbers, resume):
-    run(table, places, numbers, resume)
+def lanes(table, places, numbers):
+    run(table, places, numbers)
     return 0
 """
 PROJECT = """@calls.exported("project")
@@ -377,7 +377,11 @@ ADVANCE = """@calls.exported("advance")
 def advance(h, f, w, n, t, repeat, outputs, times, rows, count, width, events, event_count, event_width):
     if repeat < 0:
         rows, events = calls.carray(rows, (count, width)), calls.carray(events, (event_count, event_width))
-        steps(h, f, w, n, calls.carray(outputs, (times,)), rows, events)
+        outputs = calls.carray(outputs, (times,))
+        while True:  # one call, whoever evaluates: a second one might be compiled to other bits
+            if not steps(h, f, w, n, outputs, rows, events) or n[m.TOGETHER]:
+                break
+            calls.awaited(h, f, w, n)
     for _ in range(repeat):
         calls.evaluate(h, f, w, n, t, h[m.Y], h[m.SLOPES])
     return 0

@@ -17,7 +17,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite, rk4
-from flexclear.pipeline.dynamics.integrate.method import Method, slope
+from flexclear.pipeline.dynamics.integrate.method import Method, make_attempt, slope
 from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -62,7 +62,8 @@ def keep(d, step):
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels; it has no error estimate."""
-    _, runge_kutta_step = make_stages(evaluate, rk4.A, rk4.B, rk4.C)
+    _, proceed = make_stages(evaluate, rk4.A, rk4.B, rk4.C)
+    runge_kutta_step = make_attempt(evaluate, proceed)
 
     @kernel
     def attempt(d, step):

@@ -138,7 +138,7 @@ def interpolate(d, theta, out):
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels."""
-    stage, attempt = make_stages(evaluate, A, B, C)
+    stage, proceed = make_stages(evaluate, A, B, C)
 
     @kernel
     def extend(d, step):
@@ -159,7 +159,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
                 d.w[dense + (3 + k) * size + c] = step * total
             d.w[dense + 7 * size + c] = d.y[c]
 
-    return begin_afresh, attempt, error, extend, keep_nothing
+    return begin_afresh, proceed, error, extend, keep_nothing
 
 
 METHOD = Method(
@@ -170,5 +170,6 @@ METHOD = Method(
     make_kernels=make_kernels,
     interpolate=interpolate,
     error_order=ERROR_ORDER,
+    staged=True,
     stability=6.1,  # Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
 )

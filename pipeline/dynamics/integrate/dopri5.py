@@ -11,7 +11,6 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
 from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
@@ -85,18 +84,8 @@ def interpolate(d, theta, out):
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels."""
-    _, advance = make_stages(evaluate, A, B, C)
-
-    @kernel
-    def attempt(d, step):
-        """A step with the slope at its end, which the error estimate needs."""
-        if not advance(d, step):
-            return False
-        evaluate(d, d.time + step, d.at_y_new, slope(d, STAGES))
-        d.evaluations += 1
-        return d.evaluation == m.OK
-
-    return begin_afresh, attempt, error, extend, keep_nothing
+    _, proceed = make_stages(evaluate, A, B, C, ends=True)  # the error estimate needs the slope there
+    return begin_afresh, proceed, error, extend, keep_nothing
 
 
 METHOD = Method(
@@ -107,6 +96,7 @@ METHOD = Method(
     make_kernels=make_kernels,
     interpolate=interpolate,
     error_order=ERROR_ORDER,
+    staged=True,
     ends=True,
     stability=3.25,  # Hairer & Wanner, Solving Ordinary Differential Equations II, sec. IV.2, and their code
 )

@@ -26,7 +26,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import modal_basis, phi_functions
-from flexclear.pipeline.dynamics.integrate.method import Method, slope
+from flexclear.pipeline.dynamics.integrate.method import AWAITS, LOST, MADE, Method, await_rates, slope
 from flexclear.pipeline.dynamics.integrate.modal_basis import count, damping, lift, read, room, square, turn, work_rate
 from flexclear.pipeline.dynamics.integrate.newton import limit
 from flexclear.pipeline.dynamics.integrate.norms import scaled_norm, set_error_scales
@@ -53,8 +53,9 @@ SWIFT, LEAST = 0.1, 0.01
 # Memory between steps -------------------------------------------------------------------------------------------------
 # whether the oscillators are those of the present pose, whether there are any, step of the phi functions, length of the
 # step before (0: none), its rate of convergence, length of the step whose dense output is requested, the slowest
-# convergence within the last attempt
-BASIS_HOLDS, BASIS_KNOWN, PHI_STEP, LAST_STEP, RATE, LENGTH, SLOWEST, VECTORS = range(8)
+# convergence within the last attempt; of the present one the norm of the last correction, and the slowest convergence
+# that is not forgotten
+BASIS_HOLDS, BASIS_KNOWN, PHI_STEP, LAST_STEP, RATE, LENGTH, SLOWEST, CORRECTED, CONVERGING, VECTORS = range(10)
 #: vectors over the state: departures of g from its start at the nodes, and those of the step before
 DEPARTURE, BEFORE = 0, NODES
 #: pairs (z, z') of all oscillators: of the departures, of the slope at the start and of its state, two to work with
@@ -304,49 +305,58 @@ def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> t
         read(d, basis(d), d.at_y, pair(d, OF_STATE))
 
     @kernel
-    def sweep(d, step):
-        """New departures at all nodes, each with those before it; False when one cannot be evaluated."""
-        for e in range(NODES):
-            advance_to(d, step, C[e], e, d.at_y_stage)
-            evaluate(d, d.time + C[e] * step, d.at_y_stage, slope(d, NODE))
-            d.evaluations += 1
-            if d.evaluation != m.OK:
-                return False
-            depart(d, step, e)
-        return True
+    def visit(d, step, e):
+        """Wait for the rates at node e."""
+        advance_to(d, step, C[e], e, d.at_y_stage)
+        return await_rates(d, d.time + C[e] * step, d.at_y_stage, slope(d, NODE))
 
     @kernel
-    def attempt(d, step):
-        """State Y_NEW after a step from Y; False when the iteration fails."""
-        last_norm, enough = 0.0, limit(d.rtol)
-        set_error_scales(d, d.at_y)
-        prepare(d, step)
-        predict(d, step)
-        advance_to(d, step, 1.0, NODES - 1, d.at_y_new)
-        rate, d.memory[SLOWEST] = d.memory[RATE], 0.0
-        for k in range(MOST_SWEEPS):
-            if not sweep(d, step):
-                return False
-            advance_to(d, step, 1.0, NODES - 1, d.at_y_stage)
-            for c in range(d.ny):
-                end = d.y_stage[c]
-                d.y_stage[c], d.y_new[c] = end - d.y_new[c], end
-            norm = scaled_norm(d, d.at_y_stage)
-            if not norm <= 1e300:
-                return False
-            if k > 0:
-                now = norm / last_norm if last_norm > 0.0 else 0.0
-                if now >= 1.0 and norm > enough:
-                    return False
-                rate = max(FORGETTING * rate, now)
-                if last_norm > enough:
-                    d.memory[SLOWEST] = max(d.memory[SLOWEST], now)
-            left = norm * (rate / (1.0 - rate)) if rate < 0.5 else norm
-            if k > 0 and left <= enough:
-                d.memory[RATE] = rate
-                return True
-            last_norm = norm
-        return False
+    def correct(d, step):
+        """Y_NEW by the departures of a sweep: the norm of what that changes."""
+        advance_to(d, step, 1.0, NODES - 1, d.at_y_stage)
+        for c in range(d.ny):
+            end = d.y_stage[c]
+            d.y_stage[c], d.y_new[c] = end - d.y_new[c], end
+        return scaled_norm(d, d.at_y_stage)
+
+    @kernel
+    def converged(d, norm, k):
+        """What has come of the attempt after sweep k: AWAITS where another one is to follow."""
+        enough, last_norm, rate = limit(d.rtol), d.memory[CORRECTED], d.memory[CONVERGING]
+        if not norm <= 1e300:
+            return LOST
+        if k > 0:
+            now = norm / last_norm if last_norm > 0.0 else 0.0
+            if now >= 1.0 and norm > enough:
+                return LOST
+            rate = max(FORGETTING * rate, now)
+            if last_norm > enough:
+                d.memory[SLOWEST] = max(d.memory[SLOWEST], now)
+        d.memory[CORRECTED], d.memory[CONVERGING] = norm, rate
+        left = norm * (rate / (1.0 - rate)) if rate < 0.5 else norm
+        if k > 0 and left <= enough:
+            d.memory[RATE] = rate
+            return MADE
+        return AWAITS if k + 1 < MOST_SWEEPS else LOST
+
+    @kernel
+    def proceed(d, step):
+        """State Y_NEW after a step from Y, by new departures node after node; LOST when the iteration fails."""
+        if d.stage == 0:
+            set_error_scales(d, d.at_y)
+            prepare(d, step)
+            predict(d, step)
+            advance_to(d, step, 1.0, NODES - 1, d.at_y_new)
+            d.memory[CONVERGING], d.memory[SLOWEST] = d.memory[RATE], 0.0
+            return visit(d, step, 0)
+        if d.evaluation != m.OK:
+            return LOST
+        sweep, e = (d.stage - 1) // NODES, (d.stage - 1) % NODES
+        depart(d, step, e)
+        if e + 1 < NODES:
+            return visit(d, step, e + 1)
+        come = converged(d, correct(d, step), sweep)
+        return visit(d, step, 0) if come == AWAITS else come
 
     @kernel
     def keep(d, step):
@@ -357,7 +367,7 @@ def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> t
         if d.state == d.at_y_new and d.abridged == 0:
             renew(d)
 
-    return begin, attempt, error, extend, keep
+    return begin, proceed, error, extend, keep
 
 
 METHOD = Method(
@@ -367,6 +377,7 @@ METHOD = Method(
     dense=0,
     make_kernels=make_kernels,
     interpolate=interpolate,
+    staged=True,
     error_order=ERROR_ORDER,
     memory=memory,
 )

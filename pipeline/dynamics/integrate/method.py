@@ -19,6 +19,45 @@ def slope(d, i):
     return d.at_slopes + d.ny * i
 
 
+#: how far an attempt has come: it waits for rates, it is made, it cannot be made
+AWAITS, MADE, LOST = range(3)
+
+
+@kernel
+def await_rates(d, t, y, dy):
+    """Ask whoever lets the attempt proceed for the rates of the state in w from y at time t, into w from dy."""
+    d.awaited_time, d.awaited, d.awaited_slope = t, y, dy
+    d.stage += 1
+    d.evaluations += 1
+    return AWAITS
+
+
+def make_attempt(evaluate: Callable, proceed: Callable) -> Callable:
+    """The kernel attempt of a method that waits for its rates: it makes them itself."""
+
+    @kernel
+    def attempt(d, step):
+        d.stage = 0
+        come = proceed(d, step)
+        while come == AWAITS:
+            evaluate(d, d.awaited_time, d.awaited, d.awaited_slope)
+            come = proceed(d, step)
+        d.stage = 0
+        return come == MADE
+
+    return attempt
+
+
+def make_at_once(attempt: Callable) -> Callable:
+    """The kernel proceed of a method that waits for nothing."""
+
+    @kernel
+    def proceed(d, step):
+        return MADE if attempt(d, step) else LOST
+
+    return proceed
+
+
 @kernel
 def begin_afresh(d):
     """`begin` of a one-step method, which has nothing to forget."""
@@ -50,12 +89,14 @@ class Method:
         (`Traits.reads_all`): an evaluation of which everything is left. evaluate(d, t, y, dy), retract(d, y,
         displacement, out, scratch) take indices in w. They count their evaluations themselves:
         begin(d) after every restart, with the slope and the length of the first step known;
-        attempt(d, step) fills Y_NEW, False when it could not;
+        attempt(d, step) fills Y_NEW, False when it could not; of a `staged` method proceed(d, step) does so from one
+        evaluation to the next: AWAITS (`await_rates`), MADE or LOST, by d.stage, 0 at first;
         error(d, step) gives the norm of the local error, 1 at the tolerance (None: fixed steps only);
         extend(d, step) prepares the dense output once the slope at the end is known;
         keep(d, step) remembers an accepted step.
     interpolate: (d, share of the step, out) the dense output.
     error_order: the error estimate falls with this power of the step plus one; 0 for methods without one.
+    staged: whether it gives `proceed` in place of `attempt`, so that several can proceed together.
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.
     memory: floats kept between steps, from the header with the mechanism's sizes.
@@ -71,6 +112,7 @@ class Method:
     make_kernels: Callable
     interpolate: Callable
     error_order: int = 0
+    staged: bool = False
     ends: bool = False
     steady: float = 1.0
     memory: Callable[[np.ndarray], int] = no_memory

@@ -22,8 +22,8 @@ C = np.array([0.0, 0.5, 0.5, 1.0])
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels; it has no error estimate."""
-    _, attempt = make_stages(evaluate, A, B, C)
-    return begin_afresh, attempt, None, hermite.make_extend(STAGES), keep_nothing
+    _, proceed = make_stages(evaluate, A, B, C)
+    return begin_afresh, proceed, None, hermite.make_extend(STAGES), keep_nothing
 
 
 METHOD = Method(
@@ -33,5 +33,6 @@ METHOD = Method(
     dense=hermite.ROWS,
     make_kernels=make_kernels,
     interpolate=hermite.interpolate,
+    staged=True,
     stability=2.785,  # where its stability polynomial 1 + z + z^2/2 + z^3/6 + z^4/24 is 1
 )

@@ -7,21 +7,24 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate.method import slope
+from flexclear.pipeline.dynamics.integrate.method import LOST, MADE, await_rates, slope
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
-def make_stages(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray) -> tuple[Callable, Callable]:
-    """The kernels stage(d, step, i) and attempt(d, step).
+def make_stages(
+    evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray, *, ends: bool = False
+) -> tuple[Callable, Callable]:
+    """The kernels stage(d, step, i) and proceed(d, step).
 
     A, B, C: Butcher's tableau; stages beyond len(B) serve error estimates and dense output.
     Row i of SLOPES is the slope of stage i, row 0 that at the start of the step.
+    ends: whether Y_NEW is evaluated as well, into row len(B).
     """
     count = len(B)
 
     @kernel
-    def stage(d, step, i):
-        """Slope of stage i from those of all earlier ones."""
+    def combine(d, step, i):
+        """Argument of stage i, from the slopes of all earlier ones, in Y_STAGE."""
         size, y, stage_y = d.ny, d.at_y, d.at_y_stage
         for c in range(size):
             d.w[stage_y + c] = d.w[y + c]
@@ -31,17 +34,25 @@ def make_stages(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray)
                 k = slope(d, j)
                 for c in range(size):
                     d.w[stage_y + c] += weight * d.w[k + c]
-        evaluate(d, d.time + C[i] * step, stage_y, slope(d, i))
+
+    @kernel
+    def stage(d, step, i):
+        """Slope of stage i from those of all earlier ones."""
+        combine(d, step, i)
+        evaluate(d, d.time + C[i] * step, d.at_y_stage, slope(d, i))
         d.evaluations += 1
 
     @kernel
-    def attempt(d, step):
-        """State Y_NEW after a step from Y; False when a stage has no slope."""
-        size = d.ny
-        for i in range(1, count):
-            stage(d, step, i)
-            if d.evaluation != m.OK:
-                return False
+    def proceed(d, step):
+        """State Y_NEW after a step from Y, by the next stage; LOST when one has no slope."""
+        size, i = d.ny, d.stage + 1
+        if i > 1 and d.evaluation != m.OK:
+            return LOST
+        if i < count:
+            combine(d, step, i)
+            return await_rates(d, d.time + C[i] * step, d.at_y_stage, slope(d, i))
+        if i > count:
+            return MADE
         for c in range(size):
             d.y_new[c] = 0.0
         for j in range(count):
@@ -51,6 +62,6 @@ def make_stages(evaluate: Callable, A: np.ndarray, B: np.ndarray, C: np.ndarray)
                     d.y_new[c] += B[j] * d.w[k + c]
         for c in range(size):
             d.y_new[c] = d.y[c] + step * d.y_new[c]
-        return True
+        return await_rates(d, d.time + step, d.at_y_new, slope(d, count)) if ends else MADE
 
-    return stage, attempt
+    return stage, proceed

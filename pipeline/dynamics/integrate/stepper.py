@@ -14,6 +14,7 @@ from typing import Any
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.projection import keep_scales, largest
 from flexclear.pipeline.dynamics.fields import data
+from flexclear.pipeline.dynamics.integrate.method import AWAITS, LOST, await_rates, make_at_once, make_attempt
 from flexclear.pipeline.dynamics.integrate.norms import finite
 from flexclear.pipeline.dynamics.integrate.poses import NO_POSES, Poses, never
 from flexclear.pipeline.dynamics.integrate.recording import (
@@ -40,6 +41,10 @@ SHORTER = 0.3
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
 FAILED = 1e9
+#: in place of an error norm: the attempt waits for rates that somebody else is to make (`run.evaluation.batched_evaluation`)
+PENDING = -1.0
+#: stage of an attempt that is made and waits for the rates at its end
+ENDING = 1 << 30
 #: a step below this fraction of the time reached cannot be distinguished from rounding
 SMALLEST_STEP = 4e-16
 
@@ -101,7 +106,9 @@ def make_advance(
     events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
     """
     given = (evaluate, retract, complete) if method.traits.reads_all else (evaluate, retract)
-    begin, attempt_itself, error, extend_itself, keep = method.make_kernels(*given)
+    begin, step_itself, error, extend_itself, keep = method.make_kernels(*given)
+    proceed = step_itself if method.staged else make_at_once(step_itself)
+    attempt_itself = make_attempt(evaluate, proceed) if method.staged else step_itself
     attempt, extend, interpolate = poses.make_along(method, attempt_itself, extend_itself)
     last, ends = method.last, method.ends
     watch_start, make_resolve_events, any_closed = events
@@ -148,11 +155,8 @@ def make_advance(
 
     @kernel
     def finish(d, t_new, tolerance):
-        """Slope at Y_NEW with the loops closed to a tolerance; False when they cannot be."""
+        """Y_NEW, which has been evaluated, with the loops closed to a tolerance; False when they cannot be."""
         slope = d.at_slopes + d.ny * last
-        if not ends:
-            evaluate(d, t_new, d.at_y_new, slope)
-            d.evaluations += 1
         if d.evaluation != m.OK:
             return False
         if not (finite(d, slope) and finite(d, d.at_y_new)):
@@ -169,22 +173,39 @@ def make_advance(
         return used >= 0
 
     @kernel
-    def try_step(d, step, t_new, tolerance):
-        """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made."""
+    def carry_on(d, step, t_new, outputs):
+        """The step to Y_NEW up to the next evaluation: PENDING, or what `try_step` gives."""
+        if d.stage < ENDING:
+            come = proceed(d, step)
+            if come == AWAITS:
+                return PENDING
+            if come == LOST:
+                return FAILED
+            norm = error_norm(d, step)
+            if norm != norm:
+                d.evaluation = m.NOT_FINITE
+                return FAILED
+            if norm > 1.0:
+                return min(norm, FAILED)
+            d.norm = norm
+            if not ends:
+                await_rates(d, t_new, d.at_y_new, d.at_slopes + d.ny * last)
+                d.stage = ENDING
+                return PENDING
+        if not finish(d, t_new, open_loops(d, outputs, t_new)):
+            return FAILED
+        detect_stiffness(d, step)
+        return d.norm
+
+    @kernel
+    def try_step(d, step, t_new, outputs):
+        """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made, or PENDING."""
         if ready(d):
             arrive(d, step, t_new)
             return 0.0
-        if not attempt(d, step):
-            return FAILED
-        norm = error_norm(d, step)
-        if norm != norm:
-            d.evaluation = m.NOT_FINITE
-            return FAILED
-        if norm > 1.0:
-            return min(norm, FAILED)
-        if not finish(d, t_new, tolerance):
-            return FAILED
-        detect_stiffness(d, step)
+        norm = carry_on(d, step, t_new, outputs)
+        if norm != PENDING:
+            d.stage = 0
         return norm
 
     @kernel
@@ -237,22 +258,29 @@ def make_advance(
 
     @kernel
     def advance(h, f, w, n, outputs, rows, events):
-        """Step to the end of the segment or of the budget; `status` says why it came back."""
+        """Step to the end of the segment or of the budget; `status` says why it came back.
+
+        True where an attempt waits for rates (`method.await_rates`): it is to be called again when they are there.
+        """
         d = data(h, f, w, n)
-        while not must_stop(d, outputs, rows, events):
+        while d.stage > 0 or not must_stop(d, outputs, rows, events):
             t = d.time
-            if d.fresh and not start(d):
-                return
-            step = choose_step(d, t)
+            if d.stage == 0:
+                if d.fresh and not start(d):
+                    return False
+                d.tried = choose_step(d, t)
+            step = d.tried
             if step == 0.0:
-                return
+                return False
             final = t + 1.0001 * step >= d.end
             t_new = d.end if final else t + step
-            norm = try_step(d, step, t_new, open_loops(d, outputs, t_new))
+            norm = try_step(d, step, t_new, outputs)
+            if norm == PENDING:
+                return True
             if norm > 1.0:
                 d.rejected += 1
                 if not after_rejection(d, step, norm):
-                    return
+                    return False
                 continue
             along = ready(d)
             following = d.step if along else next_step(d, step, norm)
@@ -263,7 +291,7 @@ def make_advance(
                 d.step, d.rejected_step = SHORTER * step, 0.0
                 continue
             if happened < 0:
-                return
+                return False
             d.steps += 1
             if along:
                 snapshot(d, rows, t, d.at_y)
@@ -279,5 +307,6 @@ def make_advance(
                 hold_modes(d)
                 snapshot(d, rows, t_end, d.at_y)
                 d.fresh = 1 if along or happened == RESTART else 0
+        return False
 
     return advance

@@ -7,6 +7,7 @@ spread of such members do.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from contextlib import nullcontext
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -68,26 +69,23 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         with making:
             return another(other(name))
 
-    def alone(k: int, alive: Progress, lane: Place | None = None) -> tuple[xr.Dataset, str]:
+    def alone(k: int, alive: Progress, place: Place | None) -> tuple[xr.Dataset, str]:
         """A member on an engine of its own, so that it does not depend on who ran before."""
         mine = another(engine)
-        mine.straight.place = lane
+        mine.straight.place = place
         last, trajectory, switched = follow(mine, starts[k], alive, heir, judges and judges.run)
         return _member(last, trajectory, names), switched
 
     def done(k: int) -> None:
         progress(k / requested.members, f"member {k} of {requested.members}")
 
-    with abreast(engine, requested.members, width(), progress) as groups:
-        if groups is None:
-            runs = side_by_side(alone, requested.members, done)
-        else:
+    places = abreast(engine, requested.members, width(), progress)
 
-            def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
-                with groups.place() as lane:
-                    return alone(k, alive, lane)
+    def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
+        with places.place() if places else nullcontext() as place:
+            return alone(k, alive, place)
 
-            runs = side_by_side(member, requested.members, done, groups.lanes)
+    runs = side_by_side(member, requested.members, done, places.seats if places else 0)
     members, reasons = [one for one, _ in runs], [switched for _, switched in runs if switched]
     made = xr.concat(members, dim="member").assign_coords(member=np.arange(requested.members))
     facts = {"switched": f"{len(reasons)} of {requested.members} members, the first {reasons[0]}"} if reasons else {}

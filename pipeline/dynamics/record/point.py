@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from threading import Lock
 from typing import TYPE_CHECKING
@@ -28,7 +27,7 @@ from flexclear.pipeline.dynamics.record.ensemble import ball_offsets
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.run.alike import engines_alike
-from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroups, Place, groups
+from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.specialised import side_by_side
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
@@ -67,7 +66,7 @@ class Runner:
     #: what is seen of all rows is large, and seen in turn it is there once
     _looking: Lock = field(default_factory=Lock)
 
-    def run(self, scene: Scene, lane: Place | None = None, alive: Progress = silent) -> Point:
+    def run(self, scene: Scene, place: Place | None = None, alive: Progress = silent) -> Point:
         """One point; what physics or the input of this point refuses is reported in the point, not raised.
 
         place: where its steps may be taken next to those of other points, which changes no bit of it.  alive: called
@@ -76,26 +75,21 @@ class Runner:
         scene = thinned(scene, self.recorded)
         try:
             try:
-                values, deviation, count = self._values(scene, lane, alive)
+                values, deviation, count = self._values(scene, place, alive)
             except DearError:
                 scene = unverified(scene)
-                values, deviation, count = self._values(scene, lane, alive)
+                values, deviation, count = self._values(scene, place, alive)
             if not self.error:
                 return Point(values, {}, deviation, count)
             tight = with_numbers(scene, {"solver.rtol": TIGHTER * scene.solver.rtol})
-            better, _, more = self._values(tight, lane, alive)
+            better, _, more = self._values(tight, place, alive)
         except (SolverError, InputError) as error:
             return Point({}, {}, {}, 0, str(error))
         return Point(values, {name: np.abs(better[name] - v) for name, v in values.items()}, deviation, count + more)
 
-    @contextmanager
-    def abreast(self, scene: Scene, points: int) -> Iterator[LaneGroups | None]:
-        """Where so many points like that of a scene may step side by side; None where each is to be run alone."""
-        if points < FEWEST or not self._steps_abreast(scene):
-            yield None
-            return
-        with groups(ABREAST, threads=1) as made:
-            yield made
+    def abreast(self, scene: Scene, points: int) -> Places | None:
+        """Where so many points like that of a scene may step together; None where each is to be run alone."""
+        return Places(ABREAST, 1) if points >= FEWEST and self._steps_abreast(scene) else None
 
     def _steps_abreast(self, scene: Scene) -> bool:
         if scene.event:
@@ -106,13 +100,13 @@ class Runner:
             return False  # as each point reports by itself
         return self.engine is not None and side_by_side(self.engine)
 
-    def _values(self, scene: Scene, lane: Place | None, alive: Progress) -> tuple[Values, Values, int]:
+    def _values(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[Values, Values, int]:
         if scene.event:
             return self._over_events(scene, alive)
         engine, other = self._engines(scene)
         # exact, since how many points are run side by side depends on the machine and on how long they take
         engine.straight.requested = engine.straight.exact = True
-        engine.straight.place = lane
+        engine.straight.place = place
         if in_sections(self.recorded):
             values, count = _sections(scene, engine, self.recorded, alive)
             return values, {}, count

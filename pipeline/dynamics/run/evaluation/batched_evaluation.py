@@ -1,9 +1,9 @@
-"""Engines that take their steps side by side in one thread, so that their evaluations are made at once.
+"""Engines that take their steps together in one thread, so that the rates of their attempts are evaluated at once.
 
-Each engine's own thread asks for steps as ever (`run.trajectory`), and is notified when its stepper has come back:
-paused, at the end of a segment, or with an error. Meanwhile the group's thread lets up to `lanes` steppers run, each on
-a stack of its own (`compile.stacks`), and evaluates for all of them together (`compile.lanes`). What a stepper does
-depends on nothing but its own engine, so neither the number of groups nor who else is in one changes a bit of it.
+Each engine's own thread asks for steps as ever (`run.trajectory`), and has them when its stepper has come back: paused,
+at the end of a segment, or with an error. Meanwhile one of these threads lets up to `lanes` steppers proceed
+(`compile.lanes`); the others wait, and one of them takes over when its own steps are done. What a stepper does depends
+on nothing but its own engine, so neither the number of groups nor who else is in one changes a bit of it.
 """
 
 from __future__ import annotations
@@ -12,162 +12,115 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from threading import Condition, Event, Lock, Thread
+from threading import Event, Lock
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.compile import functions, stacks
+from flexclear.pipeline.dynamics.compile import functions, lanes
 
 
-@dataclass
+@dataclass(eq=False)
 class _Steps:
-    """Steps that are asked for: a function by its address and those of its arguments. back: set when it came back."""
+    """Steps that are asked for. words: of their lane.  turn: set when they are done, or their thread is to lead."""
 
-    function: int
-    arguments: Sequence[int]
-    back: Event = field(default_factory=Event)
-
-
-@dataclass(frozen=True)
-class Code:
-    """Right-hand sides of one wiring with equal bits (`functions.specialised`).
-
-    abreast: address of what lets steppers run.  alone: that of the evaluation of one state; 0 where there is none.
-    numbers: how many a mechanism of this wiring has in f at most.
-    """
-
-    abreast: int
-    alone: int
-    numbers: int
+    words: Sequence[int]
+    turn: Event = field(default_factory=Event)
+    done: bool = False
 
 
 class LaneGroup:
-    """A thread that lets steppers run while it is open.
+    """Lanes for the steppers of one wiring.
 
-    rows: closure rows that its code solves for.
+    rows: closure rows that its code solves for.  address: of what lets steppers proceed.
+    numbers: how many a mechanism of this wiring has in f at most.
     """
 
-    def __init__(self, rows: bytes, code: Code, lanes: int) -> None:
-        self.rows, self.lanes = rows, lanes
-        self.wait = stacks.addresses()["wait"]
-        self._run = functions.LANES(code.abreast)
-        self._stacks = stacks.Stacks(lanes)
-        self._table = np.zeros(stacks.HEAD + lanes, np.int64)
-        self._table[stacks.ALONE] = code.alone
-        self._places = np.zeros(7 * lanes, np.int64)
-        room = np.zeros((code.numbers + 1) * lanes)
-        self._numbers = room[-room.ctypes.data // 8 % lanes :]  # of all lanes one number, in no two lines of the cache
-        self._table[stacks.HEAD :] = [record.ctypes.data for record in self._stacks.records]
-        self._waiting, self._news, self._closed = deque[_Steps](), Condition(), False
-        self._failed: BaseException | None = None
-        self._thread = Thread(target=self._work, name="steps side by side", daemon=True)
-        self._thread.start()
+    def __init__(self, rows: bytes, address: int, numbers: int, width: int) -> None:
+        self.rows = rows
+        self._run = functions.LANES(address)
+        self._table = np.zeros(lanes.HEAD + lanes.WORDS * width, np.int64)
+        self._words = self._table[lanes.HEAD :].reshape(width, lanes.WORDS)
+        self._places = np.zeros(7 * width, np.int64)
+        room = np.zeros((numbers + 1) * width)
+        self._numbers = room[-room.ctypes.data // 8 % width :]  # of all lanes one number, in no two lines of the cache
+        self._waiting, self._busy = deque[_Steps](), dict[int, _Steps]()
+        self._lock, self._led = Lock(), False
 
     def advance(self, function: int, arguments: Sequence[int]) -> None:
-        """Let a stepper run until it comes back; raises what ended the group's thread, if something did."""
-        steps = _Steps(function, arguments)
-        with self._news:
-            if self._failed is not None:
-                raise self._failed
-            self._waiting.append(steps)
-            self._table[stacks.WANTED] = 1  # calls the compiled code back, which looks at it between two evaluations
-            self._news.notify()
-        steps.back.wait()
-        if self._failed is not None:
-            raise self._failed
-
-    def close(self) -> None:
-        """End the thread; nobody asks for steps any more."""
-        with self._news:
-            self._closed = True
-            self._news.notify()
-        self._thread.join()
-
-    def _work(self) -> None:
-        busy: list[_Steps | None] = [None] * self.lanes
+        """Let a stepper proceed until it comes back."""
+        mine = _Steps((lanes.READY, function, *arguments))
+        with self._lock:
+            self._waiting.append(mine)
+            self._table[lanes.WANTED] = 1  # calls back who leads, who looks at it between two evaluations
+            if not self._led:
+                self._led = True
+                mine.turn.set()
+        mine.turn.wait()
+        if mine.done:
+            return
         try:
-            self._let_run(busy)
-        except BaseException as error:  # for instance no memory: whoever waits is notified, instead of waiting for ever
-            with self._news:
-                self._failed = error
-                for steps in [*self._waiting, *filter(None, busy)]:
-                    steps.back.set()
+            while not mine.done:
+                self._proceed()
+        finally:
+            self._pass_on(mine)
 
-    def _let_run(self, busy: list[_Steps | None]) -> None:
-        """What the thread does: let steppers run as long as the group is open."""
-        states = self._stacks.records[:, stacks.STATE]
-        while self._take(busy):
-            arrays = (self._table, self._places, self._numbers)
-            self._run(*(array.ctypes.data for array in arrays), stacks.addresses()["resume"])
-            for lane in np.flatnonzero(states == stacks.DONE):
-                states[lane] = stacks.IDLE
-                steps, busy[lane] = busy[lane], None
-                if steps is not None:
-                    steps.back.set()
+    def _proceed(self) -> None:
+        """Give free lanes to who waits, let all proceed until one comes back, and give its lane back."""
+        with self._lock:
+            self._table[lanes.WANTED] = 0
+            self._places[6 * len(self._words) :] = 0  # where arrays lie others may have lain before
+            for lane in np.flatnonzero(self._words[:, 0] == lanes.IDLE)[: len(self._waiting)]:
+                steps = self._busy[lane] = self._waiting.popleft()
+                self._words[lane] = steps.words
+        self._run(*(array.ctypes.data for array in (self._table, self._places, self._numbers)))
+        for lane in np.flatnonzero(self._words[:, 0] == lanes.DONE):
+            self._free(lane)
 
-    def _take(self, busy: list[_Steps | None]) -> bool:
-        """Give the steps that are awaited to free lanes, waiting for some where all are free; False: no more."""
-        with self._news:
-            while not self._waiting and not any(busy):
-                if self._closed:
-                    return False
-                self._news.wait()
-            self._table[stacks.WANTED] = 0
-            self._places[6 * self.lanes :] = 0  # where arrays lie others may have lain before
-            while self._waiting and None in busy:
-                lane, steps = busy.index(None), self._waiting.popleft()
-                busy[lane] = steps
-                self._stacks.begin(lane, steps.function, steps.arguments)
-        return True
+    def _free(self, lane: int) -> None:
+        self._words[lane, 0] = lanes.IDLE
+        steps = self._busy.pop(lane)
+        steps.done = True
+        steps.turn.set()
+
+    def _pass_on(self, mine: _Steps) -> None:
+        """Let another thread lead, if there is one; also where this one has failed."""
+        with self._lock:
+            for lane in [lane for lane, steps in self._busy.items() if steps is mine]:
+                self._free(lane)
+            others = [*self._busy.values(), *(steps for steps in self._waiting if steps is not mine)]
+            self._waiting = deque(steps for steps in self._waiting if steps is not mine)
+            self._led = bool(others)
+            if others:
+                others[0].turn.set()
 
 
-class LaneGroups:
-    """LaneGroups for the engines of so many threads, each made when an engine first needs it; of one width."""
+class Place:
+    """Where up to `width` engines may step together, of them those that evaluate alike."""
 
-    def __init__(self, lanes: int, threads: int) -> None:
-        self.width, self.lanes = lanes, lanes * threads
-        self._aboard, self._groups = [0] * threads, dict[tuple[int, int], LaneGroup]()
-        self._boarding = Lock()
+    def __init__(self, width: int) -> None:
+        self.width = width
+        self._groups, self._making = dict[int, LaneGroup](), Lock()
+
+    def group(self, rows: bytes, address: int, numbers: int) -> LaneGroup:
+        """That which evaluates with this code."""
+        with self._making:
+            if address not in self._groups:
+                self._groups[address] = LaneGroup(rows, address, numbers, self.width)
+            return self._groups[address]
+
+
+class Places:
+    """So many places of one width, for as many engines at a time as they have lanes: `seats`."""
+
+    def __init__(self, width: int, number: int) -> None:
+        self.seats = width * number
+        self._free = deque([Place(width) for _ in range(number)] * width)
 
     @contextmanager
     def place(self) -> Iterator[Place]:
-        """In the thread with the fewest engines; meanwhile it has one more."""
-        with self._boarding:
-            thread = self._aboard.index(min(self._aboard))
-            self._aboard[thread] += 1
+        """One for an engine."""
+        mine = self._free.popleft()
         try:
-            yield Place(self, thread)
+            yield mine
         finally:
-            with self._boarding:
-                self._aboard[thread] -= 1
-
-    def group(self, thread: int, rows: bytes, code: Code) -> LaneGroup:
-        """That of a thread which evaluates with this code."""
-        with self._boarding:
-            made = self._groups.get((thread, code.abreast))
-            if made is None:
-                made = self._groups[thread, code.abreast] = LaneGroup(rows, code, self.width)
-            return made
-
-    def close(self) -> None:
-        """End all threads."""
-        for group in self._groups.values():
-            group.close()
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where an engine may step together with others: of those in a thread the group that evaluates as it does."""
-
-    groups: LaneGroups
-    thread: int
-
-
-@contextmanager
-def groups(lanes: int, threads: int) -> Iterator[LaneGroups]:
-    """LaneGroups, while they are used."""
-    made = LaneGroups(lanes, threads)
-    try:
-        yield made
-    finally:
-        made.close()
+            self._free.appendleft(mine)

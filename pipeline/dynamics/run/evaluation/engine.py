@@ -133,15 +133,14 @@ class Engine:
     def connect(self) -> None:
         """Let the steps evaluate with straight code where there is some for the rows solved for."""
         rows, known = self.selected.tobytes(), self.straight
-        compiled = None
-        if known.used and rows in known.rows:
-            compiled = known.group.wait if known.group and known.group.rows == rows else known.addresses.get(rows)
+        compiled = known.addresses.get(rows) if known.used and rows in known.rows else None
         self.h[m.RATES] = compiled or self.h[m.EVALUATE]
+        self.n[m.TOGETHER] = bool(compiled and known.group and known.group.rows == rows)
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
         """Step to the end of the segment or of the budget, in this thread or by the group."""
         group = self.straight.group
-        by = group.advance if group is not None and self.h[m.RATES] == group.wait else None
+        by = group.advance if group is not None and self.n[m.TOGETHER] else None
         self.entry.advance(self.h, self.model.arrays.f, self.w, self.n, outputs, rows, events, by)
 
     def view(self, index: int) -> np.ndarray:

@@ -12,19 +12,17 @@ machine, so the code gives the same bits for any number.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from threading import Lock
 
 import numpy as np
 
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.compile import functions, stacks
+from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.effects import Parts
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.model import selection
-from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Code, LaneGroup, LaneGroups, Place, groups
+from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 from flexclear.pipeline.dynamics.specialise.wiring import Wiring, wiring
@@ -58,25 +56,22 @@ def specialise(engine: Engine, progress: Progress = silent) -> None:
     settle(engine, progress)
 
 
-@contextmanager
-def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> Iterator[LaneGroups | None]:
-    """LaneGroups for so many engines like this one, in so many threads; None where each is to take its own steps.
+def abreast(engine: Engine, members: int, threads: int, progress: Progress) -> Places | None:
+    """Places for so many engines like this one, in so many threads; None where each is to take its own steps.
 
     Either way they, as `another` makes them of it, use straight code with the same bits.
     """
     engine.straight.requested = engine.straight.exact = True
     lanes = next((one for one in LANES if one * threads >= members), LANES[-1])
     if members >= FEW * threads and side_by_side(engine) and _code(engine, engine.selected.tobytes(), progress, lanes):
-        with groups(lanes, threads) as made:
-            yield made
-    else:
-        settle(engine, progress)
-        yield None
+        return Places(lanes, threads)
+    settle(engine, progress)
+    return None
 
 
 def side_by_side(engine: Engine) -> bool:
-    """Whether its steps can be taken next to those of others here."""
-    return stacks.supported() and suited(engine)
+    """Whether its attempts can be made together with those of others."""
+    return engine.method.staged and suited(engine)
 
 
 def suited(engine: Engine) -> bool:
@@ -92,22 +87,19 @@ def _make(engine: Engine, progress: Progress) -> None:
     straight, rows_of_engine = engine.straight, engine.selected.tobytes()
     if not suited(engine):
         return
-    if straight.place is not None and straight.group is None:
+    if straight.place is not None and straight.group is None and engine.method.staged:
         straight.group = _group(engine, rows_of_engine, straight.place, progress)
     if rows_of_engine not in straight.rows and (len(straight.rows) < SELECTIONS or engine.h[m.N_CHANGES]):
         straight.rows.append(rows_of_engine)
     for rows in straight.rows:
-        if rows not in straight.addresses and not (straight.group and straight.group.rows == rows):
+        if rows not in straight.addresses:
             straight.addresses[rows] = _code(engine, rows, progress, lanes=int(straight.exact))
 
 
-def _group(engine: Engine, rows: bytes, lane: Place, progress: Progress) -> LaneGroup | None:
-    """What takes the steps in a lane, with the closure rows that the first integration there begins with."""
-    several = _code(engine, rows, progress, lane.groups.width)
-    if not several:
-        return None
-    code = Code(several, _code(engine, rows, progress, lanes=1), len(engine.model.arrays.f))
-    return lane.groups.group(lane.thread, rows, code)
+def _group(engine: Engine, rows: bytes, place: Place, progress: Progress) -> LaneGroup | None:
+    """What takes the steps at a place, with the closure rows that the first integration there begins with."""
+    address = _code(engine, rows, progress, place.width)
+    return place.group(rows, address, len(engine.model.arrays.f)) if address else None
 
 
 def _code(engine: Engine, rows: bytes, progress: Progress, lanes: int) -> int:
