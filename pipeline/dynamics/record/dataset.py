@@ -23,11 +23,11 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics.compile.sources import named
 from flexclear.pipeline.dynamics.effects import RECORDS
+from flexclear.pipeline.dynamics.effects.stops.model import ends_an_angle
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import forgotten
-from flexclear.pipeline.dynamics.model.stops import ends_an_angle
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.pipeline.dynamics.record.topology import topology
 from flexclear.pipeline.dynamics.record.wrenches import every_joint_wrench
@@ -112,28 +112,11 @@ def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], C
     yield ("joint_position", "joint_velocity", "joint_acceleration"), lambda: _joint_coordinates(model, seen)
     if model.loads:
         yield ("load_",), lambda: _loads(model, seen)
-    if "bushing" in model.parts.loads:
-        from flexclear.pipeline.dynamics.record.bushings import give
-
-        yield ("bushing_",), lambda: give(model, seen)
-    if {"pid", "sampled-pid"} & set(model.parts.loads):
-        from flexclear.pipeline.dynamics.record.controllers import controllers
-
-        yield ("controller_",), lambda: controllers(model, seen)
-    if model.parts.couplings:
-        from flexclear.pipeline.dynamics.record.gears import gear_series
-
-        yield ("gear_",), lambda: gear_series(model, seen)
-    if model.parts.joint_frictions:
-        from flexclear.pipeline.dynamics.record.joint_friction import friction_series
-
-        yield ("joint_bearing", "joint_sliding", "joint_friction_"), lambda: friction_series(model, seen)
+    for effect in model.parts.present:
+        for beginnings, function in effect.records.items():
+            yield beginnings, partial(effect.load(function), model, seen)
     if model.contacts:
         yield ("contact_",), lambda: _contacts(model, seen)
-    if model.parts.wear:
-        from flexclear.pipeline.dynamics.record.wear import wear_series
-
-        yield ("wear_",), lambda: wear_series(model, seen)
     for name, asked in scene.output.requests().items():
         record = lookup(RECORDS, name, where="[output]")
         yield tuple(VARIABLES[name]), partial(record, motions, asked)
@@ -185,7 +168,7 @@ def warnings(run: Run) -> list[str]:
         *run.mended,
         *_contact_warnings(run),
         *_flexible_warnings(run),
-        *_friction_warnings(run),
+        *(text for effect in run.model.parts.present if effect.warns for text in effect.load(effect.warns)(run)),
         *_step_warnings(run.model, run.trajectory),
         *ledger.warnings(run.model, run.observed),
     ]
@@ -223,15 +206,6 @@ def _flexible_warnings(run: Run) -> list[str]:
     from flexclear.pipeline.dynamics.run import validity
 
     return validity.warnings(run.model, run.trajectory.time, run.observed)
-
-
-def _friction_warnings(run: Run) -> list[str]:
-    """Sentences about friction of ideal joints."""
-    if not run.model.parts.joint_frictions:
-        return []
-    from flexclear.pipeline.dynamics.record import joint_friction
-
-    return joint_friction.warnings(run.model, run.engine.mobility.redundant_joints)
 
 
 def _report(run: Run) -> dict[str, float | int | str]:

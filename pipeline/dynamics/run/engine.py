@@ -25,7 +25,6 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import refuse_missed
 from flexclear.pipeline.dynamics.run import singular
 from flexclear.pipeline.dynamics.run.batched_evaluation import LaneGroup, Place
-from flexclear.pipeline.dynamics.run.jamming import explanation, jammed
 
 #: two breaks nearer than this fraction of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12
@@ -166,10 +165,14 @@ class Engine:
     def evaluate(self, y: np.ndarray, t: float, repeat: int = 1) -> np.ndarray:
         """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
         if not self.attempt(y, t, repeat):
-            if jammed(self):
-                raise SolverError(f"at t = {t:.6g} s: {explanation(self)}")
-            raise SolverError(f"at t = {t:.6g} s: the equations are singular in this pose: {singular.diagnosis(self)}")
+            why = self.explained() or f"the equations are singular in this pose: {singular.diagnosis(self)}"
+            raise SolverError(f"at t = {t:.6g} s: {why}")
         return self.slope.copy()
+
+    def explained(self) -> str | None:
+        """Why an effect ends the run, in words; None where none does."""
+        explaining = [effect.load(effect.explains) for effect in self.model.parts.present if effect.explains]
+        return next((why for explain in explaining if (why := explain(self)) is not None), None)
 
     def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
         """Evaluate f(t, y) in the work space; whether it could be."""

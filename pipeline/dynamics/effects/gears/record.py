@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.coordinates import motion
+from flexclear.pipeline.dynamics.effects.gears.model import Coupling, Side
 from flexclear.pipeline.dynamics.equations.observation import Observed
-from flexclear.pipeline.dynamics.model.couplings import Coupling, Side
 from flexclear.pipeline.dynamics.model.model import Model
 
 

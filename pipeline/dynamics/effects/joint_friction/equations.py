@@ -372,7 +372,7 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool, tree: Any
         for e in range(d.n_bearings):
             bearing = d.bearing[e]
             load_coordinates(d, e, bearing.load)
-            d.ledger_rate[d.rubbing_slot + d.bearings[e].joint] += bearing.load * bearing.loss
+            d.ledger_rate[d.joint_friction_slot + d.bearings[e].joint] += bearing.load * bearing.loss
         solve(d)
         for k in range(d.nv):
             d.du[k] += d.force[k]

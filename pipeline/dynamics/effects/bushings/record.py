@@ -6,8 +6,8 @@ import numpy as np
 
 from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.bushings.model import nearest
 from flexclear.pipeline.dynamics.equations.observation import Observed
-from flexclear.pipeline.dynamics.model.bushings import nearest
 from flexclear.pipeline.dynamics.model.model import Model
 
 

@@ -9,9 +9,6 @@ from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.model import Model
 
-#: rotation [rad] at which a bushing ends a run: at a full turn its rotation vector has no direction
-LARGEST = 6.2
-
 
 def rotations(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int, np.ndarray]:
     """Rotation vector [rad], shape (3,), of every bushing that resists rotation, by its first internal state.
@@ -36,19 +33,3 @@ def nearest(R: np.ndarray, before: np.ndarray) -> np.ndarray:
         return np.asarray(shortest)
     other = shortest - 2.0 * np.pi * q[1:] / half
     return np.asarray(min((shortest, other), key=lambda v: float(np.sum((v - before) ** 2))))
-
-
-def overturned(model: Model, y: np.ndarray) -> str | None:
-    """What to say where a bushing has come to a full turn in state y, else None."""
-    first = model.ny - model.arrays.size(m.N_INTERNAL)
-    for (name, _), row in zip(model.loads, model.arrays.table(m.LOADS), strict=True):
-        at = first + int(row["internal0"])
-        if isinstance(model.scene.load[name], Bushing) and row["internal0"] >= 0:
-            angle = float(np.linalg.norm(y[at : at + 3]))
-            if angle > 0.99 * LARGEST:
-                return (
-                    f"bushing {name} has turned by {np.degrees(angle):.0f} deg: it is an elastic mount, whose rotation "
-                    "vector loses its direction at a full turn; let a joint carry the turning, with a joint-spring "
-                    "for its torque, or give the bushing no stiffness and no damping against rotation"
-                )
-    return None
