@@ -4,14 +4,15 @@ A file composes exactly the kernels of the kinds present: what a scene does not 
 imported nor compiled. Of no more than it needs, so that mechanisms share files: steps depend on
 the integrator and on whether there are closures and contacts, not on joints or bodies.
 
-Effects add to a file where they declare it (`effects.effect`), at four points: "forces", "closures", "evaluate" (the
+What effects add to a file they declare (`effects.effect`), at four points: "forces", "closures", "evaluate" (the
 right-hand side) and "observe" (what is recorded).
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -32,14 +33,60 @@ from flexclear.pipeline.dynamics.effects import (
     named,
     schemes,
 )
-from flexclear.pipeline.dynamics.effects.composition import DYNAMICS, Composition, tupled
+from flexclear.pipeline.dynamics.effects.effect import PACKAGE, Effect
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
+DYNAMICS = "flexclear.pipeline.dynamics"
 #: what others are called by
 CALLS = (f"{DYNAMICS}.compile", "calls")
+
+
+@dataclass
+class Composition:
+    """A file in the making for a mechanism's parts.
+
+    given: arguments of what makes its function, by name.  imports: (module, name) each.
+    """
+
+    parts: Parts
+    given: dict[str, str] = field(default_factory=dict)
+    imports: list[tuple[str, str]] = field(default_factory=list)
+
+    def take(self, module: str, name: str) -> str:
+        """Import a name, which is returned."""
+        others = {known for package, known in self.imports if package != module}
+        assert name not in others, f"two parts of one mechanism are called {name}"
+        self.imports.append((module, name))
+        return name
+
+    def family(self, package: str, names: Iterable[str], table: str = "NAMES") -> str:
+        """A tuple of the modules of a family's parts."""
+        modules = [self.take(package, listed(package, name, where="parts", table=table)[0]) for name in names]
+        return "(" + "".join(f"{module}, " for module in modules) + ")"
+
+    @property
+    def tree(self) -> str:
+        """The module that factors the mass matrix."""
+        return self.take(f"{DYNAMICS}.equations", "articulated" if self.parts.articulated else "composite")
+
+    @property
+    def forms(self) -> str:
+        """The forms of normal forces."""
+        return self.family(FORMS, self.parts.forms)
+
+    def add_effects(self, point: str) -> None:
+        """Add what the effects present declare for a point."""
+        for effect in self.parts.present:
+            self.given |= {name: self._of(effect, text) for name, text in effect.compose.get(point, {}).items()}
+
+    def _of(self, effect: Effect, text: str) -> str:
+        """An argument that an effect declares, its own names imported."""
+        kinds, own = self.parts.kinds(effect.name), f"{PACKAGE}.{effect.name}"
+        text = re.sub(r"<(?:(\w+)\.)?(\w+)>", lambda m: self.take(f"{own}.{m[1]}" if m[1] else own, m[2]), text)
+        return text.format(file=self, kinds=self.family(f"{DYNAMICS}.{effect.family}", kinds) if kinds else "")
 
 
 def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
@@ -181,7 +228,7 @@ def _events(file: Composition, scheme: Scheme) -> str:
     touching = parts.surfaces or any(effect.touches for effect in parts.present)
     if touching and not scheme.located:
         return file.take(f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
-    guarded = chosen and (parts.frictions or parts.load_kinks or any(effect.guards for effect in parts.present))
+    guarded = chosen and (parts.frictions or parts.load_kinks or parts.functions("guards"))
     if touching:
         located = file.take(f"{INTEGRATORS}.contact_events", "located")
         given = [file.take(f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")]
@@ -193,14 +240,14 @@ def _events(file: Composition, scheme: Scheme) -> str:
 
 def _joints(parts: Parts) -> Composition:
     file = Composition(parts)
-    file.given["joints"] = tupled(file.family(JOINTS, parts.joints))
+    file.given["joints"] = file.family(JOINTS, parts.joints)
     return file
 
 
 def _rates(parts: Parts) -> Composition:
     """What the rates of the state consist of."""
     file = _forces(parts)
-    file.given["tree"] = file.tree()
+    file.given["tree"] = file.tree
     if parts.closures:
         _close(file)
     return file
@@ -212,21 +259,22 @@ def _forces(parts: Parts) -> Composition:
     if parts.flexible:
         file.given["flexible"] = f"{file.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
     if parts.surfaces:
-        surfaces = tupled(file.family(JOINTS, parts.surfaces, "CONTACTS"))
-        forms, frictions = file.family(FORMS, parts.forms), file.family(FRICTION_LAWS, parts.frictions)
-        maker = file.take(f"{DYNAMICS}.contact.forces", "make_contacts")
-        arguments = f"surfaces={surfaces}, forms={tupled(forms)}, frictions={tupled(frictions)}"
-        file.given["contacts"] = f"{maker}({arguments})"
+        surfaces = file.family(JOINTS, parts.surfaces, "CONTACTS")
+        maker, frictions = (
+            file.take(f"{DYNAMICS}.contact.forces", "make_contacts"),
+            file.family(FRICTION_LAWS, parts.frictions),
+        )
+        file.given["contacts"] = f"{maker}(surfaces={surfaces}, forms={file.forms}, frictions={frictions})"
     if parts.loads:
-        kinds = [_load(file, n, *kind.split(maxsplit=1)) for n, kind in enumerate(parts.loads)]
-        file.given["loads"] = f"{file.take(f'{DYNAMICS}.loads.composing', 'make_loads')}({tupled(kinds)})"
+        kinds = "".join(f"{_load(file, n, *kind.split(maxsplit=1))}, " for n, kind in enumerate(parts.loads))
+        file.given["loads"] = f"{file.take(f'{DYNAMICS}.loads.composing', 'make_loads')}(({kinds}))"
     file.add_effects("forces")
     return file
 
 
 def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
     """The module of a kind of loads, or what it makes of the kernel of an expression (`_formulas`)."""
-    (module,) = file.family(LOADS, (name,))
+    module = file.take(LOADS, listed(LOADS, name, where="parts")[0])
     if not formula:
         return module
     file.take(f"{DYNAMICS}.kernels", "kernel")
@@ -248,7 +296,7 @@ def _close(file: Composition) -> None:
     """Add the kernels of the closures: of joints, unless an effect brings more."""
     file.add_effects("closures")
     if "closures" not in file.given:
-        file.given["closures"] = f"{file.take(f'{DYNAMICS}.equations.closures', 'make_closing')}({file.tree()})"
+        file.given["closures"] = f"{file.take(f'{DYNAMICS}.equations.closures', 'make_closing')}({file.tree})"
 
 
 def _projection(file: Composition) -> str:

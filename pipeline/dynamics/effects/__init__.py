@@ -19,18 +19,13 @@ from flexclear.pipeline.core.scene import integrators
 from flexclear.pipeline.core.scene.ideal import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS
-from flexclear.pipeline.dynamics.effects.effect import (
-    CONTACTS,
-    FORMS,
-    FRICTION_LAWS,
-    JOINTS,
-    NORMAL_LAWS,
-    Effect,
-)
+from flexclear.pipeline.dynamics.effects.effect import Effect
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
 
+JOINTS, CONTACTS = "flexclear.pipeline.dynamics.joints", "flexclear.pipeline.dynamics.contact"
+NORMAL_LAWS, FORMS, FRICTION_LAWS = (f"{CONTACTS}.{family}" for family in ("normal", "form", "friction"))
 LOADS, LAWS = "flexclear.pipeline.dynamics.loads", "flexclear.pipeline.dynamics.drives"
 RECORDS = "flexclear.pipeline.dynamics.record"
 EVENTS = "flexclear.pipeline.dynamics.events"
@@ -66,6 +61,10 @@ class Parts:
         """The effects, in the order of their declarations."""
         names = {one.partition(" ")[0] for one in self.effects}
         return [effect for effect in EFFECTS if effect.name in names]
+
+    def functions(self, kind: str) -> list[Any]:
+        """What the effects declare under one of the names of `Effect`, imported now."""
+        return [effect.load(getattr(effect, kind)) for effect in self.present if getattr(effect, kind)]
 
     def kinds(self, name: str) -> tuple[str, ...]:
         """The kinds of which the code of an effect is composed."""
@@ -107,7 +106,8 @@ def most_parts(scene: Scene) -> Parts:
     ideal = {joint.type for name, joint in scene.joint.items() if name not in contacts}
     ideal |= {joints.HELD[joint.type] for joint in contacts.values() if joint.type in joints.HELD}
     paths = any(not hasattr(drive, "joint") for drive in scene.drive.values())
-    touching = contacts or any(effect.touches for effect in present(scene))
+    kinds = {effect.name: effect.kinds(scene) for effect in EFFECTS}
+    touching = contacts or any(effect.touches and kinds[effect.name] is not None for effect in EFFECTS)
     chained = set(joints.CHAIN) if paths or ideal - set(joints.WHOLE) else set()
     return Parts(
         joints=tuple(sorted({"free", *ideal, *chained})),
@@ -115,22 +115,12 @@ def most_parts(scene: Scene) -> Parts:
         forms=tuple(sorted(import_module(FORMS).NAMES)) if touching else (),
         frictions=tuple(sorted({j.friction.law for j in contacts.values() if j.friction is not None})),
         loads=tuple(sorted({load_kind(scene, name) for name in scene.forces()})),
-        effects=effects_of(scene),
+        effects=tuple(sorted(" ".join([name, *known]) for name, known in kinds.items() if known is not None)),
         closures=True,
         flexible=bool(scene.flexible()),
         harmonics=bool(_laws(scene) - WITHOUT_SINES),
-        load_kinks=load_kinks(scene),
+        load_kinks=any(getattr(load, "bends", False) for load in scene.load.values()),
     )
-
-
-def present(scene: Scene) -> list[Effect]:
-    """The effects of a scene, in the order of their declarations."""
-    return [effect for effect in EFFECTS if effect.kinds(scene) is not None]
-
-
-def effects_of(scene: Scene) -> tuple[str, ...]:
-    """The effects of a scene as `Parts` has them, sorted."""
-    return tuple(sorted(" ".join([effect.name, *(effect.kinds(scene) or ())]) for effect in present(scene)))
 
 
 def load_kind(scene: Scene, name: str) -> str:
@@ -139,11 +129,6 @@ def load_kind(scene: Scene, name: str) -> str:
 
     written = formula(scene, name)
     return f"{scene.forces()[name].type} {written.code}" if written else str(scene.forces()[name].type)
-
-
-def load_kinks(scene: Scene) -> bool:
-    """Whether a load bends: its friction, or its expression."""
-    return any(getattr(load, "bends", False) for load in scene.load.values())
 
 
 def _laws(scene: Scene) -> set[str]:
@@ -165,7 +150,7 @@ def named(scene: Scene) -> Iterator[Named]:
         if contact.friction is not None:
             yield Named(FRICTION_LAWS, contact.friction.law, f"[joint.{name}.friction]")
     for effect in EFFECTS:
-        yield from (Named(*part) for part in effect.named(scene))
+        yield from (Named(f"flexclear.pipeline.dynamics.{family}", *rest) for family, *rest in effect.named(scene))
     for law in sorted(_laws(scene)):
         yield Named(LAWS, law, "law")
     for name, load in scene.load.items():

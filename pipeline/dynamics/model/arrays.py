@@ -110,28 +110,14 @@ def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> A
 def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int]:
     """The header's sizes that follow from the tables."""
     closures = named(m.CLOSURES, tables[m.CLOSURES])
-    return {
-        m.N_LINKS: count[m.LINKS],
-        m.N_SITES: count[m.SITES],
+    counted = {name: table for name, table in m.NAMED.items() if table in count and f"n_{name}" in m.SIZES}
+    return {m.SIZES[f"n_{name}"]: count[table] for name, table in counted.items()} | {
         m.N_FLEX: count[m.FLEXES],
-        m.N_CLOSURES: count[m.CLOSURES],
-        m.N_CLOSURE_ROWS: count[m.CLOSURE_ROWS],
         m.N_KEPT_ROWS: count[m.CLOSURE_ENVELOPE],
-        m.N_CONTACTS: count[m.CONTACTS],
-        m.N_LAWS: count[m.LAWS],
-        m.N_LOADS: count[m.LOADS],
         m.NV: count[m.ENVELOPE],
         m.NY: count[m.GROUPS],
-        m.N_PAIRS: count[m.PAIRS],
-        m.N_KNOWN_PAIRS: count[m.KNOWN_PAIRS],
-        m.N_KNOWN_ENTRIES: count[m.KNOWN_ENTRIES],
-        m.N_CLOSURE_PAIRS: count[m.CLOSURE_PAIRS],
         m.N_GROUPS: count[m.FLOORS],
-        m.N_BODIES: count[m.BODIES],
-        m.N_FRAMES: count[m.FRAMES],
         m.N_COMPONENTS: count[m.BOOKS],
-        m.N_GUARDS: count[m.GUARDS],
-        **{m.SIZES[f"n_{name}"]: count[m.NAMED[name]] for effect in EFFECTS for name in effect.wiring},
         m.MASS_SIZE: envelope_size(named(m.ENVELOPE, tables[m.ENVELOPE])),
         m.SCHUR_SIZE: envelope_size(named(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
         m.JACOBIAN_SIZE: int(np.sum(3 * closures["threes"] * closures["n_support"])),

@@ -7,7 +7,7 @@ from typing import Any
 
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects import FRICTION_LAWS, present
+from flexclear.pipeline.dynamics.effects import FRICTION_LAWS, Parts
 from flexclear.pipeline.dynamics.model.loads import Loaded
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 
@@ -15,10 +15,9 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 Guard = tuple[tuple[int, ...], float, float]
 
 
-def fill(mechanism: Mechanism, loaded: Loaded) -> dict[Any, Any]:
+def fill(mechanism: Mechanism, parts: Parts, loaded: Loaded) -> dict[Any, Any]:
     """The tables GUARDS and GUARD_NUMBERS."""
-    effects = [effect.load(effect.guards) for effect in present(mechanism.scene) if effect.guards]
-    of_effects = [guard for guards in effects for guard in guards(mechanism)]
+    of_effects = [guard for made in parts.functions("guards") for guard in made(mechanism)]
     guards = [*_of_contacts(mechanism), *of_effects, *_of_loads(loaded)]
     return {
         m.GUARDS: [row for row, _, _ in guards],

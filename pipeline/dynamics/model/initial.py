@@ -280,9 +280,8 @@ def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray
 def of_effects(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int, np.ndarray]:
     """Internal states of effects that follow from the frames of all sites and that continue others, by their first."""
     states = dict[int, np.ndarray]()
-    for effect in model.parts.present:
-        if effect.states:
-            states |= effect.load(effect.states)(model, sites, internal)
+    for follow in model.parts.functions("states"):
+        states |= follow(model, sites, internal)
     return states
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,12 +12,11 @@ from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.effects import Parts, effects_of, load_kinks
+from flexclear.pipeline.dynamics.effects import Parts, most_parts
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling, couplings
 from flexclear.pipeline.dynamics.effects.stops.model import STOP
 from flexclear.pipeline.dynamics.model import contacts as contacting
 from flexclear.pipeline.dynamics.model import filling, flexible_bodies, guards, laws, wiring
-from flexclear.pipeline.dynamics.model import ledger as booking
 from flexclear.pipeline.dynamics.model import loads as loading
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.model.assembly import assembled
@@ -111,11 +110,12 @@ def filled(
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
-    gravity, slots = loading.gravity(mechanism.scene), booking.slots(mechanism)
-    parts = _parts(numbering, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
+    gravity = loading.gravity(mechanism.scene)
+    parts = _parts(numbering, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]))
+    slots = filling.slots(mechanism, parts)
     contacts = contacting.fill(numbering, parts, normals, touching, gauges, slots["bristles"])
     effects = filling.tables(filling.Filling(numbering, parts, ordered, gauges, slots))
-    groups, floors = _error_groups(numbering, gauges)
+    groups, floors = _error_groups(numbering, parts, gauges)
     books = _books(slots)
     arrays = pack(
         {
@@ -136,7 +136,7 @@ def filled(
             **loaded.tables,
             m.LOADS: _booked(mechanism, loaded, books),
             **effects,
-            **guards.fill(mechanism, loaded),
+            **guards.fill(mechanism, parts, loaded),
             **_recorded(mechanism),
             m.GAUGES: gauges.rows,
             m.GRAVITY: gravity,
@@ -231,21 +231,15 @@ def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
     }
 
 
-def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Parts:
-    """The kinds of parts that there are."""
+def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool) -> Parts:
+    """The kinds of parts that there are: of what the scene may have."""
     mechanism = numbering.mechanism
-    contacts = [contact.joint for contact in mechanism.contacts]
-    return Parts(
+    return replace(
+        most_parts(mechanism.scene),
         joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
-        surfaces=tuple(sorted({joint.type for joint in contacts} - {STOP})),
         forms=tuple(sorted({law.form for law in normals})),
-        frictions=tuple(sorted({joint.friction.law for joint in contacts if joint.friction is not None})),
-        loads=loads,
-        effects=effects_of(mechanism.scene),
         closures=bool(mechanism.closures or mechanism.scene.gear),
-        flexible=not mechanism.all_rigid,
         harmonics=harmonics,
-        load_kinks=load_kinks(mechanism.scene),
         articulated=articulated(numbering),
     )
 
@@ -321,7 +315,7 @@ Books = list[Book]
 
 def _books(slots: Mapping[str, int]) -> Books:
     """Where each independent mechanism keeps its books."""
-    others = range(slots["books"], slots["end"], booking.OTHER_BOOKS)
+    others = range(slots["books"], slots["end"], filling.OTHER_BOOKS)
     return [Book(m.DRIVE_WORK, m.MODAL_LOSS, slots["loads"]), *(Book(k, k + 1, k + 2) for k in others)]
 
 
@@ -352,21 +346,21 @@ def _closure_weights(mechanism: Mechanism, closures: Sequence[Closure | Coupling
     return weights
 
 
-def _error_groups(numbering: Numbering, gauges: Gauges) -> tuple[np.ndarray, np.ndarray]:
+def _error_groups(numbering: Numbering, parts: Parts, gauges: Gauges) -> tuple[np.ndarray, np.ndarray]:
     """Group of every state variable, and rows of FLOORS; gauges: have the internal states of parts, which come last."""
     mechanism, of_link = numbering.mechanism, numbering.mechanism.components.of_link
     lengths, masses = np.array(mechanism.components.lengths), np.zeros(len(mechanism.components.lengths))
     for link, part in zip(mechanism.links[1:], of_link[1:], strict=True):
         masses[part] += link.mass
     whole = np.full(len(lengths), mechanism.length)
-    groups, magnitudes, parts = _floors(numbering, gauges, lengths, masses * lengths**2)
-    natural = _floors(numbering, gauges, whole, np.full(len(lengths), np.sum(masses)) * whole**2)[1]
-    counts = np.bincount(parts[groups], minlength=len(lengths))
-    return groups, np.stack([magnitudes, natural, np.sqrt(counts / len(groups))[parts]], axis=1)
+    groups, magnitudes, owners = _floors(numbering, parts, gauges, lengths, masses * lengths**2)
+    natural = _floors(numbering, parts, gauges, whole, np.full(len(lengths), np.sum(masses)) * whole**2)[1]
+    counts = np.bincount(owners[groups], minlength=len(lengths))
+    return groups, np.stack([magnitudes, natural, np.sqrt(counts / len(groups))[owners]], axis=1)
 
 
 def _floors(
-    numbering: Numbering, gauges: Gauges, lengths: np.ndarray, energies: np.ndarray
+    numbering: Numbering, parts: Parts, gauges: Gauges, lengths: np.ndarray, energies: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Group of every state variable; of each group the floor below which it is resolved absolutely, and its component.
 
@@ -393,13 +387,13 @@ def _floors(
                 rows.append((lengths[of_link[i]] * link.mass**0.5, of_link[i]))
                 target[mine] = len(rows) - 1
     groups = [*q_group, *v_group]
-    tail = [group for block in booking.blocks(mechanism, energies, lengths).values() for group in block]
+    tail = [group for block in filling.blocks(mechanism, parts, energies, lengths).values() for group in block]
     tail += [(1.0, 1, _part_of_sites(numbering, *sites)) for sites in gauges.owners]
     for floor, count, part in tail:
         rows.append((floor, part))
         groups += [len(rows) - 1] * count
-    floors, parts = zip(*rows, strict=True)
-    return np.array(groups, dtype=np.int64), np.array(floors), np.array(parts)
+    floors, owners = zip(*rows, strict=True)
+    return np.array(groups, dtype=np.int64), np.array(floors), np.array(owners)
 
 
 def _part_of_sites(numbering: Numbering, *sites: int) -> int:

@@ -17,7 +17,6 @@ def on_frames(model: Model, seen: Observed, body: str) -> Acting:
         from flexclear.pipeline.dynamics.record.loads import on_loaded_frames
 
         on_each += on_loaded_frames(model, seen)
-    for effect in model.parts.present:
-        if effect.acts:
-            on_each += effect.load(effect.acts)(model, seen)
+    for on_its_frames in model.parts.functions("acts"):
+        on_each += on_its_frames(model, seen)
     return [acting for acting in on_each if model.mechanism.frames[acting[0]].body == body]

@@ -24,7 +24,7 @@ from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics.compile.sources import named
 from flexclear.pipeline.dynamics.effects import RECORDS
 from flexclear.pipeline.dynamics.effects.stops.model import ends_an_angle
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import forgotten
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
-Part = tuple[Variables, dict[str, object]]  #: variables and coordinates
 
 
 def dataset(run: Run) -> xr.Dataset:
@@ -77,7 +76,7 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np
     for term in terms:
         mine = names.setdefault(KINDS[term.kind].owner, [])
         mine += [term.owner] if term.owner not in mine else []
-    wanted, parts, model = {KINDS[term.kind].variable for term in terms}, list[Part](), motions.model
+    wanted, parts, model = {KINDS[term.kind].variable for term in terms}, list[Series](), motions.model
     if bodies := names.get("body"):
         those = motions.several(bodies)
         moved = motion_series(those, model.mechanism.origin)
@@ -104,7 +103,7 @@ _LEDGER = (
 )
 
 
-def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], Callable[[], Part]]]:
+def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], Callable[[], Series]]]:
     """What makes the variables of this scene but those of bodies, frames and joints, by how their names begin."""
     model, seen = motions.model, motions.seen
     yield ("modal_",), lambda: _modes(motions)
@@ -168,7 +167,7 @@ def warnings(run: Run) -> list[str]:
         *run.mended,
         *_contact_warnings(run),
         *_flexible_warnings(run),
-        *(text for effect in run.model.parts.present if effect.warns for text in effect.load(effect.warns)(run)),
+        *(text for warn in run.model.parts.functions("warns") for text in warn(run)),
         *_step_warnings(run.model, run.trajectory),
         *ledger.warnings(run.model, run.observed),
     ]
@@ -236,7 +235,7 @@ def _report(run: Run) -> dict[str, float | int | str]:
     return facts
 
 
-def _motion(motions: Motions) -> Part:
+def _motion(motions: Motions) -> Series:
     origin, body = motions.model.mechanism.origin, motions.every_body
     frames, joints = list(motions.model.mechanism.frames), list(motions.model.scene.joint)
     moment, force = every_joint_wrench(motions, joints)
@@ -265,7 +264,7 @@ def _joints(model: Model) -> dict[str, object]:
     return coordinates if joints else {"joint": []}
 
 
-def _modes(motions: Motions) -> Part:
+def _modes(motions: Motions) -> Series:
     model = motions.model
     if not model.numbering.flexible:
         return {}, {}
@@ -282,7 +281,7 @@ def _modes(motions: Motions) -> Part:
     }
 
 
-def _drives(scene: Scene, model: Model, seen: Observed) -> Part:
+def _drives(scene: Scene, model: Model, seen: Observed) -> Series:
     names = list(model.drives)
     if not names:
         return {}, {}
@@ -303,7 +302,7 @@ def _drives(scene: Scene, model: Model, seen: Observed) -> Part:
     }, {"drive": names, "drive_motion": ("drive", [motion(turning[name]) for name in names])}
 
 
-def _joint_coordinates(model: Model, seen: Observed) -> Part:
+def _joint_coordinates(model: Model, seen: Observed) -> Series:
     every = joint_coordinates(model, seen)
     if not every:
         return {}, {}
@@ -318,7 +317,7 @@ def _joint_coordinates(model: Model, seen: Observed) -> Part:
     }
 
 
-def _loads(model: Model, seen: Observed) -> Part:
+def _loads(model: Model, seen: Observed) -> Series:
     from flexclear.pipeline.dynamics.record.loads import load_series, turning_loads
 
     forces = model.scene.forces()
@@ -329,7 +328,7 @@ def _loads(model: Model, seen: Observed) -> Part:
     }
 
 
-def _contacts(model: Model, seen: Observed) -> Part:
+def _contacts(model: Model, seen: Observed) -> Series:
     touch = seen.touch
     scalars = {
         "contact_gap": touch["gap"],

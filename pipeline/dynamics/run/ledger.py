@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +16,9 @@ from flexclear.pipeline.dynamics.model.mechanism import Site
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
+#: what an effect loses, in the first variables of its block of the ledger [J]: variable of the run's dataset and its
+#: dimension; of each loss the sites between which it is, and to what in words
+Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 #: rounding of the largest energies, which may cancel in the balance
 ROUNDING = 1e-12
@@ -33,18 +35,6 @@ DIVERGED = 3e6
 REMEDY = "a controller with a smaller gain or a shorter period, or a longer time constant of a load, keeps it bounded"
 #: steps of many vibrations leave up to half of this in the work of forces that swing while the drives' speeds change
 LONG, LONG_PER_RTOL = 2e-2, 50.0
-
-
-class Losses(NamedTuple):
-    """What an effect loses: the first variables of its block of the ledger [J].
-
-    variable, dimension: of the run's dataset.  sites, words: where each loss is, and to what.
-    """
-
-    variable: str
-    dimension: str
-    sites: list[tuple[Site, Site]]
-    words: list[str]
 
 
 def _of_effects(model: Model) -> list[tuple[int, Losses]]:
@@ -81,11 +71,11 @@ def series(model: Model, seen: Observed, component: int | None = None) -> Variab
         load_work, load_loss = (ledger[:, books["load"] + k].sum(axis=1) for k in range(2))
         dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
         loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
-    for slot, losses in _of_effects(model):
-        values = ledger[:, slot : slot + len(losses.sites)]
-        lost_there = total(values, losses.sites)
+    for slot, (variable, dimension, sites, _) in _of_effects(model):
+        values = ledger[:, slot : slot + len(sites)]
+        lost_there = total(values, sites)
         dissipated, balance = dissipated + lost_there, balance + lost_there
-        loaded[losses.variable] = (("time", losses.dimension), values)
+        loaded[variable] = (("time", dimension), values)
     variables: Variables = {
         "kinetic": (("time",), kinetic),
         "potential": (("time",), potential),
@@ -168,9 +158,8 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchang
     exchanged: before it, of a run that continues another one.
     Raises SolverError when the run diverges, or its ledger is off by more than the scene's tolerance.
     """
-    for effect in model.parts.present:
-        if effect.refuses:
-            effect.load(effect.refuses)(model, trajectory, seen)
+    for refuse in model.parts.functions("refuses"):
+        refuse(model, trajectory, seen)
     _require_bounded(model, trajectory, seen)
     made = balances(model, seen)
     for energies in made:
@@ -221,8 +210,8 @@ def _losses(model: Model, totals: dict[str, np.ndarray], t: int) -> str:
             parts.append(f"{totals[f'contact_{cause}_loss'][t, c]:.3g} J to the {cause} of {contact.words}")
     if "modal_damping_loss" in totals:
         parts.append(f"{totals['modal_damping_loss'][t]:.3g} J to modal damping")
-    for _, losses in _of_effects(model):
-        parts += [f"{totals[losses.variable][t, k]:.3g} J to {words}" for k, words in enumerate(losses.words)]
+    for _, (variable, *_, words) in _of_effects(model):
+        parts += [f"{totals[variable][t, k]:.3g} J to {what}" for k, what in enumerate(words)]
     if "load_loss" in totals:
         parts.append(f"{totals['load_loss'][t]:.3g} J to the loads")
     return ", ".join(parts) or "nothing"

@@ -207,7 +207,7 @@ def _advance(
 
 def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
     """What gives the state after what effects do at a break [s], from that before it."""
-    samplers = [effect.load(effect.samples)(engine) for effect in engine.model.parts.present if effect.samples]
+    samplers = [make(engine) for make in engine.model.parts.functions("samples")]
     return lambda y, t: reduce(lambda state, sample: sample(state, t), samplers, y)
 
 

@@ -7,7 +7,7 @@ from flexclear.pipeline.dynamics.effects.effect import Effect
 BUSHINGS = Effect(
     "bushings",
     lambda scene: () if any(load.type == "bushing" for load in scene.load.values()) else None,
-    records={("bushing_",): "record:give"},
-    states="model:rotations",
+    records={("bushing_",): "run:give"},
+    states="run:rotations",
     explains="run:explanation",
 )

@@ -1,15 +1,43 @@
-"""Bushings at a full turn end a run, in words."""
+"""Rotation vectors of bushings, followed continuously beyond half a turn, which end a run at a full one."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series
+from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.engine import Engine
 
 #: rotation [rad] at which a bushing ends a run: at a full turn its rotation vector has no direction
 LARGEST = 6.2
+
+
+def rotations(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int, np.ndarray]:
+    """Rotation vector [rad], shape (3,), of every bushing that resists rotation, by its first internal state.
+
+    sites: frames of all sites, rows of SITE_FRAMES with named fields.  internal: states that the vectors continue.
+    """
+    vectors = {}
+    for (name, _), row in zip(model.loads, model.arrays.table(m.LOADS), strict=True):
+        first = int(row["internal0"])
+        if first >= 0 and isinstance(model.scene.load[name], Bushing):
+            R = sites[row["a"]]["axes"].T @ sites[row["b"]]["axes"]
+            vectors[first] = nearest(R, internal[first : first + 3])
+    return vectors
+
+
+def nearest(R: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Of the two rotation vectors [rad] below a full turn of a matrix R the one closer to another, shape (3,)."""
+    q = matrix_to_quaternion(R)
+    q, half = (q if q[0] >= 0.0 else -q), float(np.linalg.norm(q[1:]))
+    shortest = q[1:] * (2.0 if half == 0.0 else 2.0 * np.arctan2(half, q[0]) / half)
+    if half == 0.0:
+        return np.asarray(shortest)
+    other = shortest - 2.0 * np.pi * q[1:] / half
+    return np.asarray(min((shortest, other), key=lambda v: float(np.sum((v - before) ** 2))))
 
 
 def explanation(engine: Engine) -> str | None:
@@ -27,3 +55,21 @@ def explanation(engine: Engine) -> str | None:
                     "for its torque, or give the bushing no stiffness and no damping against rotation"
                 )
     return None
+
+
+def give(model: Model, seen: Observed) -> Series:
+    """Displacement [m] and rotation vector [rad] of each second frame in the first one's axes, and their coordinate."""
+    names = [name for name, load in model.scene.forces().items() if isinstance(load, Bushing)]
+    wiring, places = model.arrays.table(m.LOADS), {name: k for k, (name, _) in enumerate(model.loads)}
+    displacement, rotation = (np.zeros((len(seen.state), len(names), 3)) for _ in range(2))
+    for k, name in enumerate(names):
+        a, b = (seen.sites[:, wiring[places[name]][end]] for end in ("a", "b"))
+        to_first = np.swapaxes(a["axes"], 1, 2)
+        displacement[:, k] = np.einsum("tij,tj->ti", to_first, b["origin"] - a["origin"])
+        first = int(wiring[places[name]]["internal0"])
+        at = model.ny - model.arrays.size(m.N_INTERNAL) + first
+        # without resistance to rotation nothing follows it
+        before = seen.state[:, at : at + 3] if first >= 0 else np.zeros((len(seen.state), 3))
+        rotation[:, k] = [nearest(R, v) for R, v in zip(to_first @ b["axes"], before, strict=True)]
+    dims = ("time", "bushing", "axis")
+    return {"bushing_displacement": (dims, displacement), "bushing_rotation": (dims, rotation)}, {"bushing": names}

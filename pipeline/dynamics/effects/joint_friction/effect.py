@@ -5,41 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from flexclear.pipeline.dynamics.effects.effect import FRICTION_LAWS, PACKAGE, Effect
+from flexclear.pipeline.dynamics.effects.effect import Effect
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.dynamics.effects.composition import Composition
-
-EQUATIONS = f"{PACKAGE}.joint_friction.equations"
-
-
-def _laws(scene: Scene) -> list[str] | None:
-    return sorted({law for _, law, _ in _named(scene)}) or None
 
 
 def _named(scene: Scene) -> Iterator[tuple[str, str, str]]:
     for name, joint in scene.rubbing().items():
         if joint.friction is not None:
-            yield FRICTION_LAWS, joint.friction.law, f"[joint.{name}.friction]"
-
-
-def _evaluate(file: Composition) -> None:
-    """Add friction on accelerations, and on drives."""
-    laws = file.family(FRICTION_LAWS, file.parts.kinds("joint_friction"))
-    tractions = "".join(f"{law}.traction, " for law in laws)
-    maker, drives = (file.take(EQUATIONS, name) for name in ("make_joint_friction", "load_drives"))
-    file.given["friction"] = f"({maker}(({tractions}), {file.parts.closures}, {file.given['tree']}), {drives})"
-
-
-def _observe(file: Composition) -> None:
-    if file.parts.closures:
-        file.given["friction"] = file.take(EQUATIONS, "take_off_closures")
+            yield "contact.friction", joint.friction.law, f"[joint.{name}.friction]"
 
 
 JOINT_FRICTION = Effect(
     "joint_friction",
-    _laws,
+    lambda scene: sorted({law for _, law, _ in _named(scene)}) or None,
+    "contact.friction",
     _named,
     wiring={
         # site_a, site_b: of its frames; link: whose inboard joint it is, or -1; reversed: whether that link is on the
@@ -52,39 +33,40 @@ JOINT_FRICTION = Effect(
         "reaction_terms": "coordinate column",  # free coordinates whose acceleration the joint of a link feels
         "reaction_loops": "closure sign part",  # closures that act beyond it
     },
-    numbers={
-        # radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per
-        # force along the axis and per moment about it; preload: normal force that is always there
-        "bearing_numbers": "radius lever axial torsion preload law:6",
-    },
+    # radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per
+    # force along the axis and per moment about it; preload: normal force that is always there
+    numbers={"bearing_numbers": "radius lever axial torsion preload law:6"},
     work={
-        # what it does now; unit: wrench of its friction on the joint's second body per normal force, about the
-        # kernels' origin; loss: what it takes per normal force [m/s]
+        # unit: wrench of its friction on the joint's second body per normal force, about the kernels' origin; loss:
+        # what it takes per normal force [m/s]
         "bearing": "load slip loss unit_moment:3 unit_force:3",
         # what bends its friction where it reverses: sliding velocity, force along the axis, moment about it and forces
         # at both ends as they press
         "bends": "sliding:3 along about one_end:2 other_end:2",
-        # reactions of the joints: without friction, then per normal force of each bearing; moment about the second
-        # frame's origin, force
+        # of the joints: without friction, then per normal force of each bearing; about the second frame's origin
         "reactions": "moment:3 force:3",
     },
     # of the bearings' loads: slopes of their equations, and residuals; of the closures: multipliers without friction
     stretches=("bearing_slopes", "bearing_residuals", "smooth_multiplier"),
     lengths={
-        "bearing": lambda size: size("n_bearings"),
-        "bends": lambda size: size("n_bearings"),
+        **dict.fromkeys(("bearing", "bends", "bearing_residuals"), lambda size: size("n_bearings")),
         "reactions": lambda size: size("n_rubbing") * (1 + size("n_bearings")),
         "bearing_slopes": lambda size: size("n_bearings") ** 2,
-        "bearing_residuals": lambda size: size("n_bearings"),
         "smooth_multiplier": lambda size: size("n_closure_rows") if size("n_bearings") else 0,
     },
+    compose={
+        "evaluate": {
+            "friction": "(<equations.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "
+            "<equations.load_drives>)"
+        },
+        "observe": {"friction": "<equations.take_off_closures>"},
+    },
+    iterates=True,
     fill="model:fill",
     ledger="model:ledger",
     guards="model:guards",
-    iterates=True,
-    compose={"evaluate": _evaluate, "observe": _observe},
-    records={("joint_bearing", "joint_sliding", "joint_friction_"): "record:friction_series"},
     losses="run:losses",
     explains="run:explanation",
+    records={("joint_bearing", "joint_sliding", "joint_friction_"): "record:friction_series"},
     warns="record:warnings",
 )

@@ -25,28 +25,20 @@ BENDS = m.NAMED["bends"]
 PRESSES = {"along": 1, "about": 1, "one_end": 2, "other_end": 2}
 
 
-def parts(mechanism: Mechanism) -> list[int]:
-    """The independent mechanism of each joint with friction."""
-    joints = mechanism.scene.rubbing().values()
-    return [mechanism.components.of(*(mechanism.site(frame).link for frame in joint.between)) for joint in joints]
-
-
 def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Group]:
     """First the loss of each joint [J], then the bristles [m] of each bearing."""
-    known = parts(mechanism)
-    joints = zip(mechanism.scene.rubbing().values(), known, strict=True)
-    bearings = [part for joint, part in joints for _ in BEARINGS[joint.type]]
-    bristles = zip(_bristles(mechanism), bearings, strict=True)
-    losses = [(energies[part], 1, part) for part in known]
-    return losses + [(size, 3, part) for size, part in bristles if size is not None]
-
-
-def _bristles(mechanism: Mechanism) -> list[float | None]:
-    """Size of the bristles of each bearing, or None."""
-    sizes = []
+    losses, bristles = list[Group](), list[Group]()
     for name, joint in mechanism.scene.rubbing().items():
-        sizes += [_law(name, joint).bristle(joint.friction)] * len(BEARINGS[joint.type])
-    return sizes
+        part, size = mechanism.components.of(*(mechanism.site(f).link for f in joint.between)), _bristle(name, joint)
+        losses.append((energies[part], 1, part))
+        bristles += [] if size is None else [(size, 3, part)] * len(BEARINGS[joint.type])
+    return losses + bristles
+
+
+def _bristle(name: str, joint: IdealJoint) -> float | None:
+    """Size of the bristles of each of its bearings, or None."""
+    size: float | None = _law(name, joint).bristle(joint.friction)
+    return size
 
 
 def _law(name: str, joint: IdealJoint) -> Any:
@@ -80,7 +72,6 @@ def fill(filling: Filling) -> dict[str, Any]:
     laws = filling.parts.kinds("joint_friction")
     slot = filling.slots["joint_friction"]
     bristle = numbering.nq + numbering.nv + slot + len(mechanism.scene.rubbing())
-    sizes = iter(_bristles(mechanism))
     for number, (name, joint) in enumerate(mechanism.scene.rubbing().items()):
         a, b = (mechanism.site(frame) for frame in joint.between)
         sites = numbering.site(a), numbering.site(b)
@@ -91,7 +82,7 @@ def fill(filling: Filling) -> dict[str, Any]:
         ranges = tables.add(list(entries), reaction, len(BEARINGS[joint.type]))
         tables.joints.append((*sites, link, int(reverse), closure, *ranges))
         for kind, side, axis in BEARINGS[joint.type]:
-            size = next(sizes)
+            size = _bristle(name, joint)
             law = laws.index(joint.friction.law) if joint.friction is not None else -1
             tables.bearings.append((number, kind, law, side, axis, bristle if size is not None else -1))
             tables.numbers.append(_numbers(name, joint, kind))

@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.run import Run
 
 
-def friction_series(
-    model: Model, seen: Observed
-) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
+def friction_series(model: Model, seen: Observed) -> Series:
     """Load [N], largest sliding speed [m/s] and power [W] of the bearings of each joint, and the wrench of friction.
 
     The wrench is part of the joint's own; on its second body, about the second frame's origin.

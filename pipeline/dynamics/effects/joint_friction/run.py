@@ -17,7 +17,7 @@ def losses(model: Model) -> Losses:
     """What each joint loses."""
     joints = model.scene.rubbing().items()
     sites = [(model.mechanism.site(joint.between[0]), model.mechanism.site(joint.between[1])) for _, joint in joints]
-    return Losses("joint_friction_loss", "rubbing", sites, [f"the friction of joint {name}" for name, _ in joints])
+    return "joint_friction_loss", "rubbing", sites, [f"the friction of joint {name}" for name, _ in joints]
 
 
 def explanation(engine: Engine) -> str | None:

@@ -5,24 +5,14 @@ Sliding distance and load path are part of the state, so that steps and impacts 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from flexclear.pipeline.dynamics.effects.effect import PACKAGE, Effect
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.effects.composition import Composition
-
-
-def _forces(file: Composition) -> None:
-    file.given["contacts"] = f"{file.take(f'{PACKAGE}.wear.contact', 'wearing')}({file.given['contacts']})"
-
+from flexclear.pipeline.dynamics.effects.effect import Effect
 
 WEAR = Effect(
     "wear",
     lambda scene: () if scene.worn() else None,
     wiring={"worn": "contact"},  # contacts whose wear is counted
-    ledger="model:ledger",
+    compose={"forces": {"contacts": "<contact.wearing>({file.given[contacts]})"}},
     fill="model:fill",
-    compose={"forces": _forces},
+    ledger="model:ledger",
     records={("wear_",): "record:wear_series"},
 )

@@ -6,13 +6,11 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.wear.contact import LEDGER
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series
 from flexclear.pipeline.dynamics.model.model import Model
 
 
-def wear_series(
-    model: Model, seen: Observed
-) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
+def wear_series(model: Model, seen: Observed) -> Series:
     """Sliding distance [m] and load path [N m] since the start, and the direction of the contact in both surfaces.
 
     A direction is a unit vector from the centre of a surface to the contact, in the axes of the surface's frame; zero
