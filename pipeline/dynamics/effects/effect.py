@@ -31,6 +31,7 @@ class Effect:
     compose: arguments that it adds to generated files, or replaces there, by the point in `compile.sources` at which
     it does.  In their texts, ``<module.name>`` is a name in its folder, ``{file}`` the `compile.sources.Composition`,
     and ``{kinds}`` the tuple of the modules of its kinds.
+    changeable: keys of a scene, as ``table.key``, that decide none but numbers of the effect (`model.refill`).
     touches: whether it has contacts, which open and close at events.
     iterates: whether its equations are solved by iteration from what the last evaluation found, which only kernels can.
     fill: ``fill(filling)`` -> rows of the tables by name (`model.filling`).
@@ -58,6 +59,7 @@ class Effect:
     stretches: tuple[str, ...] = ()
     lengths: Mapping[str, Callable[[Callable[[str], int]], int]] = field(default_factory=dict)
     compose: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
+    changeable: tuple[str, ...] = ()
     touches: bool = False
     iterates: bool = False
     fill: str = ""

@@ -12,6 +12,7 @@ WEAR = Effect(
     lambda scene: () if scene.worn() else None,
     wiring={"worn": "contact"},  # contacts whose wear is counted
     compose={"forces": {"contacts": "<contact.wearing>({file.given[contacts]})"}},
+    changeable=("joint.wear",),
     fill="model:fill",
     ledger="model:ledger",
     records={("wear_",): "record:wear_series"},
