@@ -41,6 +41,7 @@ from flexclear.pipeline.core.scene.event_kinds import COMPRESSION as COMPRESSION
 from flexclear.pipeline.core.scene.event_kinds import OPENING as OPENING
 from flexclear.pipeline.core.scene.event_kinds import SLIPPING as SLIPPING
 from flexclear.pipeline.core.scene.event_kinds import STICKING as STICKING
+from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 from flexclear.pipeline.dynamics.kernels import kernel
 
 _place = count()
@@ -140,17 +141,16 @@ class Room:
 (
     N_LINKS, N_SITES, N_FLEX, N_CLOSURES, N_CLOSURE_ROWS, N_KEPT_ROWS, N_CONTACTS, N_DRIVES, NQ, NV, NY, N_LEDGER,
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
-    MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, LOAD_SLOT, N_COUPLINGS, N_SURFACES, N_RUBBING, N_BEARINGS, RUBBING_SLOT,
-    N_WORN, WEAR_SLOT, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS,
+    MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, N_SURFACES, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS,
     N_CHANGES, F_CHANGE, W_CHANGE,
 ) = _named(
     SIZES,
     "n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger n_pairs "
     "n_known_pairs n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
-    "n_loads n_internal load_slot n_couplings n_surfaces n_rubbing n_bearings rubbing_slot n_worn wear_slot n_bodies "
-    "n_frames n_components n_guards n_load_bends n_changes f_change w_change",
+    "n_loads n_internal n_surfaces n_bodies n_frames n_components n_guards n_load_bends n_changes f_change w_change",
 )
 # fmt: on
+_named(SIZES, " ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 #: RATES: of what the steps evaluate with, EVALUATE's or code for this wiring alone (`specialise`)
 EVALUATE, PROJECT, RETRACT, RATES = ADDRESSES = _places(4)
@@ -187,7 +187,6 @@ ENTRIES = wiring("slot column sign part")  # slot: in the support; part: of a co
 KNOWN_ENTRIES = wiring("closure drive column sign part")
 #: links between the ground and a closure's ends, leaves first; slot: of the first coordinate of the link's joint, or -1
 PATHS = wiring("link slot")
-COUPLINGS = wiring("first second")  # gauges of two joint coordinates, of which the second follows the first
 CLOSURE_PAIRS = wiring("a b common0 n_common")  # b >= a
 COMMON = wiring("a b")  # slots of a common coordinate
 CLOSURE_ENVELOPE = wiring("first origin")  # of the rows that are solved for
@@ -204,18 +203,6 @@ LOAD_KINDS = wiring("load0 n_loads")
 #: how a joint coordinate is measured between sites a and b: turning or sliding, frame (side) and axis, entries of R_FG;
 #: turns: index of the angle with its full turns among the internal states or -1
 GAUGES = wiring("a b turns turning side axis sine_f sine_g cosine_f cosine_g")
-#: ideal joints with friction. site_a, site_b: of their frames; link: whose inboard joint it is, or -1; reversed:
-#: whether that link is on the side of the first frame; closure: that it is, or -1
-RUBBING = wiring(
-    "site_a site_b link reversed closure entry0 n_entries momentum0 n_momenta column0 n_columns loop0 n_loops bearing0 "
-    "n_bearings"
-)
-#: where such a joint rubs. kind: see `equations.joint_friction`; side, axis: of its frame; bristle: as of CONTACTS
-BEARINGS = wiring("joint kind law side axis bristle")
-RUBBING_ENTRIES = wiring("coordinate column sign")  # what moves the joint; prescribed coordinates after the free ones
-REACTION_TERMS = wiring("coordinate column")  # free coordinates whose acceleration the joint of a link feels
-REACTION_LOOPS = wiring("closure sign part")  # closures that act beyond it
-WORN = wiring("contact")  # contacts whose wear is counted
 #: on what steps end: the vector of `components` numbers from `offset` on in the table of w that has this index in
 #: the header.  contact: that must be closed, or -1; bearing: by whose load it is measured, or -1
 GUARDS = wiring("table offset components contact bearing")
@@ -236,13 +223,9 @@ BASIS_VALUES = numbers("value")
 INTERFACE_DATA = numbers("value")  # per body, in the interface basis: C1 (3n), modal mass (n n), stiffness (n n)
 PORT_NUMBERS = numbers("origin:3 axes:3x3")  # undeformed
 PORT_DATA = numbers("value")  # per port and moving shape r: translation shape (3r), rotation shape (3r)
-#: radius: of the inner surface; shape: what else its kind of surfaces has; length: size of the mechanism that it
-#: belongs to
-CONTACT_NUMBERS = numbers("clearance radius floor stick_speed normal_law:4 friction_law:6 shape:2 length")
-#: radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per force
-#: along the axis and per moment about it; preload: normal force that is always there
-BEARING_NUMBERS = numbers("radius lever axial torsion preload law:6")
-COUPLING_NUMBERS = numbers("ratio offset")  # second coordinate = ratio * first + offset
+#: radius: of the inner surface; stiffness, exponent, damping: of the normal law (`contact.law.Numbers`); shape: what
+#: else its kind of surfaces has; length: size of the mechanism that it belongs to
+CONTACT_NUMBERS = numbers("clearance radius floor stick_speed stiffness exponent damping friction_law:6 shape:2 length")
 PIECES = numbers("start coefficients:8")
 HARMONICS = numbers("amplitude frequency phase")  # angular frequency
 LOAD_NUMBERS = numbers("value")  # see `loads`
@@ -305,19 +288,6 @@ LAW = work("value rate second_rate")
 #: energy, power that it brings in, power that it loses
 LOAD = work("force:3 moment:3 value rate stored power loss")
 LOAD_BENDS = work("now")  # of loads that bend: speeds along their coordinates, arguments of max, min and abs
-#: what a bearing does now; unit: wrench of its friction on the joint's second body per normal force, about the kernels'
-#: origin; loss: what it takes per normal force [m/s]
-BEARING = work("load slip loss unit_moment:3 unit_force:3")
-#: what bends the friction of a bearing where it reverses: sliding velocity, force along the axis, moment about it and
-#: forces at both ends as they press
-BENDS = work("sliding:3 along about one_end:2 other_end:2")
-#: reactions of the joints with friction: without it, then per normal force of each bearing; moment about the second
-#: frame's origin, force
-REACTIONS = work("moment:3 force:3")
-#: of the bearings' loads: slopes of their equations, and residuals; of the closures: multipliers without friction
-BEARING_SLOPES, BEARING_RESIDUALS, SMOOTH_MULTIPLIER = _named(
-    STRETCHES, "bearing_slopes bearing_residuals smooth_multiplier"
-)
 INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _named(
     STRETCHES, "internal drive_force ledger_rate position_rate y y_new y_stage slopes dense memory"
 )
@@ -330,6 +300,14 @@ WATCH = work(
 )
 GUARDED = work("start:3 end:3")  # what guards watch, at the start and at the end of the step
 (CONTROL,) = _named(STRETCHES, "control")
+
+# Tables of effects ---------------------------------------------------------------------------------------------------
+#: by the names that they declare (`effects.effect`); those of effects that a mechanism lacks are empty
+OF_EFFECTS: dict[str, Any] = {}
+for _effect in EFFECTS:
+    for _array, _tables in (("h", _effect.wiring), ("f", _effect.numbers), ("w", _effect.work)):
+        OF_EFFECTS |= {name: _table(_array, rows) for name, rows in _tables.items()}
+    _named(STRETCHES, " ".join(_effect.stretches))
 HEADER = next(_place)
 
 # the ledger before the contacts' slots (three deflections of each contact with bristles come after them):
@@ -337,8 +315,6 @@ HEADER = next(_place)
 DRIVE_WORK, MODAL_LOSS, CONTACT_SLOTS = range(3)
 #: a contact's slots there: losses of its damping and of friction, impulse of its normal force
 CONTACT_LEDGER = layout("damping friction impulse")
-#: of contacts that wear: sliding distance [m], and time integral of normal force times sliding speed [N m]
-WEAR_LEDGER = layout("sliding load_path")
 # what an evaluation reports in n[EVALUATION]
 OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 
@@ -397,7 +373,7 @@ NOT_A_NUMBER, NO_CONVERGENCE, WORN_ROWS, AT_SINGULAR, STEPPED_OVER, SINGULAR_AHE
 # Names of tables for kernels (`fields`) -------------------------------------------------------------------------------
 NAMED: dict[str, Any] = {
     name.lower(): value for name, value in list(globals().items()) if type(value).__name__ == "Table"
-}
+} | OF_EFFECTS
 #: where stretches of w, and tables, begin
 INDICES = {f"at_{name}": index for name, index in STRETCHES.items()}
 INDICES |= {f"at_{name}": table.place for name, table in NAMED.items()}

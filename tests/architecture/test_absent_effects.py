@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,10 +20,13 @@ from flexclear.pipeline.dynamics import loads
 from flexclear.pipeline.dynamics.compile import functions
 from flexclear.pipeline.dynamics.compile.sources import imported, sources, specialised
 from flexclear.pipeline.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
+from flexclear.pipeline.dynamics.effects.declared import EFFECTS as DECLARED
+from flexclear.pipeline.dynamics.effects.effect import PACKAGE
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import bundles
 
+DYNAMICS = "flexclear.pipeline.dynamics"
 CONTACT = (
     "flexclear.pipeline.dynamics.contact",
     "flexclear.pipeline.dynamics.joints.clearance_spherical",
@@ -87,6 +90,35 @@ def test_a_run_of_an_ideal_scene_imports_no_contact_and_no_flexible_body(root: P
     assert below(names, (*CONTACT, *FLEXIBLE, *APPLIED, *SINGULAR)) == set()
 
 
+def code_of_effects(names: set[str]) -> set[str]:
+    """Modules of effects other than declarations."""
+    return {n.removeprefix(f"{PACKAGE}.") for n in names if re.fullmatch(rf"{PACKAGE}\.\w+\.(?!effect$)\w+", n)}
+
+
+def test_declarations_of_effects_are_read_without_their_code() -> None:
+    text = "import sys; from flexclear.pipeline.dynamics import effects; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
+    names = set(done.stdout.split())
+    assert {f"{PACKAGE}.{effect.name}.effect" for effect in DECLARED} <= names
+    assert code_of_effects(names) == set()
+    assert below(names, ("numba", f"{DYNAMICS}.kernels", f"{DYNAMICS}.memory")) == set()
+
+
+def test_a_run_imports_the_code_of_no_effect_that_its_scene_lacks(root: Path) -> None:
+    """But for what contacts and closures may be: ends of stops, and gears."""
+    kinds = {"stops.model", "gears.model"}
+    assert code_of_effects(imported_by_a_run(root, IDEAL)) == kinds
+    assert code_of_effects(imported_by_a_run(root, "checks/bushing")) == {*kinds, "bushings.run"}
+
+
+def test_every_function_that_a_declaration_names_is_there() -> None:
+    for effect in DECLARED:
+        given = [getattr(effect, field.name) for field in fields(effect)]
+        functions = [one for one in [*given, *effect.records.values()] if isinstance(one, str) and ":" in one]
+        assert all(callable(effect.load(function)) for function in functions)
+        assert {f"{PACKAGE}.{effect.name}.{one.partition(':')[0]}" for one in functions} == effect.modules
+
+
 def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
     """Also shows that the test above would notice."""
     names = imported_by_a_run(root, CSJ)
@@ -130,13 +162,13 @@ EFFECTS = {
     "friction": ("modified_coulomb", "flexclear.pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("flexible_bodies", "flexclear.pipeline.dynamics.bodies.flexible"),
     "closures": ("closures=", "flexclear.pipeline.dynamics.equations.closures"),
-    "couplings": ("make_coupled_closing", "flexclear.pipeline.dynamics.equations.couplings"),
-    "stops": ("make_stops", "flexclear.pipeline.dynamics.contact.stops"),
-    "stiffening": ("import shortening", "flexclear.pipeline.dynamics.bodies.shortening"),
+    "couplings": ("make_coupled_closing", "flexclear.pipeline.dynamics.effects.gears.equations"),
+    "stops": ("make_stops", "flexclear.pipeline.dynamics.effects.stops.contact"),
+    "stiffening": ("flexible_bodies(bodies)", "flexclear.pipeline.dynamics.effects.stiffening.bodies"),
     "loads": ("make_loads", "flexclear.pipeline.dynamics.loads.composing"),
     "harmonics": ("import oscillate", "flexclear.pipeline.dynamics.drives.oscillation"),
-    "joint friction": ("make_joint_friction", "flexclear.pipeline.dynamics.equations.joint_friction"),
-    "wear": ("import wearing", "flexclear.pipeline.dynamics.contact.wear"),
+    "joint friction": ("make_joint_friction", "flexclear.pipeline.dynamics.effects.joint_friction.equations"),
+    "wear": ("import wearing", "flexclear.pipeline.dynamics.effects.wear.contact"),
     "guards": ("integrate.guards import", "flexclear.pipeline.dynamics.integrate.guards"),
 }
 SPRING = ("spring-damper",)
@@ -151,29 +183,25 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
         {"contact", "normal law", "friction", "closures", "guards"},
     ),
     "flexible": (Parts(("fixed",), flexible=True), {"flexible bodies"}),
-    "stiffened": (Parts(("fixed",), flexible=True, stiffening=True), {"flexible bodies", "stiffening"}),
+    "stiffened": (Parts(("fixed",), flexible=True, effects=("stiffening",)), {"flexible bodies", "stiffening"}),
     "springs": (Parts(("prismatic",), loads=SPRING), {"loads"}),
     "waves": (Parts(("prismatic",), harmonics=True), {"harmonics"}),
-    "geared": (Parts(("revolute",), closures=True, couplings=True), {"closures", "couplings"}),
-    "stopped": (Parts(("revolute",), forms=("hysteretic",), stops=True), {"stops", "normal law"}),
+    "geared": (Parts(("revolute",), closures=True, effects=("gears",)), {"closures", "couplings"}),
+    "stopped": (Parts(("revolute",), forms=("hysteretic",), effects=("stops",)), {"stops", "normal law"}),
     "rubbing hinges": (
-        Parts(("revolute",), closures=True, joint_frictions=("modified-coulomb",)),
+        Parts(("revolute",), closures=True, effects=("joint_friction modified-coulomb",)),
         {"closures", "joint friction", "friction", "guards"},
     ),
-    "worn": (Parts(("free",), **SMOOTH, wear=True), {"contact", "normal law", "wear"}),
+    "worn": (Parts(("free",), **SMOOTH, effects=("wear",)), {"contact", "normal law", "wear"}),
     "everything": (
         Parts(
             ("fixed", "spherical"),
             **RUBBING,
             loads=("joint-friction", *SPRING),
-            stops=True,
+            effects=("gears", "joint_friction ambrosio", "stiffening", "stops", "wear"),
             closures=True,
-            couplings=True,
             flexible=True,
-            stiffening=True,
             harmonics=True,
-            joint_frictions=("ambrosio",),
-            wear=True,
             load_kinks=True,
         ),
         set(EFFECTS),

@@ -180,5 +180,13 @@ def test_the_page_shows_what_is_tested(root: Path, name: str) -> None:
     assert f"`{PLACES[name]}/{name}.py`" in page
 
 
+@pytest.mark.parametrize("name", ["effect", "contact", "model", "record"])
+def test_the_page_shows_the_folder_of_an_effect(root: Path, name: str) -> None:
+    path = "pipeline/dynamics/effects/wear"
+    page = (root / "docs" / "extending.md").read_text()
+    assert f"`{path}/{name}.py`:\n\n```python\n{(root / path / name).with_suffix('.py').read_text()}```" in page
+    assert {one.stem for one in (root / path).glob("*.py")} == {"__init__", "effect", "contact", "model", "record"}
+
+
 def test_every_example_is_tested(root: Path) -> None:
     assert {path.stem for path in examples(root).iterdir()} == set(PLACES)

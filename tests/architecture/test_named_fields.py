@@ -9,6 +9,7 @@ from numba.core.errors import NumbaError, TypingError
 
 import flexclear.pipeline.dynamics.compile.calls  # noqa: F401  (registers the types of named fields)
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 from flexclear.pipeline.dynamics.fields import Data, data
 from flexclear.pipeline.dynamics.memory import ARRAYS, row_fields
 from flexclear.pipeline.dynamics.memory import NAMED as TABLES
@@ -39,8 +40,10 @@ def test_names_are_those_of_memory_and_none_means_two_things() -> None:
     kinds = (m.SIZES, m.STRETCHES, m.REPORTS, m.LISTS, floats, TABLES)
     names = [name for kind in (*kinds, m.INDICES) for name in kind]
     assert len(names) == len(set(names))
+    of_effects = {name for effect in EFFECTS for name in (*effect.sizes, *effect.stretches)} | set(m.OF_EFFECTS)
     for kind in kinds:
-        assert {name: getattr(m, name.upper()) for name in kind} == kind
+        named = set(kind) - of_effects  # those of effects are read by their names alone
+        assert {name: getattr(m, name.upper()) for name in named} == {name: kind[name] for name in named}
     assert sorted([*m.REPORTS.values(), *m.LISTS.values()]) == list(range(m.INTEGERS))
     assert len(m.SIZES) + len(m.STRETCHES) + len(TABLES) + len(m.ADDRESSES) == m.HEADER
 

@@ -26,6 +26,12 @@ def drawn(root: Path) -> Arrows:
     return set(re.findall(r"^ +(\w+) --> (\w+)$", chart[1], re.MULTILINE))
 
 
+def drawn_as(module: str) -> str:
+    """The folder or module of the tower; for a module of an effect, but its declaration, the one it is called like."""
+    parts = module.split(".")[3:]
+    return parts[2] if parts[0] == "effects" and len(parts) > 2 and parts[2] != "effect" else parts[0]
+
+
 def imports() -> Arrows:
     """The same, between folders and single modules of the tower, as it is."""
     graph = grimp.build_graph("flexclear", cache_dir=None)
@@ -33,7 +39,7 @@ def imports() -> Arrows:
     for module in graph.modules:
         for other in graph.find_modules_directly_imported_by(module):
             if module.startswith(f"{DYNAMICS}.") and other.startswith(f"{DYNAMICS}."):
-                found.add((module.split(".")[3], other.split(".")[3]))
+                found.add((drawn_as(module), drawn_as(other)))
     return {(a, b) for a, b in found if a != b}
 
 
@@ -78,6 +84,19 @@ def test_every_import_follows_the_arrows_of_the_drawing(root: Path) -> None:
     arrows = drawn(root)
     assert {(a, b) for a, b in imports() if b not in below(arrows, a)} == set()
     assert [a for a in {a for a, _ in arrows} if a in below(arrows, a)] == []
+
+
+def test_declarations_of_effects_import_no_code(root: Path) -> None:
+    graph = grimp.build_graph("flexclear", cache_dir=None)
+    declarations = {m for m in graph.modules if re.fullmatch(rf"{DYNAMICS}\.effects\.\w+\.effect", m)}
+    reached = {other for module in declarations for other in graph.find_modules_directly_imported_by(module)}
+    # the other one for type checkers alone
+    assert {m for m in reached if m.startswith(DYNAMICS)} <= {
+        f"{DYNAMICS}.effects.{n}" for n in ("effect", "composition")
+    }
+    assert len(declarations) == len(
+        [p for p in (root / "pipeline/dynamics/effects").iterdir() if (p / "effect.py").exists()]
+    )
 
 
 def test_the_table_stands_in_the_order_of_the_arrows(root: Path) -> None:

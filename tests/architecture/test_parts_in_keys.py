@@ -118,13 +118,13 @@ BESIDE: dict[str, tuple[dict[str, Any], Parts, str]] = {
                 "end": {"joint": "J", "upper": 1.0, "normal": {"law": "flores", "restitution": 0.5, "stiffness": 1.0}}
             }
         },
-        Parts(("cylindrical",), forms=("hysteretic",), stops=True),
-        "flexclear.pipeline.dynamics.contact.stops",
+        Parts(("cylindrical",), forms=("hysteretic",), effects=("stops",)),
+        "flexclear.pipeline.dynamics.effects.stops.contact",
     ),
     "gear": (
         {"gear": {"screw": {"first": "J.rotation", "second": "J.translation", "ratio": 0.1}}},
-        Parts(("cylindrical",), closures=True, couplings=True),
-        "flexclear.pipeline.dynamics.equations.couplings",
+        Parts(("cylindrical",), closures=True, effects=("gears",)),
+        "flexclear.pipeline.dynamics.effects.gears.equations",
     ),
 }
 

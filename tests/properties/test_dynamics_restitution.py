@@ -35,7 +35,7 @@ def impact(law: Law, speed: float) -> Impact:
 
     It ends where the surfaces part, or where the force does, which then stays away.
     """
-    exponent = law.resolved.exponent
+    exponent = law.resolved.numbers.exponent
     size = exact.largest_depth(law.mass, speed, law.stiffness, 0.0, exponent)
 
     def rhs(_: float, y: np.ndarray) -> list[float]:
@@ -57,8 +57,8 @@ def impact(law: Law, speed: float) -> Impact:
 
 def ratio(law: Law) -> float:
     """Damping ratio of a linear law."""
-    stiffness, _, damping, _ = law.resolved.numbers
-    return damping / (2.0 * math.sqrt(stiffness * law.mass))
+    numbers = law.resolved.numbers
+    return numbers.damping / (2.0 * math.sqrt(numbers.stiffness * law.mass))
 
 
 def known_depth(law: Law, speed: float) -> float:
@@ -66,7 +66,9 @@ def known_depth(law: Law, speed: float) -> float:
         # v = 0 at w t = pi/2 - phi: depth = (v/w0) exp(-tan(phi) (pi/2 - phi)), phi = asin(zeta)
         phi = math.asin(ratio(law))
         return speed * math.sqrt(law.mass / law.stiffness) * math.exp(-math.tan(phi) * (math.pi / 2.0 - phi))
-    return exact.largest_depth(law.mass, speed, law.stiffness, law.resolved.numbers[2], law.resolved.exponent)
+    return exact.largest_depth(
+        law.mass, speed, law.stiffness, law.resolved.numbers.damping, law.resolved.numbers.exponent
+    )
 
 
 def known_restitution(law: Law) -> float:
@@ -74,13 +76,13 @@ def known_restitution(law: Law) -> float:
         # F = 0 at w t = pi - 2 phi; the speed is then -exp(-tan(phi) (pi - 2 phi))
         phi = math.asin(ratio(law))
         return math.exp(-math.tan(phi) * (math.pi - 2.0 * phi))
-    return exact.delivered_restitution(law.resolved.numbers[2])
+    return exact.delivered_restitution(law.resolved.numbers.damping)
 
 
 @pytest.mark.parametrize("law", laws(), ids=called)
 def test_factor_is_the_published_one(law: Law) -> None:
     if law.name != "kelvin-voigt":
-        assert law.resolved.numbers[2] == pytest.approx(law.a, rel=1e-14)
+        assert law.resolved.numbers.damping == pytest.approx(law.a, rel=1e-14)
 
 
 @pytest.mark.parametrize("name", NORMAL)
@@ -109,11 +111,11 @@ def test_free_impact_rebounds_and_penetrates_as_the_closed_form_says(
 def test_delivered_restitution_is_delivered(name: str, asked: float) -> None:
     law = Law(name, asked, 1e9, 1.5, asked="delivered_restitution")
     # the closed form has no other errors than rounding
-    assert exact.delivered_restitution(law.resolved.numbers[2]) == pytest.approx(asked, rel=1e-9)
+    assert exact.delivered_restitution(law.resolved.numbers.damping) == pytest.approx(asked, rel=1e-9)
     parameter = law.resolved.parameter
     assert parameter is not None
     # the parameter that is told gives the same factor when it is asked for
-    assert NORMAL[name][0](parameter) == pytest.approx(law.resolved.numbers[2], rel=1e-9, abs=1e-12)
+    assert NORMAL[name][0](parameter) == pytest.approx(law.resolved.numbers.damping, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("asked", [0.01, 0.1, 0.5, 0.99])

@@ -121,15 +121,15 @@ def test_bearings_and_loads_have_the_guards_that_their_laws_name() -> None:
     speeds, of_loads = numbers["level"] > 0.0, rows["table"] == m.LOAD_BENDS.place
     # the load that brakes, at its two speeds; of the ideal joints one has bristles, all others two speeds
     assert sorted(numbers["level"][of_loads]) == [COULOMB["v_static"], COULOMB["v_dynamic"]]
-    bearings = arrays.size(m.N_BEARINGS)
-    bristly = arrays.table(m.BEARINGS)["bristle"] >= 0
+    bearings = arrays.size(m.SIZES["n_bearings"])
+    bristly = arrays.table(m.NAMED["bearings"])["bristle"] >= 0
     sliding = ~of_loads & (rows["components"] == 3)
     assert np.count_nonzero(sliding & speeds) == 2 * np.count_nonzero(~bristly)
-    assert rows["offset"][sliding & ~speeds].tolist() == [m.BENDS.size * e for e in np.flatnonzero(bristly)]
+    assert rows["offset"][sliding & ~speeds].tolist() == [m.NAMED["bends"].size * e for e in np.flatnonzero(bristly)]
     # the force along, the moment about, and the forces at both ends of each bearing, by its own load
     presses = rows["bearing"] >= 0
     assert np.bincount(rows["bearing"][presses]).tolist() == [4] * bearings
-    offsets = [m.BENDS.size * e + k for e in range(bearings) for k in (3, 4, 5, 7)]
+    offsets = [m.NAMED["bends"].size * e + k for e in range(bearings) for k in (3, 4, 5, 7)]
     assert rows["offset"][presses].tolist() == offsets
     assert np.array_equal(presses | speeds | sliding, np.full(len(rows), True))
 

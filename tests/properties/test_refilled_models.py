@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
-from flexclear.pipeline.core.scene.load import edited, load_scene, with_numbers
+from flexclear.pipeline.core.scene.fields import Part
+from flexclear.pipeline.core.scene.load import FAMILIES, edited, load_scene, with_numbers
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.dynamics.model import refill
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
-from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.model.refill import refilled
+from flexclear.pipeline.dynamics.model.model import Model, tabulate
+from flexclear.pipeline.dynamics.model.refill import CHANGEABLE, refilled
 
 STROKE = {"type": "step", "start": [0.0], "end": [0.1], "change": ["20 mm"]}
 #: scene, its changes, and whether refilling must do
@@ -72,3 +74,130 @@ def test_a_quick_edit_refuses_what_a_whole_one_does(root: Path, change: dict[str
 def test_a_recipe_in_an_edit_is_looked_for_where_the_scene_is(root: Path, edit: Callable[..., Scene]):
     scene = edit(load_scene(root / "scenes/sps4/far_cb.toml"), {"body.rod1.mesh": "meshes/rods/steel.toml"})
     assert Path(scene.recipes()["rod1"]).resolve() == (root / "meshes/rods/steel.toml").resolve()
+
+
+# The whole schema ----------------------------------------------------------------------------------------------------
+
+
+def part_models(annotation: Any) -> set[type[Part]]:
+    """Models of parts that an annotation allows."""
+    if isinstance(annotation, type) and issubclass(annotation, Part):
+        return {annotation}
+    return set().union(*(part_models(one) for one in get_args(annotation)))
+
+
+#: (table, model of its parts, key) of everything that a scene may say
+KEYS = [
+    (table, model, key)
+    for table, field in Scene.model_fields.items()
+    for model in part_models(field.annotation)
+    for key in model.model_fields
+    if key != "source"
+]
+
+
+def test_the_schema_is_known_by_its_keys() -> None:
+    tables = {table for table, _, _ in KEYS}
+    assert set(Scene.model_fields) - tables == {"source", "title", "description"}
+    assert {f"{table}.{key}" for table, _, key in KEYS} >= {name for name in CHANGEABLE if "." in name}
+    assert {name for name in CHANGEABLE if "." not in name} <= set(Scene.model_fields)
+
+
+@pytest.mark.parametrize("table", Scene.model_fields)
+def test_what_is_not_listed_must_be_the_same(table: str) -> None:
+    """Of every key of every model of parts, and of every table as a whole."""
+    assert refill._alike("other", "one", table) == (table in CHANGEABLE)
+    for owner, model, key in KEYS:
+        if owner == table:
+            was = model.model_construct(**dict.fromkeys(model.model_fields, 0.0))
+            new = was.model_copy(update={key: 1.0})
+            listed = table in CHANGEABLE or f"{table}.{key}" in CHANGEABLE
+            assert refill._alike({"part": new}, {"part": was}, table) == listed, (table, model, key)
+            assert not refill._alike({"other": was}, {"part": was}, table) or table in CHANGEABLE
+
+
+#: rigid scenes that have between them every kind of part
+SCENES = [
+    *(
+        "sps4/csj",
+        "checks/stops",
+        "checks/gears",
+        "checks/bushing",
+        "checks/controllers",
+        "checks/rubbing_slider_crank",
+    ),
+    *("checks/clearance_slider_crank", "checks/ball_on_plane", "checks/driven_pendulum", "checks/oscillator"),
+]
+
+
+def changes(value: Any, path: str) -> Iterator[dict[str, Any]]:
+    """The first number in a value of a scene, changed by a hundredth; another truth value."""
+    if isinstance(value, bool):
+        yield {path: not value}
+    elif isinstance(value, (int, float)):
+        yield {path: value * 1.01 if value and isinstance(value, float) else value + 1}
+    elif isinstance(value, (dict, list)):
+        inner = value.items() if isinstance(value, dict) else enumerate(value)
+        found = (change for key, one in inner if key != "source" for change in changes(one, f"{path}.{key}"))
+        yield from (change for _, change in zip(range(2), found, strict=False))
+
+
+def edits(scene: Scene) -> Iterator[dict[str, Any]]:
+    """A change of each key of each kind of part, and of each setting, that a scene gives."""
+    known = set[tuple[str, ...]]()
+    for table, value in scene.model_dump(mode="json", exclude_none=True).items():
+        parts = value.items() if table in FAMILIES else [("", value)]
+        for name, part in parts if isinstance(value, dict) else []:
+            for key, one in part.items():
+                kind = (table, type(getattr(scene, table).get(name)).__name__ if name else "", key)
+                if kind not in known:
+                    known.add(kind)
+                    yield from changes(one, ".".join(filter(None, (table, name, key))))
+
+
+def said(model: Model) -> tuple[Any, ...]:
+    """What a model says next to its arrays."""
+    ratios = [getattr(closure, "ratio", None) for closure in model.closures]
+    starts = [(*link.start.p, *link.start.R.ravel()) for link in model.links]
+    contacts = [(contact.name, contact.joint) for contact in model.contacts]
+    return model.parts, model.scene, model.length, model.laws, contacts, ratios, starts
+
+
+def differing(root: Path, name: str, override: dict[str, Any] | None = None) -> tuple[list[dict[str, Any]], int]:
+    """Changes of a scene for which a refilled model is not the one from scratch, and how often it is."""
+    scene = load_scene(root / "scenes" / f"{name}.toml", override)
+    model, wrong, equal = tabulate(build(scene, {})), [], 0
+    for change in edits(scene):
+        try:
+            other = edited(scene, change)
+            found, whole = refilled(model, other), tabulate(build(other, {}))
+        except InputError:
+            continue
+        if found is not None:
+            same = [np.array_equal(getattr(found.arrays, a), getattr(whole.arrays, a)) for a in "hf"]
+            kept = said(found) == said(whole)
+            equal += all(same) and kept
+            wrong += [] if all(same) and kept else [change]
+    return wrong, equal
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_change_gives_no_model_or_the_one_from_scratch(root: Path, name: str) -> None:
+    wrong, equal = differing(root, name)
+    assert wrong == []
+    assert equal >= (0 if name == "checks/ball_on_plane" else 5)  # a ball above a plane is as far as all is large
+
+
+@pytest.mark.parametrize(
+    "table, name", [("stop", "checks/stops"), ("gear", "checks/gears"), ("start", "checks/pendulum")]
+)
+def test_a_table_that_is_left_out_would_be_noticed(
+    root: Path, monkeypatch: pytest.MonkeyPatch, table: str, name: str
+) -> None:
+    monkeypatch.setattr(refill, "CHANGEABLE", CHANGEABLE | {table})
+    joint = next(iter(load_scene(root / "scenes" / f"{name}.toml").joint))
+    override = {"start.joint": {joint: {"position": 0.05}}} if table == "start" else {}
+    wrong, _ = differing(root, name, override)
+    assert {place.partition(".")[0] for change in wrong for place in change} == {table}
+    with pytest.raises(AssertionError):
+        test_what_is_not_listed_must_be_the_same(table)

@@ -6,7 +6,7 @@ families of vectors that are linear in the state, with the invariants of the bun
 .. math:: P_{kl} = \int\rho\, r_k S_l = E_{kl} + F_{kl} q, \qquad V_{kl} = \int\rho\, \dot r_k S_l = F_{kl}\dot q
 
 after Shabana, *Dynamics of Multibody Systems*, ch. 5, and Wang & Wang (2019), eqs. (9)-(15).
-Where bending shortens the body, r also moves along x by a quadratic form of q (see `shortening`).
+Where bending shortens the body, r also moves along x by a quadratic form of q (see `effects.stiffening.bodies`).
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ class FlexibleBodies:
 
 
 def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
-    """The kernels of bodies with linear shapes, or with those that bending shortens (the module `shortening`)."""
+    """The kernels of bodies with linear shapes, or with those that bending shortens (`effects.stiffening.bodies`)."""
     first_moment = straight if shortening is None else shortening.first_moment
     second_moment = straight if shortening is None else shortening.second_moment
     site, inboard = make_ports(straight if shortening is None else shortening.at_port)

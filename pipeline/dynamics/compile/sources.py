@@ -3,12 +3,16 @@
 A file composes exactly the kernels of the kinds present: what a scene does not call for is neither
 imported nor compiled. Of no more than it needs, so that mechanisms share files: steps depend on
 the integrator and on whether there are closures and contacts, not on joints or bodies.
+
+What effects add to a file they declare (`effects.effect`), at four points: "forces", "closures", "evaluate" (the
+right-hand side) and "observe" (what is recorded).
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import TYPE_CHECKING
 
@@ -29,6 +33,7 @@ from flexclear.pipeline.dynamics.effects import (
     named,
     schemes,
 )
+from flexclear.pipeline.dynamics.effects.effect import PACKAGE, Effect
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
@@ -37,7 +42,51 @@ if TYPE_CHECKING:
 DYNAMICS = "flexclear.pipeline.dynamics"
 #: what others are called by
 CALLS = (f"{DYNAMICS}.compile", "calls")
-Imports = list[tuple[str, str]]  #: (module, name) each
+
+
+@dataclass
+class Composition:
+    """A file in the making for a mechanism's parts.
+
+    given: arguments of what makes its function, by name.  imports: (module, name) each.
+    """
+
+    parts: Parts
+    given: dict[str, str] = field(default_factory=dict)
+    imports: list[tuple[str, str]] = field(default_factory=list)
+
+    def take(self, module: str, name: str) -> str:
+        """Import a name, which is returned."""
+        others = {known for package, known in self.imports if package != module}
+        assert name not in others, f"two parts of one mechanism are called {name}"
+        self.imports.append((module, name))
+        return name
+
+    def family(self, package: str, names: Iterable[str], table: str = "NAMES") -> str:
+        """A tuple of the modules of a family's parts."""
+        modules = [self.take(package, listed(package, name, where="parts", table=table)[0]) for name in names]
+        return "(" + "".join(f"{module}, " for module in modules) + ")"
+
+    @property
+    def tree(self) -> str:
+        """The module that factors the mass matrix."""
+        return self.take(f"{DYNAMICS}.equations", "articulated" if self.parts.articulated else "composite")
+
+    @property
+    def forms(self) -> str:
+        """The forms of normal forces."""
+        return self.family(FORMS, self.parts.forms)
+
+    def add_effects(self, point: str) -> None:
+        """Add what the effects present declare for a point."""
+        for effect in self.parts.present:
+            self.given |= {name: self._of(effect, text) for name, text in effect.compose.get(point, {}).items()}
+
+    def _of(self, effect: Effect, text: str) -> str:
+        """An argument that an effect declares, its own names imported."""
+        kinds, own = self.parts.kinds(effect.name), f"{PACKAGE}.{effect.name}"
+        text = re.sub(r"<(?:(\w+)\.)?(\w+)>", lambda m: self.take(f"{own}.{m[1]}" if m[1] else own, m[2]), text)
+        return text.format(file=self, kinds=self.family(f"{DYNAMICS}.{effect.family}", kinds) if kinds else "")
 
 
 def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
@@ -51,12 +100,14 @@ def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
 
 
 def modules(scene: Scene) -> tuple[str, ...]:
-    """Modules that a run of the scene reaches by names: those of its parts, and those that its generated files import.
+    """Modules that a run of the scene reaches by names: those of its parts and effects, and those that its generated
+    files import.
 
     Raises InputError when a name is not listed in its family.
     """
     scene = with_switched(scene) if scene.event else scene
     names, parts = {part.module for part in named(scene)}, most_parts(scene)
+    names = names.union(*(effect.modules for effect in parts.present))
     either = (parts, replace(parts, articulated=True))  # which, only the tree decides
     return tuple(sorted(names.union(*(_composed(one, scheme) for one in either for scheme in schemes(scene)))))
 
@@ -87,174 +138,154 @@ def specialised(parts: Parts, wiring: Wiring, lanes: int = 0, *, changes: bool =
     lanes: 0 for runs; of members of ensembles how many are evaluated at once, with equal bits whatever their number.
     changes: with its tangent, of one state.
     """
-    given, imports = _equations(parts)
-    maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_rates")
-    _import(imports, f"{DYNAMICS}.equations.prescribed_motion", "make_laws")
+    file = _rates(parts)
+    maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_rates")
+    file.take(f"{DYNAMICS}.equations.prescribed_motion", "make_laws")
     function = LANES if lanes > 1 else SPECIALISED
     for name in (["exactly"] if lanes else []) + ["abreast" if lanes > 1 else "along" if changes else "straight"]:
-        _import(imports, f"{DYNAMICS}.specialise.straight", name)
+        file.take(f"{DYNAMICS}.specialise.straight", name)
     if lanes > 1:
-        _import(imports, f"{DYNAMICS}.compile.lanes", "make_lanes")
-    harmonics = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate") if parts.harmonics else ""
+        file.take(f"{DYNAMICS}.compile.lanes", "make_lanes")
+    harmonics = _harmonics(file)
     laws = f"exactly(make_laws({harmonics}))" if lanes else f"make_laws({harmonics})"
     what = f"right-hand side of {', '.join(parts.joints)}, for one wiring"
     law_changes = ""
     if changes:
         function = CHANGES
-        _import(imports, f"{DYNAMICS}.equations.prescribed_motion", "make_law_changes")
-        _import(imports, f"{DYNAMICS}.fields", "data")
-        change = _import(imports, f"{DYNAMICS}.drives.oscillation", "change_oscillation") if parts.harmonics else ""
+        file.take(f"{DYNAMICS}.equations.prescribed_motion", "make_law_changes")
+        file.take(f"{DYNAMICS}.fields", "data")
+        change = file.take(f"{DYNAMICS}.drives.oscillation", "change_oscillation") if parts.harmonics else ""
         law_changes = f"make_law_changes({change})"
     wired = "".join(f"    {row},\n" for row in wiring)
     values = {"laws": laws, "wiring": wired, "lanes": lanes, "exact": bool(lanes), "law_changes": law_changes}
-    return _file(what, imports, "rates", maker, given, function.format(**values), _formulas(parts))
+    return _text(file, what, "rates", maker, function.format(**values), _formulas(parts))
 
 
 def rates(parts: Parts) -> str:
     """Source of the kernel `rates` alone, which Python runs (`specialise.dual`), without friction of ideal joints."""
-    given, imports = _equations(parts)
-    maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_rates")
-    return _file("right-hand side for Python", imports, "rates", maker, given, "", _formulas(parts))
-
-
-def _equations(parts: Parts) -> tuple[dict[str, str], Imports]:
-    """What makes accelerations, but for friction of ideal joints."""
-    given, imports = _forces(parts)
-    given["tree"] = _tree(imports, parts)
-    if parts.closures:
-        given["closures"] = _closures(imports, parts)
-    return given, imports
+    file = _rates(parts)
+    maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_rates")
+    return _text(file, "right-hand side for Python", "rates", maker, "", _formulas(parts))
 
 
 def _evaluate(parts: Parts) -> str:
-    given, imports = _equations(parts)
+    file = _rates(parts)
     if parts.harmonics:
-        given["harmonics"] = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate")
-    if parts.joint_frictions:
-        given["friction"] = _joint_friction(imports, parts)
-    maker = _import(imports, f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
-    return _file(
-        f"right-hand side of {', '.join(parts.joints)}",
-        imports,
-        "right_hand_side",
-        maker,
-        given,
-        EVALUATE,
-        _formulas(parts),
-    )
+        file.given["harmonics"] = _harmonics(file)
+    file.add_effects("evaluate")
+    maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
+    what = f"right-hand side of {', '.join(parts.joints)}"
+    return _text(file, what, "right_hand_side", maker, EVALUATE, _formulas(parts))
 
 
 def _project(parts: Parts) -> str:
-    given, imports = _joints(parts)
-    given = {"evaluate": "calls.evaluate", **given}
-    given["closures"] = _closures(imports, parts)
+    file = _joints(parts)
+    file.given["evaluate"] = "calls.evaluate"
+    _close(file)
     if parts.flexible:
-        stiffen = _import(imports, f"{DYNAMICS}.equations.projection", "make_stiffen")
-        given["stiffen"] = f"{stiffen}({given['closures']})"
-        given["to_modes"] = _import(imports, f"{DYNAMICS}.bodies.interface", "to_modes")
-    maker = _import(imports, f"{DYNAMICS}.equations.projection", "make_projection")
-    return _file(f"projection with {', '.join(parts.joints)}", imports, "projection", maker, given, PROJECT)
+        stiffen = file.take(f"{DYNAMICS}.equations.projection", "make_stiffen")
+        file.given["stiffen"] = f"{stiffen}({file.given['closures']})"
+        file.given["to_modes"] = file.take(f"{DYNAMICS}.bodies.interface", "to_modes")
+    maker = file.take(f"{DYNAMICS}.equations.projection", "make_projection")
+    return _text(file, f"projection with {', '.join(parts.joints)}", "projection", maker, PROJECT)
 
 
 def _retract(parts: Parts) -> str:
-    given, imports = _joints(parts)
-    maker = _import(imports, f"{DYNAMICS}.equations.retraction", "make_retraction")
-    return _file(f"retraction of {', '.join(parts.joints)}", imports, "retraction", maker, given, RETRACT)
+    file = _joints(parts)
+    maker = file.take(f"{DYNAMICS}.equations.retraction", "make_retraction")
+    return _text(file, f"retraction of {', '.join(parts.joints)}", "retraction", maker, RETRACT)
 
 
 def _observe(parts: Parts) -> str:
-    given, imports = _forces(parts)
-    given = {"evaluate": "calls.evaluate", "project": _projection(imports, parts), **given}
+    file = _forces(parts)
+    file.given |= {"evaluate": "calls.evaluate", "project": _projection(file)}
     if parts.harmonics:
-        given["harmonics"] = _import(imports, f"{DYNAMICS}.drives.oscillation", "oscillate")
-    if parts.couplings:
-        given["couplings"] = _import(imports, f"{DYNAMICS}.equations", "couplings")
-    if parts.joint_frictions and parts.closures:
-        given["friction"] = _import(imports, f"{DYNAMICS}.equations.joint_friction", "take_off_closures")
-    maker = _import(imports, f"{DYNAMICS}.equations.observation", "make_observation")
-    return _file(
-        f"what is recorded of {', '.join(parts.joints)}",
-        imports,
-        "observation",
-        maker,
-        given,
-        OBSERVE,
-        _formulas(parts),
-    )
+        file.given["harmonics"] = _harmonics(file)
+    file.add_effects("observe")
+    maker = file.take(f"{DYNAMICS}.equations.observation", "make_observation")
+    what = f"what is recorded of {', '.join(parts.joints)}"
+    return _text(file, what, "observation", maker, OBSERVE, _formulas(parts))
 
 
 def _advance(parts: Parts, scheme: Scheme) -> str:
     module, method = listed(INTEGRATORS, scheme.integrator, where="[solver.integrator]")
-    imports: Imports = []
-    given = {
+    file = Composition(parts)
+    file.given = {
         "evaluate": "calls.rates",
-        "project": _projection(imports, parts),
+        "project": _projection(file),
         "retract": "calls.retract",
-        "method": _import(imports, f"{INTEGRATORS}.{module}", method),
-        "stepping": _import(imports, INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
+        "method": file.take(f"{INTEGRATORS}.{module}", method),
+        "stepping": file.take(INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
     if integrators.INTEGRATORS[scheme.integrator].reads_all:
-        given["complete"] = "calls.evaluate"
-    events = _events(imports, parts, scheme)
+        file.given["complete"] = "calls.evaluate"
+    events = _events(file, scheme)
     if events:
-        given["events"] = events
+        file.given["events"] = events
     if parts.closures:
-        given["poses"] = _import(imports, f"{INTEGRATORS}.singular_step", "OVER_POSES")
-    _import(imports, DYNAMICS, "memory as m")
-    maker = _import(imports, f"{INTEGRATORS}.stepper", "make_advance")
-    return _file(f"steps of {scheme}", imports, "steps", maker, given, ADVANCE)
+        file.given["poses"] = file.take(f"{INTEGRATORS}.singular_step", "OVER_POSES")
+    file.take(DYNAMICS, "memory as m")
+    maker = file.take(f"{INTEGRATORS}.stepper", "make_advance")
+    return _text(file, f"steps of {scheme}", "steps", maker, ADVANCE)
 
 
-def _events(imports: Imports, parts: Parts, scheme: Scheme) -> str:
+def _events(file: Composition, scheme: Scheme) -> str:
     """What the stepper searches for in each step; nothing for the default, which is nothing."""
-    touching, chosen = parts.surfaces or parts.stops, not scheme.fixed
+    parts, chosen = file.parts, not scheme.fixed
+    touching = parts.surfaces or any(effect.touches for effect in parts.present)
     if touching and not scheme.located:
-        return _import(imports, f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
-    guarded = chosen and (parts.frictions or parts.joint_frictions or parts.load_kinks)
+        return file.take(f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
+    guarded = chosen and (parts.frictions or parts.load_kinks or parts.functions("guards"))
     if touching:
-        located = _import(imports, f"{INTEGRATORS}.contact_events", "located")
-        given = [_import(imports, f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")]
+        located = file.take(f"{INTEGRATORS}.contact_events", "located")
+        given = [file.take(f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")]
         if guarded:
-            given.append(_import(imports, f"{INTEGRATORS}.guards", "AMONG_CONTACTS"))
+            given.append(file.take(f"{INTEGRATORS}.guards", "AMONG_CONTACTS"))
         return f"{located}({', '.join(given)})"
-    return _import(imports, f"{INTEGRATORS}.guards", "GUARDS") if guarded else ""
+    return file.take(f"{INTEGRATORS}.guards", "GUARDS") if guarded else ""
 
 
-def _joints(parts: Parts) -> tuple[dict[str, str], Imports]:
-    imports: Imports = []
-    return {"joints": _family(imports, JOINTS, parts.joints)}, imports
+def _joints(parts: Parts) -> Composition:
+    file = Composition(parts)
+    file.given["joints"] = file.family(JOINTS, parts.joints)
+    return file
 
 
-def _forces(parts: Parts) -> tuple[dict[str, str], Imports]:
+def _rates(parts: Parts) -> Composition:
+    """What the rates of the state consist of."""
+    file = _forces(parts)
+    file.given["tree"] = file.tree
+    if parts.closures:
+        _close(file)
+    return file
+
+
+def _forces(parts: Parts) -> Composition:
     """What acts in the mechanism: joints, flexible bodies, contacts, loads."""
-    given, imports = _joints(parts)
+    file = _joints(parts)
     if parts.flexible:
-        bodies = _import(imports, f"{DYNAMICS}.bodies.flexible", "flexible_bodies")
-        shortening = _import(imports, f"{DYNAMICS}.bodies", "shortening") if parts.stiffening else ""
-        given["flexible"] = f"{bodies}({shortening})"
+        file.given["flexible"] = f"{file.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
     if parts.surfaces:
-        surfaces = _family(imports, JOINTS, parts.surfaces, "CONTACTS")
-        forms, frictions = _family(imports, FORMS, parts.forms), _family(imports, FRICTION_LAWS, parts.frictions)
-        maker = _import(imports, f"{DYNAMICS}.contact.forces", "make_contacts")
-        given["contacts"] = f"{maker}(surfaces={surfaces}, forms={forms}, frictions={frictions})"
-        if parts.wear:
-            given["contacts"] = f"{_import(imports, f'{DYNAMICS}.contact.wear', 'wearing')}({given['contacts']})"
-    if parts.stops:
-        forms = _family(imports, FORMS, parts.forms)
-        given["stops"] = f"{_import(imports, f'{DYNAMICS}.contact.stops', 'make_stops')}({forms})"
+        surfaces = file.family(JOINTS, parts.surfaces, "CONTACTS")
+        maker, frictions = (
+            file.take(f"{DYNAMICS}.contact.forces", "make_contacts"),
+            file.family(FRICTION_LAWS, parts.frictions),
+        )
+        file.given["contacts"] = f"{maker}(surfaces={surfaces}, forms={file.forms}, frictions={frictions})"
     if parts.loads:
-        kinds = "".join(f"{_load(imports, n, *kind.split(maxsplit=1))}, " for n, kind in enumerate(parts.loads))
-        given["loads"] = f"{_import(imports, f'{DYNAMICS}.loads.composing', 'make_loads')}(({kinds}))"
-    return given, imports
+        kinds = "".join(f"{_load(file, n, *kind.split(maxsplit=1))}, " for n, kind in enumerate(parts.loads))
+        file.given["loads"] = f"{file.take(f'{DYNAMICS}.loads.composing', 'make_loads')}(({kinds}))"
+    file.add_effects("forces")
+    return file
 
 
-def _load(imports: Imports, number: int, name: str, formula: str = "") -> str:
+def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
     """The module of a kind of loads, or what it makes of the kernel of an expression (`_formulas`)."""
-    module = _import(imports, LOADS, listed(LOADS, name, where="parts")[0])
+    module = file.take(LOADS, listed(LOADS, name, where="parts")[0])
     if not formula:
         return module
-    _import(imports, f"{DYNAMICS}.kernels", "kernel")
-    _import(imports, LOADS, "looks")
+    file.take(f"{DYNAMICS}.kernels", "kernel")
+    file.take(LOADS, "looks")
     return f"{module}.applying(formula{number})"
 
 
@@ -264,52 +295,24 @@ def _formulas(parts: Parts) -> str:
     return "\n\n".join(formulas.source(f"formula{n}", kind[1]) for n, kind in written if len(kind) > 1)
 
 
-def _joint_friction(imports: Imports, parts: Parts) -> str:
-    """Friction of ideal joints: on accelerations, and on drives."""
-    module = f"{DYNAMICS}.equations.joint_friction"
-    laws = [listed(FRICTION_LAWS, law, where="parts")[0] for law in parts.joint_frictions]
-    tractions = "".join(f"{_import(imports, FRICTION_LAWS, law)}.traction, " for law in laws)
-    maker, drives = (_import(imports, module, name) for name in ("make_joint_friction", "load_drives"))
-    return f"({maker}(({tractions}), {parts.closures}, {_tree(imports, parts)}), {drives})"
+def _harmonics(file: Composition) -> str:
+    return file.take(f"{DYNAMICS}.drives.oscillation", "oscillate") if file.parts.harmonics else ""
 
 
-def _tree(imports: Imports, parts: Parts) -> str:
-    """The module that factors the mass matrix."""
-    return _import(imports, f"{DYNAMICS}.equations", "articulated" if parts.articulated else "composite")
+def _close(file: Composition) -> None:
+    """Add the kernels of the closures: of joints, unless an effect brings more."""
+    file.add_effects("closures")
+    if "closures" not in file.given:
+        file.given["closures"] = f"{file.take(f'{DYNAMICS}.equations.closures', 'make_closing')}({file.tree})"
 
 
-def _closures(imports: Imports, parts: Parts) -> str:
-    """The kernels of the closures: with couplings, or of joints alone."""
-    if parts.couplings:
-        maker = _import(imports, f"{DYNAMICS}.equations.couplings", "make_coupled_closing")
-    else:
-        maker = _import(imports, f"{DYNAMICS}.equations.closures", "make_closing")
-    return f"{maker}({_tree(imports, parts)})"
+def _projection(file: Composition) -> str:
+    return "calls.project" if file.parts.closures else file.take(f"{DYNAMICS}.equations.projection", "no_projection")
 
 
-def _projection(imports: Imports, parts: Parts) -> str:
-    return "calls.project" if parts.closures else _import(imports, f"{DYNAMICS}.equations.projection", "no_projection")
-
-
-def _family(imports: Imports, package: str, names: tuple[str, ...], table: str = "NAMES") -> str:
-    """A tuple of the modules of a family's parts."""
-    modules = [_import(imports, package, listed(package, name, where="parts", table=table)[0]) for name in names]
-    return "(" + "".join(f"{module}, " for module in modules) + ")"
-
-
-def _import(imports: Imports, module: str, name: str) -> str:
-    """Note an import; the name."""
-    others = {known for package, known in imports if package != module}
-    assert name not in others, f"two parts of one mechanism are called {name}"
-    imports.append((module, name))
-    return name
-
-
-def _file(
-    what: str, imports: Imports, result: str, maker: str, given: dict[str, str], function: str, kernels: str = ""
-) -> str:
-    lines = sorted({f"from {module} import {name}" for module, name in [*([CALLS] if function else []), *imports]})
-    arguments = [f"    {key}={value}," for key, value in given.items()]
+def _text(file: Composition, what: str, result: str, maker: str, function: str, kernels: str = "") -> str:
+    lines = sorted({f"from {module} import {name}" for module, name in [*([CALLS] if function else []), *file.imports]})
+    arguments = [f"    {key}={value}," for key, value in file.given.items()]
     return "\n".join(
         [f'"""Generated: {what}."""', *lines, "", kernels, f"{result} = {maker}(", *arguments, ")", "", "", function]
     )

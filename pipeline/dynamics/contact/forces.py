@@ -101,9 +101,9 @@ def make_normal_force(forms: tuple[Any, ...]) -> Callable:
     def normal_force(d, c):
         contact, numbers, touch = d.contacts[c], d.contact_numbers[c], d.touch[c]
         depth, rate = max(0.0, -touch.gap), touch.rate
-        elastic, damping = normal(contact.normal, depth, rate, max(d.latched[c], numbers.floor), numbers.normal_law)
+        elastic, damping = normal(contact.normal, depth, rate, max(d.latched[c], numbers.floor), numbers)
         f_n, slots = max(0.0, elastic + damping), contact_slots(c)
-        touch.normal_force, touch.stored = f_n, stored(contact.normal, depth, numbers.normal_law)
+        touch.normal_force, touch.stored = f_n, stored(contact.normal, depth, numbers)
         touch.damping_power = damping * rate
         d.ledger_rate[slots + m.CONTACT_LEDGER.damping] = damping * rate
         d.ledger_rate[slots + m.CONTACT_LEDGER.impulse] = f_n

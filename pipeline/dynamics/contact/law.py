@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import isfinite
+from typing import NamedTuple
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.dynamics.contact import restitution as closed_form
@@ -13,17 +14,27 @@ from flexclear.pipeline.dynamics.contact import restitution as closed_form
 CLOSE = 0.05
 
 
+class Numbers(NamedTuple):
+    """Of a normal law, as its form has them: CONTACT_NUMBERS has the same.
+
+    stiffness: K [N/m^n].  damping: C [N s/m], or a factor of hysteresis; 0 of a law without loss.
+    """
+
+    stiffness: float
+    exponent: float
+    damping: float
+
+
 @dataclass(frozen=True)
 class Resolved:
-    """What a normal law comes to: form and four numbers for the kernels, and what a free impact gets.
+    """What a normal law comes to: form and numbers for the kernels, and what a free impact gets.
 
     parameter: the law's own coefficient of restitution, or None.  delivered: the rebound over the
     approach speed of a free impact.  warning: in words, when the law is used outside its range.
     """
 
     form: str
-    numbers: tuple[float, float, float, float]
-    exponent: float
+    numbers: Numbers
     parameter: float | None
     delivered: float
     warning: str | None = None
@@ -56,9 +67,8 @@ class Hysteresis:
             delivered = closed_form.delivered(a)
         else:
             raise ValueError(f"the law '{self.name}' needs a restitution, or a delivered_restitution")
-        return Resolved(
-            "hysteretic", (stiffness, exponent, a, 0.0), exponent, parameter, delivered, self._warning(law, delivered)
-        )
+        numbers = Numbers(stiffness, exponent, a)
+        return Resolved("hysteretic", numbers, parameter, delivered, self._warning(law, delivered))
 
     def _factor(self, parameter: float) -> float:
         a = self.factor(parameter) if parameter > 0.0 or self._finite_at_zero() else float("inf")

@@ -80,8 +80,8 @@ def laws(contacts: Sequence[tuple[str, Any, Any, Any]], resolved: Sequence[Resol
     found = {
         name: {
             "law": joint.normal.law,
-            "exponent": law.exponent,
-            "stiffness": law.numbers[0],
+            "exponent": law.numbers.exponent,
+            "stiffness": law.numbers.stiffness,
             "restitution_parameter": law.parameter,
             "delivered_restitution": law.delivered,
             "friction": None if joint.friction is None else joint.friction.law,

@@ -23,6 +23,9 @@ from flexclear.pipeline.dynamics.vectors import ZERO, add, add_wrench, dot, put,
 #: of an independent mechanism: kinetic energy, potential energy of gravity, that stored in bodies, springs and contacts
 #: [J]
 ENERGY = m.layout("kinetic potential elastic")
+BEARING = m.NAMED["bearing"]
+#: variables of a run's dataset with their dimensions, and coordinates
+Series = tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]
 #: tolerance by which the loops of rows stay as they are, and nothing but frames is written
 AS_RECORDED = -1.0
 #: of so many rows one is closed first, and those between two of them start from what that changed there, where rows
@@ -97,7 +100,7 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
         "link_wrenches": (m.WRENCH, size(m.N_LINKS)),
         "touch": (m.TOUCH, size(m.N_CONTACTS)),
         "loads": (m.LOAD, size(m.N_LOADS)),
-        "bearings": (m.BEARING, size(m.N_BEARINGS)),
+        "bearings": (BEARING, size(m.SIZES["n_bearings"])),
         "drive_force": (None, drives),
         "jacobian": (None, size(m.JACOBIAN_SIZE)),
     }
@@ -234,20 +237,20 @@ def make_observation(
     loads: Callable | None = None,
     stops: Callable | None = None,
     harmonics: Callable | None = None,
-    couplings: Any = None,
+    couplings: Callable | None = None,
     friction: Callable | None = None,
 ) -> Callable:
     """The kernel observe(h, f, w, n, rows, pieces, tolerance, out), which writes on the blocks of `room`.
 
     With a tolerance of AS_RECORDED nothing is evaluated and only frames are written, of links and of sites.
 
-    evaluate, project: as the stepper calls them; couplings: the module of that name; friction: of ideal joints, in
-    closures (`equations.joint_friction`); the other arguments are those of `make_right_hand_side`.
+    evaluate, project: as the stepper calls them; couplings: takes them off their links (`effects.gears`); friction: of
+    ideal joints, in closures (`effects.joint_friction`); the other arguments are those of `make_right_hand_side`.
     """
     kinematics, laws = make_kinematics(joints, flexible), make_laws(harmonics)
     forces = make_forces(flexible, contacts, loads, stops)
     modal_inertia = nothing if flexible is None else flexible.modal_inertia
-    couple = no_couplings if couplings is None else couplings.take_off_first_joints
+    couple = no_couplings if couplings is None else couplings
     rub = no_friction if friction is None else friction
     flexible_energy = no_energy if flexible is None else flexible.energies
 
@@ -324,7 +327,7 @@ def make_observation(
             (d.at_wrench, m.WRENCH.size * d.n_links),
             (d.at_touch, m.TOUCH.size * d.n_contacts),
             (d.at_load, m.LOAD.size * d.n_loads),
-            (d.at_bearing, m.BEARING.size * d.n_bearings),
+            (d.at_bearing, BEARING.size * d.n_bearings),
             (d.at_drive_force, known),
             (d.at_jacobian, d.jacobian_size),
         )

@@ -95,7 +95,7 @@ def make_rates(
     joints: modules of the joint types.  tree: how the mass matrix is factored, the module `equations.articulated` or
     `equations.composite`.  flexible: kernels of the flexible bodies.  contacts, loads, stops: the kernels that apply
     them.  closures: kernels of all closures.  friction: of ideal joints, on accelerations and on drives
-    (`equations.joint_friction`).
+    (`effects.joint_friction`).
     """
     kinematics = make_kinematics(joints, flexible, tree.localise, tree.step)
     forces = make_forces(flexible, contacts, loads, stops, tree.rigid_inertia)

@@ -12,10 +12,10 @@ from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import LOADS
+from flexclear.pipeline.dynamics.effects.stops.model import End
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.driving import coordinate_of, joint_class, named_coordinate
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.stops import End
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
 
@@ -84,7 +84,7 @@ def _slots(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
         elif row["bristle"] >= 0:
             yield ("contact", contact.name), range(int(row["bristle"]), int(row["bristle"]) + 3)
     joints = list(scene.rubbing())
-    for row in arrays.table(m.BEARINGS):
+    for row in arrays.table(m.NAMED["bearings"]):
         if row["bristle"] >= 0:
             where = (str(int(row[k])) for k in ("kind", "side", "axis"))
             yield ("joint", joints[int(row["joint"])], *where), range(int(row["bristle"]), int(row["bristle"]) + 3)

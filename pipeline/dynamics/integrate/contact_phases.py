@@ -133,7 +133,7 @@ def make_follow_contacts(
         Around its peak a force lies below its tangents.
         """
         watch = d.watch[c]
-        damped = d.contact_numbers[c].normal_law[2] > 0.0
+        damped = d.contact_numbers[c].damping > 0.0
         if not (damped and watch.rate0 > 0.0 and watch.trend0 > 0.0 and watch.trend1 <= 0.0):
             return False
         ahead = watch.force0 + watch.trend0 * step

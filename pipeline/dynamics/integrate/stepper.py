@@ -41,7 +41,7 @@ SHORTER = 0.3
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
 FAILED = 1e9
-#: in place of an error norm: the attempt waits for rates that somebody else is to make (`run.evaluation.batched_evaluation`)
+#: in place of an error norm: the attempt waits for rates that others make (`run.evaluation.batched_evaluation`)
 PENDING = -1.0
 #: stage of an attempt that is made and waits for the rates at its end
 ENDING = 1 << 30

@@ -15,7 +15,6 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model import initial, selection
-from flexclear.pipeline.dynamics.model.bushings import rotations
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.interface_basis import modes_of
@@ -186,7 +185,7 @@ def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
     for index, angle in angles(bench.model.arrays.table(m.GAUGES), seen.sites[0]).items():
         before = bench.internal[index]
         bench.internal[index] = angle + 2.0 * np.pi * np.round((before - angle) / (2.0 * np.pi))
-    for index, vector in rotations(bench.model, seen.sites[0], bench.internal).items():
+    for index, vector in initial.of_effects(bench.model, seen.sites[0], bench.internal).items():
         bench.internal[index : index + 3] = vector
     return seen.state[0, : len(q)].copy()
 

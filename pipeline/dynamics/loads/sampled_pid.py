@@ -3,8 +3,8 @@ r"""PID controller that samples: at t_k it looks at the error, and holds its for
 .. math:: u_k = K_p e_k + z_k + K_d (e_k - e_{k-1})/T, \quad F_k = \min(\max(u_k, F_-), F_+), \quad
           z_{k+1} = z_k + T\,[K_i e_k + (F_k - u_k)/T_t]
 
-The force, the integral part and the last error are internal states that change at samples only (`run.sampling`), where
-steps end.
+The force, the integral part and the last error are internal states that change at samples only
+(`effects.controllers.run`), where steps end.
 Source: Astrom & Hagglund (1995), PID Controllers: Theory, Design, and Tuning, 2nd ed., sec. 3.6.
 """
 

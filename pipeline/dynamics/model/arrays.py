@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 
 
 class WorkSpace(NamedTuple):
@@ -109,30 +110,14 @@ def pack(sizes: Mapping[int, int], tables: Mapping[Any, Any], columns: int) -> A
 def _sizes(count: Mapping[Any, int], tables: Mapping[Any, Any]) -> dict[int, int]:
     """The header's sizes that follow from the tables."""
     closures = named(m.CLOSURES, tables[m.CLOSURES])
-    return {
-        m.N_LINKS: count[m.LINKS],
-        m.N_SITES: count[m.SITES],
+    counted = {name: table for name, table in m.NAMED.items() if table in count and f"n_{name}" in m.SIZES}
+    return {m.SIZES[f"n_{name}"]: count[table] for name, table in counted.items()} | {
         m.N_FLEX: count[m.FLEXES],
-        m.N_CLOSURES: count[m.CLOSURES],
-        m.N_CLOSURE_ROWS: count[m.CLOSURE_ROWS],
         m.N_KEPT_ROWS: count[m.CLOSURE_ENVELOPE],
-        m.N_CONTACTS: count[m.CONTACTS],
-        m.N_LAWS: count[m.LAWS],
-        m.N_LOADS: count[m.LOADS],
         m.NV: count[m.ENVELOPE],
         m.NY: count[m.GROUPS],
-        m.N_PAIRS: count[m.PAIRS],
-        m.N_KNOWN_PAIRS: count[m.KNOWN_PAIRS],
-        m.N_KNOWN_ENTRIES: count[m.KNOWN_ENTRIES],
-        m.N_CLOSURE_PAIRS: count[m.CLOSURE_PAIRS],
         m.N_GROUPS: count[m.FLOORS],
-        m.N_RUBBING: count[m.RUBBING],
-        m.N_BEARINGS: count[m.BEARINGS],
-        m.N_WORN: count[m.WORN],
-        m.N_BODIES: count[m.BODIES],
-        m.N_FRAMES: count[m.FRAMES],
         m.N_COMPONENTS: count[m.BOOKS],
-        m.N_GUARDS: count[m.GUARDS],
         m.MASS_SIZE: envelope_size(named(m.ENVELOPE, tables[m.ENVELOPE])),
         m.SCHUR_SIZE: envelope_size(named(m.CLOSURE_ENVELOPE, tables[m.CLOSURE_ENVELOPE])),
         m.JACOBIAN_SIZE: int(np.sum(3 * closures["threes"] * closures["n_support"])),
@@ -151,7 +136,7 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
     known, contacts, ny, nv = (int(h[index]) for index in (m.N_DRIVES, m.N_CONTACTS, m.NY, m.NV))
     closure_rows, links, nq = int(h[m.N_CLOSURE_ROWS]), int(h[m.N_LINKS]), int(h[m.NQ])
     coordinates, positions = nv + known, nq + known
-    requested, bearings = room(h), int(h[m.N_BEARINGS])
+    requested = room(h)
     tables = {
         m.LINK_FRAMES: links,
         m.SITE_FRAMES: int(h[m.N_SITES]),
@@ -166,16 +151,13 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
         m.TRANSMITTED: links,
         m.LOCAL: nv + known,
         m.GAIN: nv,
-        m.ROWS: closure_rows + int(h[m.N_COUPLINGS]),
+        m.ROWS: closure_rows + int(h[m.SIZES["n_couplings"]]),
         m.TOUCH: contacts,
         m.LAW: int(h[m.N_LAWS]),
         m.LOAD: int(h[m.N_LOADS]),
         m.LOAD_BENDS: int(h[m.N_LOAD_BENDS]),
         m.WATCH: contacts,
-        m.BEARING: bearings,
-        m.BENDS: bearings,
         m.GUARDED: int(h[m.N_GUARDS]),
-        m.REACTIONS: int(h[m.N_RUBBING]) * (1 + bearings),
     }
     lengths = {table.place: table.size * count for table, count in tables.items()} | {
         m.X: positions,
@@ -198,9 +180,6 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
         m.ROW_SCALE: 2 * closure_rows,
         m.PIVOT: m.PIVOT_SIZE,
         m.MULTIPLIER: closure_rows,
-        m.BEARING_SLOPES: bearings * bearings,
-        m.BEARING_RESIDUALS: bearings,
-        m.SMOOTH_MULTIPLIER: closure_rows if bearings else 0,
         m.INDEPENDENCE: 3 * closure_rows,
         m.COLLOCATION: m.COLLOCATION_ROWS * ny if closure_rows else 0,
         m.INTERNAL: int(h[m.N_INTERNAL]),
@@ -218,4 +197,12 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
         m.LATCHED: contacts,
         m.CONTROL: m.N_CONTROLS,
     }
-    return dict(sorted(lengths.items()))
+    return dict(sorted((lengths | _lengths_of_effects(h)).items()))
+
+
+def _lengths_of_effects(h: np.ndarray) -> dict[int, int]:
+    lengths = {}
+    for name, length in ((name, length) for effect in EFFECTS for name, length in effect.lengths.items()):
+        index, size = (m.NAMED[name].place, m.NAMED[name].size) if name in m.NAMED else (m.STRETCHES[name], 1)
+        lengths[index] = size * length(lambda name: int(h[m.SIZES[name]]))
+    return lengths

@@ -5,7 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from flexclear.pipeline.core.scene.schema import Scene
+
+#: a number of each independent mechanism
+Floors = Sequence[float] | np.ndarray
+#: an error group: floor, number of variables, independent mechanism
+Group = tuple[float, int, int]
 
 
 @dataclass(frozen=True)

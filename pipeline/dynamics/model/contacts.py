@@ -12,16 +12,15 @@ from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_LAWS, Parts
+from flexclear.pipeline.dynamics.effects.stops.model import End, ends_an_angle
+from flexclear.pipeline.dynamics.model.components import Floors, Group
 from flexclear.pipeline.dynamics.model.gauges import Gauges
 from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
-from flexclear.pipeline.dynamics.model.stops import End, ends_an_angle
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
 
-#: a number of each independent mechanism
-Floors = Sequence[float] | np.ndarray
 #: least impact rates where the scene gives none: far below the approach speeds of common machines [m/s or rad/s], and
 #: the fraction of the size of a mechanism of 10 cm that this is [1/s]; in one of micrometres 1 um/s would be fast
 LEAST_RATE, SLOW = 1e-6, 1e-5
@@ -35,14 +34,14 @@ def resolve(mechanism: Mechanism) -> tuple[Resolved, ...]:
 
 
 def fill(
-    numbering: Numbering, parts: Parts, laws: Sequence[Resolved], touching: Touching, gauges: Gauges
+    numbering: Numbering, parts: Parts, laws: Sequence[Resolved], touching: Touching, gauges: Gauges, slot: int
 ) -> dict[Any, Any]:
     """The tables CONTACTS and CONTACT_NUMBERS, given (outer site, inner site) of every contact.
 
-    gauges: take those of the stops.
+    gauges: take those of the stops.  slot: of the first bristles in the ledger.
     """
     mechanism, rows, reals = numbering.mechanism, [], []
-    given = zip(mechanism.contacts, laws, touching, bristle_places(numbering), strict=True)
+    given = zip(mechanism.contacts, laws, touching, _bristle_places(numbering, slot), strict=True)
     for contact, law, sites, first in given:
         name, joint, *_ = contact
         length = mechanism.components.lengths[part_of(mechanism, contact)]
@@ -62,46 +61,24 @@ def fill(
     return {m.CONTACTS: rows, m.CONTACT_NUMBERS: reals}
 
 
-def of_worn(mechanism: Mechanism) -> list[int]:
-    """The independent mechanism of every contact that wears."""
-    return [part_of(mechanism, mechanism.contacts[k]) for (k,) in worn(mechanism)]
-
-
-def worn(mechanism: Mechanism) -> list[tuple[int]]:
-    """Rows of the table WORN."""
-    wearing = mechanism.scene.worn()
-    names = [contact.name for contact in mechanism.contacts]
-    return [(names.index(name),) for name in wearing]
-
-
 def part_of(mechanism: Mechanism, contact: Contact) -> int:
     """The independent mechanism that a contact belongs to."""
     return mechanism.components.of(contact.outer.link, contact.inner.link)
 
 
-def ledger_groups(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[tuple[float, int, int]]:
-    """(floor, number of variables, independent mechanism) of every error group after positions and speeds.
-
-    First the ledger, then bristles.  energies, lengths: floors of each independent mechanism.
-    """
-    parts = [part_of(mechanism, contact) for contact in mechanism.contacts]
-    ledger = [(energies[0], 1, 0)] * m.CONTACT_SLOTS
+def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> dict[str, list[Group]]:
+    """Error groups of the contacts' variables in the ledger and of their bristles (`model.ledger`)."""
+    parts, ledger = [part_of(mechanism, contact) for contact in mechanism.contacts], list[Group]()
     for part in parts:
-        ledger += [(energies[part], 1, part)] * 2 + [(energies[part] / lengths[part], 1, part)]  # losses, impulse [N s]
+        floors = {"damping": energies, "friction": energies, "impulse": np.divide(energies, lengths)}  # [J], [N s]
+        ledger += [(floors[name][part], 1, part) for name in m.row_type(m.CONTACT_LEDGER).names or ()]
     bristles = zip(_bristles(mechanism), parts, strict=True)
-    return ledger + [(size, 3, part) for size, part in bristles if size is not None]
+    return {"contacts": ledger, "bristles": [(size, 3, part) for size, part in bristles if size is not None]}
 
 
-def ledger_size(mechanism: Mechanism) -> int:
-    """Variables of the ledger up to the contacts' and their bristles, where those of the loads begin."""
-    ones = np.ones(len(mechanism.components.lengths))
-    return sum(count for _, count, _ in ledger_groups(mechanism, ones, ones))
-
-
-def bristle_places(numbering: Numbering) -> list[int]:
+def _bristle_places(numbering: Numbering, slot: int) -> list[int]:
     """Where in the state each contact's deflection of bristles starts, or -1."""
-    first = numbering.nq + numbering.nv + m.CONTACT_SLOTS + m.CONTACT_LEDGER.size * len(numbering.mechanism.contacts)
-    places = []
+    first, places = numbering.nq + numbering.nv + slot, []
     for size in _bristles(numbering.mechanism):
         places.append(-1 if size is None else first)
         first += 0 if size is None else 3

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.couplings import Coupling
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.start_table import given_coordinates, given_modal_velocities
 

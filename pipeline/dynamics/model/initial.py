@@ -12,7 +12,6 @@ from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigi
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
-from flexclear.pipeline.dynamics.model.bushings import rotations
 from flexclear.pipeline.dynamics.model.constraints import outboard_place
 from flexclear.pipeline.dynamics.model.deformation import start_place
 from flexclear.pipeline.dynamics.model.driving import joint_class
@@ -273,9 +272,17 @@ def start_internal(model: Model, y: np.ndarray, sites: np.ndarray) -> np.ndarray
     y, first = y.copy(), model.ny - model.arrays.size(m.N_INTERNAL)
     for index, angle in angles(model.arrays.table(m.GAUGES), sites).items():
         y[first + index] = angle
-    for index, vector in rotations(model, sites, np.zeros(model.ny - first)).items():
-        y[first + index : first + index + 3] = vector
+    for index, states in of_effects(model, sites, np.zeros(model.ny - first)).items():
+        y[first + index : first + index + len(states)] = states
     return y
+
+
+def of_effects(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int, np.ndarray]:
+    """Internal states of effects that follow from the frames of all sites and that continue others, by their first."""
+    states = dict[int, np.ndarray]()
+    for follow in model.parts.functions("states"):
+        states |= follow(model, sites, internal)
+    return states
 
 
 def check_loads(model: Model, loads: np.ndarray) -> None:

@@ -24,9 +24,6 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism, Site
 from flexclear.pipeline.dynamics.model.merge import Placement, find_frame
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 
-#: what loads add to the ledger, before the turns that they count: work done, energy lost
-LEDGER = 2
-
 
 class Load(NamedTuple):
     """A load by name, and the frame that it acts on, or the two between which it acts."""

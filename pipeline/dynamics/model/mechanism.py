@@ -13,6 +13,7 @@ from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.dynamics.effects.stops.model import STOP, End, ends
 from flexclear.pipeline.dynamics.model.chain import InboardJoint, chain
 from flexclear.pipeline.dynamics.model.components import Components, components
 from flexclear.pipeline.dynamics.model.driving import prescribed
@@ -28,7 +29,6 @@ from flexclear.pipeline.dynamics.model.merge import (
     start_places,
 )
 from flexclear.pipeline.dynamics.model.start_table import given_modes
-from flexclear.pipeline.dynamics.model.stops import STOP, End, ends
 from flexclear.pipeline.dynamics.model.tree import PATH, Branch, Edge, edges, span
 
 if TYPE_CHECKING:

@@ -16,10 +16,10 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.model.assembly import settled
 from flexclear.pipeline.dynamics.model.closing import LEAST_GYRATION, close
 from flexclear.pipeline.dynamics.model.constraints import constraints
-from flexclear.pipeline.dynamics.model.couplings import Coupling
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, row_unit, sites, unit_wrench

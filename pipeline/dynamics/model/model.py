@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -12,27 +12,24 @@ from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.effects import Parts, joint_frictions, load_kinks
+from flexclear.pipeline.dynamics.effects import Parts, most_parts
+from flexclear.pipeline.dynamics.effects.gears.model import Coupling, couplings
+from flexclear.pipeline.dynamics.effects.stops.model import STOP
 from flexclear.pipeline.dynamics.model import contacts as contacting
-from flexclear.pipeline.dynamics.model import flexible_bodies, guards, laws, wiring
+from flexclear.pipeline.dynamics.model import filling, flexible_bodies, guards, laws, wiring
 from flexclear.pipeline.dynamics.model import loads as loading
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.model.assembly import assembled
-from flexclear.pipeline.dynamics.model.couplings import Coupling, couplings, tables
 from flexclear.pipeline.dynamics.model.driving import joint_class
 from flexclear.pipeline.dynamics.model.gauges import Gauges
 from flexclear.pipeline.dynamics.model.loads import Load
 from flexclear.pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.numbering import Numbering, number
-from flexclear.pipeline.dynamics.model.stops import STOP
 
 if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
 
-#: places in the ledger of an independent mechanism that is not the first one: work of drives, loss of modal damping,
-#: work and loss of loads
-OTHER_BOOKS = 4
 #: four roundings of a length, as a fraction of it
 ROUNDED = 8.9e-16
 
@@ -113,29 +110,22 @@ def filled(
     loaded = loading.tabulate(mechanism, numbering, gauges, given)
     drive_laws = laws.drive_laws(mechanism.scene, given)
     in_tree = [law.times(sign) for law, sign in zip(drive_laws, mechanism.drive_signs, strict=True)]
-    contact_ledger = contacting.ledger_size(mechanism)
     gravity = loading.gravity(mechanism.scene)
-    ledger = loading.LEDGER if mechanism.scene.forces() else 0
-    parts = _parts(numbering, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]), loaded.kinds)
-    contacts = contacting.fill(numbering, parts, normals, touching, gauges)
-    coupling_tables = tables(coupled, numbering, gauges, [link.start for link in mechanism.links])
-    wear_ledger = m.WEAR_LEDGER.size * len(mechanism.scene.worn())
-    rubbing = _rubbing(numbering, parts, ordered, contact_ledger + ledger)
-    groups, floors = _error_groups(numbering, ledger, gauges)
-    wear_slot = len(groups) - numbering.nq - numbering.nv - gauges.internal - wear_ledger
-    books = _books(mechanism, contact_ledger, wear_slot)
+    parts = _parts(numbering, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]))
+    slots = filling.slots(mechanism, parts)
+    contacts = contacting.fill(numbering, parts, normals, touching, gauges, slots["bristles"])
+    effects = filling.tables(filling.Filling(numbering, parts, ordered, gauges, slots))
+    groups, floors = _error_groups(numbering, parts, gauges)
+    books = _books(slots)
     arrays = pack(
         {
             m.NQ: numbering.nq,
             m.N_LEDGER: len(groups) - numbering.nq - numbering.nv,
             m.N_DRIVES: numbering.known,
             m.N_INTERNAL: gauges.internal,
-            m.N_COUPLINGS: len(coupled),
             m.N_LOAD_BENDS: len(loaded.bends),
             m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
-            m.LOAD_SLOT: contact_ledger,
-            m.RUBBING_SLOT: contact_ledger + ledger,
-            m.WEAR_SLOT: wear_slot,
+            **{m.SIZES[f"{effect.name}_slot"]: slots[effect.name] for effect in parts.present if effect.ledger},
             m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
         },
         {
@@ -145,10 +135,8 @@ def filled(
             **laws.fill([*in_tree, *loaded.laws]),
             **loaded.tables,
             m.LOADS: _booked(mechanism, loaded, books),
-            **coupling_tables,
-            **rubbing,
-            **guards.fill(mechanism, loaded),
-            m.WORN: contacting.worn(mechanism),
+            **effects,
+            **guards.fill(mechanism, parts, loaded),
             **_recorded(mechanism),
             m.GAUGES: gauges.rows,
             m.GRAVITY: gravity,
@@ -243,25 +231,15 @@ def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
     }
 
 
-def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool, loads: tuple[str, ...]) -> Parts:
-    """The kinds of parts that there are."""
+def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool) -> Parts:
+    """The kinds of parts that there are: of what the scene may have."""
     mechanism = numbering.mechanism
-    contacts = [contact.joint for contact in mechanism.contacts]
-    return Parts(
+    return replace(
+        most_parts(mechanism.scene),
         joints=tuple(sorted({link.kind for link in mechanism.links[1:]})),
-        surfaces=tuple(sorted({joint.type for joint in contacts} - {STOP})),
         forms=tuple(sorted({law.form for law in normals})),
-        frictions=tuple(sorted({joint.friction.law for joint in contacts if joint.friction is not None})),
-        loads=loads,
-        stops=any(joint.type == STOP for joint in contacts),
-        couplings=bool(mechanism.scene.gear),
         closures=bool(mechanism.closures or mechanism.scene.gear),
-        flexible=not mechanism.all_rigid,
-        stiffening=any(b.stiffening is not None for b in mechanism.scene.flexible().values()),
         harmonics=harmonics,
-        joint_frictions=joint_frictions(mechanism.scene),
-        wear=bool(mechanism.scene.worn()),
-        load_kinks=load_kinks(mechanism.scene),
         articulated=articulated(numbering),
     )
 
@@ -277,21 +255,6 @@ def articulated(numbering: Numbering) -> bool:
         depths += [before[link.branch.parent] + k for k in range(1, len(own) + 1)]
         before[i] = before[link.branch.parent] + len(own)
     return bool(np.sqrt(np.mean(np.square(depths))) > DEEP)
-
-
-#: tables of joints with friction, where there are none
-NO_FRICTION: dict[Any, Any] = dict.fromkeys(
-    (m.RUBBING, m.BEARINGS, m.RUBBING_ENTRIES, m.REACTION_TERMS, m.REACTION_LOOPS, m.BEARING_NUMBERS), ()
-)
-
-
-def _rubbing(numbering: Numbering, parts: Parts, closures: tuple[Closure | Coupling, ...], slot: int) -> dict[Any, Any]:
-    """Tables of the ideal joints with friction; slot: of their first loss in the ledger."""
-    if not parts.joint_frictions:
-        return NO_FRICTION
-    from flexclear.pipeline.dynamics.model import joint_friction
-
-    return joint_friction.fill(numbering, parts.joint_frictions, closures, slot, parts.articulated)
 
 
 def _pose_row(placement: Placement) -> np.ndarray:
@@ -350,11 +313,10 @@ class Book(NamedTuple):
 Books = list[Book]
 
 
-def _books(mechanism: Mechanism, loads: int, end: int) -> Books:
-    """Where each independent mechanism keeps its books; loads: place of the first one's, end: after the last one's."""
-    first = end - OTHER_BOOKS * (len(mechanism.components.lengths) - 1)
-    others = range(first, end, OTHER_BOOKS)
-    return [Book(m.DRIVE_WORK, m.MODAL_LOSS, loads), *(Book(place, place + 1, place + 2) for place in others)]
+def _books(slots: Mapping[str, int]) -> Books:
+    """Where each independent mechanism keeps its books."""
+    others = range(slots["books"], slots["end"], filling.OTHER_BOOKS)
+    return [Book(m.DRIVE_WORK, m.MODAL_LOSS, slots["loads"]), *(Book(k, k + 1, k + 2) for k in others)]
 
 
 def _booked(mechanism: Mechanism, loaded: loading.Loaded, books: Books) -> list[tuple[int, ...]]:
@@ -384,24 +346,21 @@ def _closure_weights(mechanism: Mechanism, closures: Sequence[Closure | Coupling
     return weights
 
 
-def _error_groups(numbering: Numbering, loads: int, gauges: Gauges) -> tuple[np.ndarray, np.ndarray]:
-    """Group of every state variable, and rows of FLOORS.
-
-    loads: number of the loads' energies.  gauges: have the internal states of parts, which come last.
-    """
+def _error_groups(numbering: Numbering, parts: Parts, gauges: Gauges) -> tuple[np.ndarray, np.ndarray]:
+    """Group of every state variable, and rows of FLOORS; gauges: have the internal states of parts, which come last."""
     mechanism, of_link = numbering.mechanism, numbering.mechanism.components.of_link
     lengths, masses = np.array(mechanism.components.lengths), np.zeros(len(mechanism.components.lengths))
     for link, part in zip(mechanism.links[1:], of_link[1:], strict=True):
         masses[part] += link.mass
     whole = np.full(len(lengths), mechanism.length)
-    groups, magnitudes, parts = _floors(numbering, loads, gauges, lengths, masses * lengths**2)
-    natural = _floors(numbering, loads, gauges, whole, np.full(len(lengths), np.sum(masses)) * whole**2)[1]
-    counts = np.bincount(parts[groups], minlength=len(lengths))
-    return groups, np.stack([magnitudes, natural, np.sqrt(counts / len(groups))[parts]], axis=1)
+    groups, magnitudes, owners = _floors(numbering, parts, gauges, lengths, masses * lengths**2)
+    natural = _floors(numbering, parts, gauges, whole, np.full(len(lengths), np.sum(masses)) * whole**2)[1]
+    counts = np.bincount(owners[groups], minlength=len(lengths))
+    return groups, np.stack([magnitudes, natural, np.sqrt(counts / len(groups))[owners]], axis=1)
 
 
 def _floors(
-    numbering: Numbering, loads: int, gauges: Gauges, lengths: np.ndarray, energies: np.ndarray
+    numbering: Numbering, parts: Parts, gauges: Gauges, lengths: np.ndarray, energies: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Group of every state variable; of each group the floor below which it is resolved absolutely, and its component.
 
@@ -428,20 +387,13 @@ def _floors(
                 rows.append((lengths[of_link[i]] * link.mass**0.5, of_link[i]))
                 target[mine] = len(rows) - 1
     groups = [*q_group, *v_group]
-    tail = [*contacting.ledger_groups(mechanism, energies, lengths), *[(energies[0], 1, 0)] * loads]
-    if mechanism.scene.rubbing():
-        from flexclear.pipeline.dynamics.model import joint_friction
-
-        tail += joint_friction.ledger_groups(mechanism, energies)
-    tail += [(energy, OTHER_BOOKS, part) for part, energy in enumerate(energies) if part]
-    for part in contacting.of_worn(mechanism):
-        tail += [(lengths[part], 1, part), (energies[part], 1, part)]  # sliding distance, load path
+    tail = [group for block in filling.blocks(mechanism, parts, energies, lengths).values() for group in block]
     tail += [(1.0, 1, _part_of_sites(numbering, *sites)) for sites in gauges.owners]
     for floor, count, part in tail:
         rows.append((floor, part))
         groups += [len(rows) - 1] * count
-    floors, parts = zip(*rows, strict=True)
-    return np.array(groups, dtype=np.int64), np.array(floors), np.array(parts)
+    floors, owners = zip(*rows, strict=True)
+    return np.array(groups, dtype=np.int64), np.array(floors), np.array(owners)
 
 
 def _part_of_sites(numbering: Numbering, *sites: int) -> int:

@@ -11,9 +11,9 @@ import numpy as np
 from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.dynamics.effects.stops.model import STOP, End
 from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.model.stops import STOP, End
 
 #: surfaces whose inner part is a pin or a ball within a hollow one
 ROUND = ("clearance-revolute", "clearance-spherical")

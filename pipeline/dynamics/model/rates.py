@@ -24,8 +24,8 @@ from functools import cached_property
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.gears.model import Coupling, Side
 from flexclear.pipeline.dynamics.model.constraints import demands, freedoms, outboard_place
-from flexclear.pipeline.dynamics.model.couplings import Coupling, Side
 from flexclear.pipeline.dynamics.model.interface_basis import frame_index
 from flexclear.pipeline.dynamics.model.mechanism import Closure
 from flexclear.pipeline.dynamics.model.merge import Placement

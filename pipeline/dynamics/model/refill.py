@@ -12,18 +12,31 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.drives import JointDrive
-from flexclear.pipeline.core.scene.loads import Gravity
-from flexclear.pipeline.core.scene.parts import RigidBody
+from flexclear.pipeline.core.scene.fields import Part
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import pieces_of
+from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 from flexclear.pipeline.dynamics.model.closing import EXACT
 from flexclear.pipeline.dynamics.model.driving import Prescribed, prescribed
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, sizes
 from flexclear.pipeline.dynamics.model.merge import rigid_inertia
 from flexclear.pipeline.dynamics.model.model import Model, filled
 
+#: keys of a table, or of its parts, that decide numbers of a model but neither its links nor what is wired to what
+KEYS = {
+    "time": "end",
+    "body": "mass com inertia",
+    "joint": "clearance ball_radius pin_radius length travel ball_material socket_material pin_material "
+    "journal_material slot_material plane_material normal friction floor initial_approach_speed",
+    "drive": "law",
+    "load": "acceleration force torque stiffness damping free_length rest viscous coulomb values",
+}
+#: what may change of a scene for which a model is refilled, as ``table`` or ``table.key``; whatever is not listed must
+#: be the same
+CHANGEABLE = {f"{table}.{key}" for table, keys in KEYS.items() for key in keys.split()}
+CHANGEABLE |= {key for effect in EFFECTS for key in effect.changeable}
+CHANGEABLE |= {"title", "description", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view"}
 #: least principal moment as fraction of the largest with which no motion of a link can be without inertia
 SLENDER = 1e-6
 
@@ -51,45 +64,32 @@ def refilled(model: Model, scene: Scene) -> Model | None:
 
 def _same_structure(model: Model, scene: Scene) -> bool:
     old = model.scene
-    if not _same_bodies(model, scene) or scene.time.start != old.time.start:
-        return False
-    if (scene.stop, scene.gear, scene.start) != (old.stop, old.gear, old.start):
-        return False
-    if list(scene.joint) != list(old.joint) or list(scene.drive) != list(old.drive):
-        return False
-    if list(scene.load) != list(old.load):
-        return False
-    contacts, clearances = scene.contacts(), [joint.clearance for joint in old.contacts().values()]
-    if contacts.keys() != old.contacts().keys():
+    if not all(_alike(getattr(scene, table), getattr(old, table), table) for table in Scene.model_fields):
         return False
     # the mechanism's size is that of its points, unless a clearance is larger
-    least = min(model.mechanism.components.lengths)
-    if any(c >= least for c in [*clearances, *(joint.clearance for joint in contacts.values())]):
-        return False
-    pairs = zip(scene.joint.items(), old.joint.values(), strict=True)
-    if any(new is not was and (name not in contacts or _held(new) != _held(was)) for (name, new), was in pairs):
-        return False
-    loads = zip(scene.load.values(), old.load.values(), strict=True)
-    if any(new is not was and not _acts_alike(new, was) for new, was in loads):
-        return False
-    drives = zip(scene.drive.values(), old.drive.values(), strict=True)
-    return all(new is was or _drives_alike(new, was) for new, was in drives)
+    clearances = [joint.clearance for one in (old, scene) for joint in one.contacts().values()]
+    return all(clearance < min(model.mechanism.components.lengths) for clearance in clearances)
 
 
-def _same_bodies(model: Model, scene: Scene) -> bool:
-    """Whether no body differs in more than its mass, centre and inertia, which decide but the links' numbers."""
-    old = model.scene.body
-    if [*scene.body] != [*old]:
+def _alike(new: Any, was: Any, path: str) -> bool:
+    """Whether two values differ in nothing but what `CHANGEABLE` lists, which neither appears nor is a text.
+
+    Texts name frames and coordinates, or write formulas.
+    """
+    whole = path in Scene.model_fields or not (new is None or was is None or _is_text(new) or _is_text(was))
+    if new is was or (path in CHANGEABLE and whole):
+        return True
+    if type(new) is not type(was):
         return False
-    changed = [(new, was) for new, was in zip(scene.body.values(), old.values(), strict=True) if new is not was]
-    return all(new == was or _shape(new) == _shape(was) for new, was in changed)
+    if isinstance(was, Part):
+        return all(_alike(getattr(new, key), value, f"{path}.{key}") for key, value in was if key != "source")
+    if isinstance(was, dict):
+        return [*new] == [*was] and all(_alike(new[name], value, path) for name, value in was.items())
+    return bool(new == was)
 
 
-def _shape(body: Any) -> Any:
-    """What a rigid body is besides its mass, centre and inertia; of any other body nothing that equals another's."""
-    if not isinstance(body, RigidBody):
-        return object()
-    return [value for name, value in body if name not in ("mass", "com", "inertia", "source")]
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str) or (isinstance(value, tuple) and any(isinstance(one, str) for one in value))
 
 
 def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
@@ -117,29 +117,6 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
     if any(joint.clearance >= min(parts.lengths) for joint in scene.contacts().values()) or not mechanism.all_rigid:
         return None
     return replace(mechanism, links=links, length=length, components=parts)
-
-
-def _held(joint: Any) -> tuple[str, tuple[str, str]]:
-    """What a clearance joint holds next to its contact."""
-    return joint.type, tuple(joint.between)
-
-
-def _acts_alike(new: Any, was: Any) -> bool:
-    """Whether two loads are of one kind and act between the same frames or coordinates."""
-    return _words(new) == _words(was) or (isinstance(new, Gravity) and isinstance(was, Gravity))
-
-
-def _words(load: Any) -> dict[str, Any]:
-    """What a load says in words: its type, frames, joint and coordinate; the rest of it are numbers and laws."""
-    values = {name: value for name, value in load if name != "source"}
-    return {
-        n: v for n, v in values.items() if isinstance(v, str) or (isinstance(v, tuple) and v and isinstance(v[0], str))
-    }
-
-
-def _drives_alike(new: Any, was: Any) -> bool:
-    both = isinstance(new, JointDrive) and isinstance(was, JointDrive)
-    return both and (new.joint, new.coordinate) == (was.joint, was.coordinate)
 
 
 def _same_start(model: Model, scene: Scene) -> bool:

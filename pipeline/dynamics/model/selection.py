@@ -94,8 +94,8 @@ def _coupling_length(
     model: Model, c: Any, entries: np.ndarray, columns: np.ndarray, points: np.ndarray, mobility: np.ndarray
 ) -> float:
     """Natural length of the row of a coupling, as of `natural_lengths`; c: its closure."""
-    gauges, table = model.arrays.table(m.GAUGES), model.arrays.table(m.COUPLINGS)[c["coupling"]]
-    ratio = model.arrays.table(m.COUPLING_NUMBERS)["ratio"][c["coupling"]]
+    gauges, table = model.arrays.table(m.GAUGES), model.arrays.table(m.NAMED["couplings"])[c["coupling"]]
+    ratio = model.arrays.table(m.NAMED["coupling_numbers"])["ratio"][c["coupling"]]
     support, total = model.arrays.table(m.SUPPORT)["coordinate"], 0.0
     for part, gauge, factor in ((0, gauges[table["second"]], 1.0), (1, gauges[table["first"]], ratio)):
         mine = entries[entries["part"] == part]

@@ -1,4 +1,4 @@
-"""What acts on bodies besides joints and paths: loads, stops and gears, at the frames where they do."""
+"""What acts on bodies besides joints and paths: loads and effects, at the frames where they do."""
 
 from __future__ import annotations
 
@@ -17,12 +17,6 @@ def on_frames(model: Model, seen: Observed, body: str) -> Acting:
         from flexclear.pipeline.dynamics.record.loads import on_loaded_frames
 
         on_each += on_loaded_frames(model, seen)
-    if model.parts.stops:
-        from flexclear.pipeline.dynamics.record.stops import on_stopped_frames
-
-        on_each += on_stopped_frames(model, seen)
-    if model.parts.couplings:
-        from flexclear.pipeline.dynamics.record.gears import on_geared_frames
-
-        on_each += on_geared_frames(model, seen)
+    for on_its_frames in model.parts.functions("acts"):
+        on_each += on_its_frames(model, seen)
     return [acting for acting in on_each if model.mechanism.frames[acting[0]].body == body]

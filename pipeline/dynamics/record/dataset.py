@@ -23,11 +23,11 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics.compile.sources import named
 from flexclear.pipeline.dynamics.effects import RECORDS
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.effects.stops.model import ends_an_angle
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import forgotten
-from flexclear.pipeline.dynamics.model.stops import ends_an_angle
 from flexclear.pipeline.dynamics.record.motion import Motions, motion_series, shifted
 from flexclear.pipeline.dynamics.record.topology import topology
 from flexclear.pipeline.dynamics.record.wrenches import every_joint_wrench
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
-Part = tuple[Variables, dict[str, object]]  #: variables and coordinates
 
 
 def dataset(run: Run) -> xr.Dataset:
@@ -77,7 +76,7 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np
     for term in terms:
         mine = names.setdefault(KINDS[term.kind].owner, [])
         mine += [term.owner] if term.owner not in mine else []
-    wanted, parts, model = {KINDS[term.kind].variable for term in terms}, list[Part](), motions.model
+    wanted, parts, model = {KINDS[term.kind].variable for term in terms}, list[Series](), motions.model
     if bodies := names.get("body"):
         those = motions.several(bodies)
         moved = motion_series(those, model.mechanism.origin)
@@ -104,7 +103,7 @@ _LEDGER = (
 )
 
 
-def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], Callable[[], Part]]]:
+def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], Callable[[], Series]]]:
     """What makes the variables of this scene but those of bodies, frames and joints, by how their names begin."""
     model, seen = motions.model, motions.seen
     yield ("modal_",), lambda: _modes(motions)
@@ -112,28 +111,11 @@ def _makers(scene: Scene, motions: Motions) -> Iterator[tuple[tuple[str, ...], C
     yield ("joint_position", "joint_velocity", "joint_acceleration"), lambda: _joint_coordinates(model, seen)
     if model.loads:
         yield ("load_",), lambda: _loads(model, seen)
-    if "bushing" in model.parts.loads:
-        from flexclear.pipeline.dynamics.record.bushings import give
-
-        yield ("bushing_",), lambda: give(model, seen)
-    if {"pid", "sampled-pid"} & set(model.parts.loads):
-        from flexclear.pipeline.dynamics.record.controllers import controllers
-
-        yield ("controller_",), lambda: controllers(model, seen)
-    if model.parts.couplings:
-        from flexclear.pipeline.dynamics.record.gears import gear_series
-
-        yield ("gear_",), lambda: gear_series(model, seen)
-    if model.parts.joint_frictions:
-        from flexclear.pipeline.dynamics.record.joint_friction import friction_series
-
-        yield ("joint_bearing", "joint_sliding", "joint_friction_"), lambda: friction_series(model, seen)
+    for effect in model.parts.present:
+        for beginnings, function in effect.records.items():
+            yield beginnings, partial(effect.load(function), model, seen)
     if model.contacts:
         yield ("contact_",), lambda: _contacts(model, seen)
-    if model.parts.wear:
-        from flexclear.pipeline.dynamics.record.wear import wear_series
-
-        yield ("wear_",), lambda: wear_series(model, seen)
     for name, asked in scene.output.requests().items():
         record = lookup(RECORDS, name, where="[output]")
         yield tuple(VARIABLES[name]), partial(record, motions, asked)
@@ -185,7 +167,7 @@ def warnings(run: Run) -> list[str]:
         *run.mended,
         *_contact_warnings(run),
         *_flexible_warnings(run),
-        *_friction_warnings(run),
+        *(text for warn in run.model.parts.functions("warns") for text in warn(run)),
         *_step_warnings(run.model, run.trajectory),
         *ledger.warnings(run.model, run.observed),
     ]
@@ -225,15 +207,6 @@ def _flexible_warnings(run: Run) -> list[str]:
     return validity.warnings(run.model, run.trajectory.time, run.observed)
 
 
-def _friction_warnings(run: Run) -> list[str]:
-    """Sentences about friction of ideal joints."""
-    if not run.model.parts.joint_frictions:
-        return []
-    from flexclear.pipeline.dynamics.record import joint_friction
-
-    return joint_friction.warnings(run.model, run.engine.mobility.redundant_joints)
-
-
 def _report(run: Run) -> dict[str, float | int | str]:
     """How the run was made, for the attributes; and in words what is to be doubted."""
     counters, redundant = run.trajectory.counters, run.engine.mobility.redundant
@@ -262,7 +235,7 @@ def _report(run: Run) -> dict[str, float | int | str]:
     return facts
 
 
-def _motion(motions: Motions) -> Part:
+def _motion(motions: Motions) -> Series:
     origin, body = motions.model.mechanism.origin, motions.every_body
     frames, joints = list(motions.model.mechanism.frames), list(motions.model.scene.joint)
     moment, force = every_joint_wrench(motions, joints)
@@ -291,7 +264,7 @@ def _joints(model: Model) -> dict[str, object]:
     return coordinates if joints else {"joint": []}
 
 
-def _modes(motions: Motions) -> Part:
+def _modes(motions: Motions) -> Series:
     model = motions.model
     if not model.numbering.flexible:
         return {}, {}
@@ -308,7 +281,7 @@ def _modes(motions: Motions) -> Part:
     }
 
 
-def _drives(scene: Scene, model: Model, seen: Observed) -> Part:
+def _drives(scene: Scene, model: Model, seen: Observed) -> Series:
     names = list(model.drives)
     if not names:
         return {}, {}
@@ -329,7 +302,7 @@ def _drives(scene: Scene, model: Model, seen: Observed) -> Part:
     }, {"drive": names, "drive_motion": ("drive", [motion(turning[name]) for name in names])}
 
 
-def _joint_coordinates(model: Model, seen: Observed) -> Part:
+def _joint_coordinates(model: Model, seen: Observed) -> Series:
     every = joint_coordinates(model, seen)
     if not every:
         return {}, {}
@@ -344,7 +317,7 @@ def _joint_coordinates(model: Model, seen: Observed) -> Part:
     }
 
 
-def _loads(model: Model, seen: Observed) -> Part:
+def _loads(model: Model, seen: Observed) -> Series:
     from flexclear.pipeline.dynamics.record.loads import load_series, turning_loads
 
     forces = model.scene.forces()
@@ -355,7 +328,7 @@ def _loads(model: Model, seen: Observed) -> Part:
     }
 
 
-def _contacts(model: Model, seen: Observed) -> Part:
+def _contacts(model: Model, seen: Observed) -> Series:
     touch = seen.touch
     scalars = {
         "contact_gap": touch["gap"],

@@ -10,8 +10,8 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import cross
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.equations.observation import Observed
-from flexclear.pipeline.dynamics.model.couplings import Coupling
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.acting import on_frames
 from flexclear.pipeline.dynamics.record.motion import Motions

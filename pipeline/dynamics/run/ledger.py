@@ -8,16 +8,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.core.scene.loads import Pid, SampledPid
 from flexclear.pipeline.core.scene.solver import Solver
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.drives.pieces import pieces_of, size
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.mechanism import Site
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
+#: what an effect loses, in the first variables of its block of the ledger [J]: variable of the run's dataset and its
+#: dimension; of each loss the sites between which it is, and to what in words
+Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 #: rounding of the largest energies, which may cancel in the balance
 ROUNDING = 1e-12
@@ -30,12 +31,16 @@ CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 0.1
 DOUBTFUL = 1e-2
 #: speed above which a run diverges [m/s]: a hundredth of that of light, where Newton's mechanics is off by 1e-4
 DIVERGED = 3e6
-#: a coordinate is out of control at so many times the largest of its reference, its start, a turn or the mechanism
-LOST = 100.0
 #: what keeps a motion bounded
 REMEDY = "a controller with a smaller gain or a shorter period, or a longer time constant of a load, keeps it bounded"
 #: steps of many vibrations leave up to half of this in the work of forces that swing while the drives' speeds change
 LONG, LONG_PER_RTOL = 2e-2, 50.0
+
+
+def _of_effects(model: Model) -> list[tuple[int, Losses]]:
+    """Index in the ledger of what each effect loses."""
+    losing = [effect for effect in model.parts.present if effect.losses]
+    return [(model.arrays.size(m.SIZES[f"{one.name}_slot"]), one.load(one.losses)(model)) for one in losing]
 
 
 def series(model: Model, seen: Observed, component: int | None = None) -> Variables:
@@ -66,13 +71,11 @@ def series(model: Model, seen: Observed, component: int | None = None) -> Variab
         load_work, load_loss = (ledger[:, books["load"] + k].sum(axis=1) for k in range(2))
         dissipated, balance = dissipated + load_loss, balance + load_loss - load_work
         loaded = {"load_work": (("time",), load_work), "load_loss": (("time",), load_loss)}
-    if model.parts.joint_frictions:
-        first = model.arrays.size(m.RUBBING_SLOT)
-        rubbed = ledger[:, first : first + model.arrays.size(m.N_RUBBING)]
-        joints = [joint.between for joint in model.scene.rubbing().values()]
-        lost_there = total(rubbed, [(model.mechanism.site(a), model.mechanism.site(b)) for a, b in joints])
+    for slot, (variable, dimension, sites, _) in _of_effects(model):
+        values = ledger[:, slot : slot + len(sites)]
+        lost_there = total(values, sites)
         dissipated, balance = dissipated + lost_there, balance + lost_there
-        loaded["joint_friction_loss"] = (("time", "rubbing"), rubbed)
+        loaded[variable] = (("time", dimension), values)
     variables: Variables = {
         "kinetic": (("time",), kinetic),
         "potential": (("time",), potential),
@@ -155,7 +158,8 @@ def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchang
     exchanged: before it, of a run that continues another one.
     Raises SolverError when the run diverges, or its ledger is off by more than the scene's tolerance.
     """
-    _require_controlled(model, trajectory, seen)
+    for refuse in model.parts.functions("refuses"):
+        refuse(model, trajectory, seen)
     _require_bounded(model, trajectory, seen)
     made = balances(model, seen)
     for energies in made:
@@ -199,26 +203,6 @@ def _require_bounded(model: Model, trajectory: Trajectory, seen: Observed) -> No
         raise SolverError(f"at t = {trajectory.time[k]:.6g} s: {text}; {REMEDY}")
 
 
-def _require_controlled(model: Model, trajectory: Trajectory, seen: Observed) -> None:
-    """SolverError for a controlled coordinate beyond all that its reference and the mechanism have of size."""
-    wiring, gauges = model.arrays.table(m.LOADS), model.arrays.table(m.GAUGES)
-    for k, (name, _) in enumerate(model.loads):
-        load = model.scene.load.get(name)
-        if not isinstance(load, (Pid, SampledPid)):
-            continue
-        looked_at = wiring[k]["measured"] if wiring[k]["measured"] >= 0 else wiring[k]["gauge"]
-        turning = bool(gauges[int(looked_at)]["turning"])
-        law = pieces_of(load.reference, "angle" if turning else "length")
-        asked = size(law, float(trajectory.time[0]), float(trajectory.time[-1]), 0)
-        value = np.abs(seen.loads["value"][:, k])
-        bound = LOST * max(asked, float(value[0]), 2.0 * np.pi if turning else model.length)
-        beyond = np.flatnonzero(~(value <= bound))
-        if len(beyond):
-            text = f"the motion diverges: controller {name} has its coordinate at {value[beyond[0]]:.3g} "
-            text += f"{'rad' if turning else 'm'}, beyond {LOST:g} times its reference and the mechanism's size"
-            raise SolverError(f"at t = {trajectory.time[beyond[0]]:.6g} s: {text}; {REMEDY}")
-
-
 def _losses(model: Model, totals: dict[str, np.ndarray], t: int) -> str:
     parts = []
     for c, contact in enumerate(model.contacts):
@@ -226,8 +210,8 @@ def _losses(model: Model, totals: dict[str, np.ndarray], t: int) -> str:
             parts.append(f"{totals[f'contact_{cause}_loss'][t, c]:.3g} J to the {cause} of {contact.words}")
     if "modal_damping_loss" in totals:
         parts.append(f"{totals['modal_damping_loss'][t]:.3g} J to modal damping")
-    for k, name in enumerate(model.scene.rubbing()):
-        parts.append(f"{totals['joint_friction_loss'][t, k]:.3g} J to the friction of joint {name}")
+    for _, (variable, *_, words) in _of_effects(model):
+        parts += [f"{totals[variable][t, k]:.3g} J to {what}" for k, what in enumerate(words)]
     if "load_loss" in totals:
         parts.append(f"{totals['load_loss'][t]:.3g} J to the loads")
     return ", ".join(parts) or "nothing"

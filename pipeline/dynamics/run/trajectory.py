@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import reduce
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.loads import SampledPid
 from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import stopping
@@ -198,12 +198,9 @@ def _advance(
 
 
 def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
-    """What gives the state after the samples of controllers, from that at a break [s] before them."""
-    if not any(isinstance(load, SampledPid) for load in engine.model.scene.load.values()):
-        return lambda y, t: y
-    from flexclear.pipeline.dynamics.run.sampling import sampler
-
-    return sampler(engine)
+    """What gives the state after what effects do at a break [s], from that before it."""
+    samplers = [make(engine) for make in engine.model.parts.functions("samples")]
+    return lambda y, t: reduce(lambda state, sample: sample(state, t), samplers, y)
 
 
 def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:

@@ -165,7 +165,7 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
                 axis = outer["axes"][:, 2]
                 force, offset = force - axis * (axis @ force), offset - axis * (axis @ offset)
             size = float(np.linalg.norm(force))
-            depth = (size / law.numbers[0]) ** (1.0 / law.exponent)
+            depth = (size / law.numbers.stiffness) ** (1.0 / law.numbers.exponent)
             there = -force / size * (contact.joint.clearance + depth) if size > NOTHING * weight else 0.0 * force
             missing.append(there - offset)
         least = min(joint.clearance for joint in loose(model.scene).values())

@@ -16,12 +16,12 @@ def power(depth, exponent):
 
 
 @kernel
-def force(depth, rate, impact_rate, p):
-    """Elastic force [N], >= 0, and no damping; depth [m] >= 0, rates [m/s]; p = (K, n, -, -)."""
-    return p[0] * power(depth, p[1]), 0.0
+def force(depth, rate, impact_rate, law):
+    """Elastic force [N], >= 0, and no damping; depth [m] >= 0, rates [m/s]."""
+    return law.stiffness * power(depth, law.exponent), 0.0
 
 
 @kernel
-def stored(depth, p):
+def stored(depth, law):
     """Energy [J] that the elastic part of the force can give back."""
-    return p[0] * depth * power(depth, p[1]) / (p[1] + 1.0)
+    return law.stiffness * depth * power(depth, law.exponent) / (law.exponent + 1.0)

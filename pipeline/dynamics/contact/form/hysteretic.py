@@ -13,10 +13,10 @@ __all__ = ["force", "stored"]
 
 
 @kernel
-def force(depth, rate, impact_rate, p):
+def force(depth, rate, impact_rate, law):
     """Elastic and damping force [N], together >= 0; impact_rate: `rate` when this contact began [m/s], > 0.
 
-    p = (K, n, a, -).
+    The law's damping is a.
     """
-    elastic = p[0] * power(depth, p[1])
-    return elastic, max(-elastic, elastic * (p[2] * rate / impact_rate))
+    elastic = law.stiffness * power(depth, law.exponent)
+    return elastic, max(-elastic, elastic * (law.damping * rate / impact_rate))

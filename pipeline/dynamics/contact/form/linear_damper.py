@@ -10,13 +10,13 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 
 @kernel
-def force(depth, rate, impact_rate, p):
-    """Elastic and damping force [N], together >= 0; p = (K, 1, C, -)."""
-    elastic = p[0] * depth
-    return elastic, max(-elastic, p[2] * rate)
+def force(depth, rate, impact_rate, law):
+    """Elastic and damping force [N], together >= 0; the law's damping is C."""
+    elastic = law.stiffness * depth
+    return elastic, max(-elastic, law.damping * rate)
 
 
 @kernel
-def stored(depth, p):
+def stored(depth, law):
     """Energy [J] that the spring can give back."""
-    return 0.5 * p[0] * depth * depth
+    return 0.5 * law.stiffness * depth * depth

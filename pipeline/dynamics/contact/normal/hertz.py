@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
-from flexclear.pipeline.dynamics.contact.law import CLOSE, Resolved, refuse_linear
+from flexclear.pipeline.dynamics.contact.law import CLOSE, Numbers, Resolved, refuse_linear
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Hertz:
         warning = None
         if law.restitution is not None and 1.0 - law.restitution > CLOSE:
             warning = f"'hertz' loses nothing: it delivers a restitution of 1, not of {law.restitution:g}"
-        return Resolved("elastic", (stiffness, exponent, 0.0, 0.0), exponent, None, 1.0, warning)
+        return Resolved("elastic", Numbers(stiffness, exponent, 0.0), None, 1.0, warning)
 
 
 LAW = Hertz()

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.dynamics.contact import restitution
-from flexclear.pipeline.dynamics.contact.law import Resolved
+from flexclear.pipeline.dynamics.contact.law import Numbers, Resolved
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class KelvinVoigt:
         else:
             raise ValueError("the law 'kelvin-voigt' needs a damping [N s/m], or a restitution")
         delivered = restitution.linear_delivered(damping / critical)
-        return Resolved("linear-damper", (stiffness, 1.0, damping, 0.0), 1.0, asked, delivered)
+        return Resolved("linear-damper", Numbers(stiffness, 1.0, damping), asked, delivered)
 
 
 LAW = KelvinVoigt()

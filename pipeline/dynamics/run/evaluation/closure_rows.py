@@ -14,7 +14,6 @@ from flexclear.pipeline.dynamics.model.mobility import INFINITE
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.jamming import explanation, jammed
 from flexclear.pipeline.dynamics.run.evaluation.tree_factor import mass_factor
 
 #: length that makes rows and coordinates of the closures comparable in condition numbers [m]
@@ -28,7 +27,7 @@ def evaluate(engine: Engine, y: np.ndarray, t: float, repeat: int = 1) -> np.nda
     """f(t, y) with the contacts' present modes; SolverError where the equations are singular."""
     if engine.attempt(y, t, repeat):
         return engine.slope.copy()
-    why = explanation(engine) if jammed(engine) else f"the equations are singular in this pose: {diagnosis(engine)}"
+    why = engine.explained() or f"the equations are singular in this pose: {diagnosis(engine)}"
     raise SolverError(f"at t = {t:.6g} s: {why}")
 
 

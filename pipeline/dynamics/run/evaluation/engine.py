@@ -172,6 +172,11 @@ class Engine:
         """Impact rates of the contacts [m/s], not copied."""
         return self.view(m.LATCHED)
 
+    def explained(self) -> str | None:
+        """Why an effect ends the run, in words; None where none does."""
+        found = (explain(self) for explain in self.model.parts.functions("explains"))
+        return next((why for why in found if why is not None), None)
+
     def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
         """Evaluate f(t, y) in the work space; whether it could be."""
         self.view(m.Y)[:] = y

@@ -76,7 +76,7 @@ def side_by_side(engine: Engine) -> bool:
 
 def suited(engine: Engine) -> bool:
     """Whether there can be straight code."""
-    return not (INTERPRETED or engine.model.parts.joint_frictions)
+    return not (INTERPRETED or any(effect.iterates for effect in engine.model.parts.present))
 
 
 def _make(engine: Engine, progress: Progress) -> None:

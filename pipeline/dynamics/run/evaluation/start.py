@@ -13,7 +13,6 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.plausibility import refuse_depth
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.jamming import explanation
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe
 
 #: impact rate that a resting contact is given: the hysteresis of an impact long past has no say [m/s]
@@ -92,12 +91,9 @@ def project(engine: Engine, y: np.ndarray) -> np.ndarray:
     start = m.record(rows, len(engine.model.contacts))
     start.time[:], start.state[:] = engine.start, y
     seen = observe(engine, rows)
-    if seen.status[0] == m.JAMMED:
-        raise SolverError(f"at t = {engine.start:.6g} s: {explanation(engine)}")
     if seen.status[0] != m.OK:
-        raise SolverError(
-            f"at t = {engine.start:.6g} s: the loops cannot be closed from the start that the scene gives"
-        )
+        why = engine.explained() or "the loops cannot be closed from the start that the scene gives"
+        raise SolverError(f"at t = {engine.start:.6g} s: {why}")
     return seen.state[0].copy()
 
 

@@ -6,10 +6,8 @@ import numpy as np
 
 from flexclear.pipeline.core.scene.plausibility import negative_gains
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model.bushings import overturned
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.jamming import explanation, jammed
 from flexclear.pipeline.dynamics.run.refusals.reach import beyond_reach, end_in_pose
 
 #: above this fraction of steps that stability limits, stiffness is named as the cause of a long run
@@ -24,11 +22,9 @@ def text(engine: Engine, rows: np.ndarray) -> str:
     """When and why the stepper stopped, in words; rows: of the record so far."""
     engine.complete()
     control, n, contacts = engine.control, engine.n, engine.model.contacts
-    turned = overturned(engine.model, engine.view(m.Y)) if "bushing" in engine.model.parts.loads else None
-    if turned is not None:
-        return f"at t = {control[m.TIME]:.6g} s: {turned}"
-    if n[m.STATUS] in LOOPS and jammed(engine):
-        return f"at t = {control[m.TIME]:.6g} s: {explanation(engine)}"
+    why = engine.explained()
+    if why is not None:
+        return f"at t = {control[m.TIME]:.6g} s: {why}"
     if n[m.STATUS] in LOOPS:
         message = beyond_reach(engine) or end_in_pose(engine, rows)
         if message:

@@ -1,4 +1,4 @@
-"""Rotation vectors of bushings, followed continuously beyond half a turn."""
+"""Rotation vectors of bushings, followed continuously beyond half a turn, which end a run at a full one."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series
 from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 #: rotation [rad] at which a bushing ends a run: at a full turn its rotation vector has no direction
 LARGEST = 6.2
@@ -38,8 +40,9 @@ def nearest(R: np.ndarray, before: np.ndarray) -> np.ndarray:
     return np.asarray(min((shortest, other), key=lambda v: float(np.sum((v - before) ** 2))))
 
 
-def overturned(model: Model, y: np.ndarray) -> str | None:
-    """What to say where a bushing has come to a full turn in state y, else None."""
+def explanation(engine: Engine) -> str | None:
+    """What to say where a bushing has come to a full turn in the engine's state, else None."""
+    model, y = engine.model, engine.view(m.Y)
     first = model.ny - model.arrays.size(m.N_INTERNAL)
     for (name, _), row in zip(model.loads, model.arrays.table(m.LOADS), strict=True):
         at = first + int(row["internal0"])
@@ -52,3 +55,21 @@ def overturned(model: Model, y: np.ndarray) -> str | None:
                     "for its torque, or give the bushing no stiffness and no damping against rotation"
                 )
     return None
+
+
+def give(model: Model, seen: Observed) -> Series:
+    """Displacement [m] and rotation vector [rad] of each second frame in the first one's axes, and their coordinate."""
+    names = [name for name, load in model.scene.forces().items() if isinstance(load, Bushing)]
+    wiring, places = model.arrays.table(m.LOADS), {name: k for k, (name, _) in enumerate(model.loads)}
+    displacement, rotation = (np.zeros((len(seen.state), len(names), 3)) for _ in range(2))
+    for k, name in enumerate(names):
+        a, b = (seen.sites[:, wiring[places[name]][end]] for end in ("a", "b"))
+        to_first = np.swapaxes(a["axes"], 1, 2)
+        displacement[:, k] = np.einsum("tij,tj->ti", to_first, b["origin"] - a["origin"])
+        first = int(wiring[places[name]]["internal0"])
+        at = model.ny - model.arrays.size(m.N_INTERNAL) + first
+        # without resistance to rotation nothing follows it
+        before = seen.state[:, at : at + 3] if first >= 0 else np.zeros((len(seen.state), 3))
+        rotation[:, k] = [nearest(R, v) for R, v in zip(to_first @ b["axes"], before, strict=True)]
+    dims = ("time", "bushing", "axis")
+    return {"bushing_displacement": (dims, displacement), "bushing_rotation": (dims, rotation)}, {"bushing": names}

@@ -2,7 +2,10 @@
 
 Nothing is compiled here, nor is anything imported that compiles: generated files (`compile.sources`), lazy imports
 (`core.scene.registry`) and the keys of results (`compile.sources.modules`) read the same tables, those of the family
-folders.
+folders, and the same declarations, those of the effects.
+
+An effect is a folder here. Its declaration is in `effect`; its other modules are called like the folder of the tower
+whose work they do for the effect, and import what modules there may: `model`, `equations`, `contact`, `run`, `record`.
 """
 
 from __future__ import annotations
@@ -15,6 +18,8 @@ from typing import TYPE_CHECKING, Any
 from flexclear.pipeline.core.scene import integrators
 from flexclear.pipeline.core.scene.ideal import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.core.scene.registry import module_of
+from flexclear.pipeline.dynamics.effects.declared import EFFECTS
+from flexclear.pipeline.dynamics.effects.effect import Effect
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
@@ -33,10 +38,9 @@ WITHOUT_SINES = {"constant", "step", "polynomial", "spline", "table", "sum", "pi
 class Parts:
     """Which kinds of parts a mechanism has, each sorted by name: all that the code of its equations depends on.
 
-    surfaces, forms, frictions: of contacts.  joint_frictions: laws of ideal joints.
-    wear: whether that of contacts is counted.  stops: whether joint coordinates have ends.
-    couplings: whether they follow each other.      harmonics: whether a law of time has some.
-    loads: their types, of expressions with their structure.  load_kinks: whether some bend.
+    surfaces, forms, frictions: of contacts.  loads: their types, of expressions with their structure.
+    effects: names, each followed by the kinds of which its code is composed.  harmonics: whether a law of time has
+    some.  load_kinks: whether loads bend.
     articulated: whether the tree is so deep that its mass matrix is factored by articulated inertias.
     """
 
@@ -45,16 +49,26 @@ class Parts:
     forms: tuple[str, ...] = ()
     frictions: tuple[str, ...] = ()
     loads: tuple[str, ...] = ()
-    stops: bool = False
-    couplings: bool = False
+    effects: tuple[str, ...] = ()
     closures: bool = False
     flexible: bool = False
-    stiffening: bool = False
     harmonics: bool = False
-    joint_frictions: tuple[str, ...] = ()
-    wear: bool = False
     load_kinks: bool = False
     articulated: bool = False
+
+    @property
+    def present(self) -> list[Effect]:
+        """The effects, in the order of their declarations."""
+        names = {one.partition(" ")[0] for one in self.effects}
+        return [effect for effect in EFFECTS if effect.name in names]
+
+    def functions(self, kind: str) -> list[Any]:
+        """What the effects declare under one of the names of `Effect`, imported now."""
+        return [effect.load(getattr(effect, kind)) for effect in self.present if getattr(effect, kind)]
+
+    def kinds(self, name: str) -> tuple[str, ...]:
+        """The kinds of which the code of an effect is composed."""
+        return next((tuple(kinds) for first, *kinds in map(str.split, self.effects) if first == name), ())
 
 
 @dataclass(frozen=True)
@@ -92,28 +106,21 @@ def most_parts(scene: Scene) -> Parts:
     ideal = {joint.type for name, joint in scene.joint.items() if name not in contacts}
     ideal |= {joints.HELD[joint.type] for joint in contacts.values() if joint.type in joints.HELD}
     paths = any(not hasattr(drive, "joint") for drive in scene.drive.values())
+    kinds = {effect.name: effect.kinds(scene) for effect in EFFECTS}
+    touching = contacts or any(effect.touches and kinds[effect.name] is not None for effect in EFFECTS)
     chained = set(joints.CHAIN) if paths or ideal - set(joints.WHOLE) else set()
     return Parts(
         joints=tuple(sorted({"free", *ideal, *chained})),
         surfaces=tuple(sorted({joint.type for joint in contacts.values()})),
-        forms=tuple(sorted(import_module(FORMS).NAMES)) if contacts or scene.stop else (),
+        forms=tuple(sorted(import_module(FORMS).NAMES)) if touching else (),
         frictions=tuple(sorted({j.friction.law for j in contacts.values() if j.friction is not None})),
         loads=tuple(sorted({load_kind(scene, name) for name in scene.forces()})),
-        stops=bool(scene.stop),
-        couplings=bool(scene.gear),
+        effects=tuple(sorted(" ".join([name, *known]) for name, known in kinds.items() if known is not None)),
         closures=True,
         flexible=bool(scene.flexible()),
-        stiffening=any(body.stiffening is not None for body in scene.flexible().values()),
         harmonics=bool(_laws(scene) - WITHOUT_SINES),
-        joint_frictions=joint_frictions(scene),
-        wear=bool(scene.worn()),
-        load_kinks=load_kinks(scene),
+        load_kinks=any(getattr(load, "bends", False) for load in scene.load.values()),
     )
-
-
-def joint_frictions(scene: Scene) -> tuple[str, ...]:
-    """Friction laws of ideal joints, sorted."""
-    return tuple(sorted({joint.friction.law for joint in scene.rubbing().values() if joint.friction is not None}))
 
 
 def load_kind(scene: Scene, name: str) -> str:
@@ -122,11 +129,6 @@ def load_kind(scene: Scene, name: str) -> str:
 
     written = formula(scene, name)
     return f"{scene.forces()[name].type} {written.code}" if written else str(scene.forces()[name].type)
-
-
-def load_kinks(scene: Scene) -> bool:
-    """Whether a load bends: its friction, or its expression."""
-    return any(getattr(load, "bends", False) for load in scene.load.values())
 
 
 def _laws(scene: Scene) -> set[str]:
@@ -147,11 +149,8 @@ def named(scene: Scene) -> Iterator[Named]:
         yield Named(NORMAL_LAWS, contact.normal.law, f"[joint.{name}.normal]")
         if contact.friction is not None:
             yield Named(FRICTION_LAWS, contact.friction.law, f"[joint.{name}.friction]")
-    for name, joint in scene.rubbing().items():
-        if joint.friction is not None:
-            yield Named(FRICTION_LAWS, joint.friction.law, f"[joint.{name}.friction]")
-    for name, stop in scene.stop.items():
-        yield Named(NORMAL_LAWS, stop.normal.law, f"[stop.{name}.normal]")
+    for effect in EFFECTS:
+        yield from (Named(f"flexclear.pipeline.dynamics.{family}", *rest) for family, *rest in effect.named(scene))
     for law in sorted(_laws(scene)):
         yield Named(LAWS, law, "law")
     for name, load in scene.load.items():

@@ -2,50 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import FRICTION_LAWS
+from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.joints.bearings import BEARINGS, SLIDER
-from flexclear.pipeline.dynamics.model.couplings import Coupling
+from flexclear.pipeline.dynamics.model.components import Floors, Group
+from flexclear.pipeline.dynamics.model.filling import Filling
+from flexclear.pipeline.dynamics.model.guards import Guard, speeds
 from flexclear.pipeline.dynamics.model.mechanism import Closure, Mechanism
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 from flexclear.pipeline.dynamics.model.wiring import closure_route, uncommon
 
 Rows = list[tuple[int, ...]]
+BENDS = m.NAMED["bends"]
+#: what presses a bearing, by its field of BENDS, and how many components it has
+PRESSES = {"along": 1, "about": 1, "one_end": 2, "other_end": 2}
 
 
-def parts(mechanism: Mechanism) -> list[int]:
-    """The independent mechanism of each joint with friction."""
-    joints = mechanism.scene.rubbing().values()
-    return [mechanism.components.of(*(mechanism.site(frame).link for frame in joint.between)) for joint in joints]
-
-
-def ledger_groups(mechanism: Mechanism, energies: np.ndarray) -> list[tuple[float, int, int]]:
-    """(floor, number of variables, independent mechanism) of the error groups.
-
-    First the loss of each joint [J], then the bristles [m] of each bearing.  energies: of each independent mechanism.
-    """
-    known = parts(mechanism)
-    joints = zip(mechanism.scene.rubbing().values(), known, strict=True)
-    bearings = [part for joint, part in joints for _ in BEARINGS[joint.type]]
-    bristles = zip(_bristles(mechanism), bearings, strict=True)
-    losses = [(energies[part], 1, part) for part in known]
-    return losses + [(size, 3, part) for size, part in bristles if size is not None]
-
-
-def _bristles(mechanism: Mechanism) -> list[float | None]:
-    """Size of the bristles of each bearing, or None."""
-    sizes = []
+def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Group]:
+    """First the loss of each joint [J], then the bristles [m] of each bearing."""
+    losses, bristles = list[Group](), list[Group]()
     for name, joint in mechanism.scene.rubbing().items():
-        sizes += [_law(name, joint).bristle(joint.friction)] * len(BEARINGS[joint.type])
-    return sizes
+        part, size = mechanism.components.of(*(mechanism.site(f).link for f in joint.between)), _bristle(name, joint)
+        losses.append((energies[part], 1, part))
+        bristles += [] if size is None else [(size, 3, part)] * len(BEARINGS[joint.type])
+    return losses + bristles
+
+
+def _bristle(name: str, joint: IdealJoint) -> float | None:
+    """Size of the bristles of each of its bearings, or None."""
+    size: float | None = _law(name, joint).bristle(joint.friction)
+    return size
 
 
 def _law(name: str, joint: IdealJoint) -> Any:
@@ -53,17 +46,32 @@ def _law(name: str, joint: IdealJoint) -> Any:
     return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
 
 
-def fill(
-    numbering: Numbering, laws: Sequence[str], closures: Sequence[Closure | Coupling], slot: int, articulated: bool
-) -> dict[Any, Any]:
+def guards(mechanism: Mechanism) -> Iterator[Guard]:
+    """Of each bearing: speeds, sliding that reverses under a law with bristles, and what presses that reverses."""
+    bearing = 0
+    for name, joint in mechanism.scene.rubbing().items():
+        law = _law(name, joint)
+        assert joint.friction is not None
+        for _ in BEARINGS[joint.type]:
+            row = bearing * BENDS.size
+            yield from speeds(BENDS, row + BENDS.sliding, 3, law.kinks(joint.friction))
+            if law.bristle(joint.friction) is not None:
+                yield (BENDS.place, row + BENDS.sliding, 3, -1, -1), 0.0, law.stick_speed(joint.friction)
+            for pressing, count in PRESSES.items():
+                yield (BENDS.place, row + getattr(BENDS, pressing), count, -1, bearing), 0.0, 0.0
+            bearing += 1
+
+
+def fill(filling: Filling) -> dict[str, Any]:
     """The tables of joints with friction and their bearings.
 
-    laws: names of those present.  closures: as the table CLOSURES has them.  slot: of the first loss in the ledger.
-    articulated: articulated inertias find what a joint transmits without terms of reactions.
+    Articulated inertias find what a joint transmits without terms of reactions.
     """
+    numbering, closures, articulated = filling.numbering, filling.closures, filling.parts.articulated
     mechanism, tables, ends = numbering.mechanism, _Tables(), closure_ends(numbering, closures)
+    laws = filling.parts.kinds("joint_friction")
+    slot = filling.slots["joint_friction"]
     bristle = numbering.nq + numbering.nv + slot + len(mechanism.scene.rubbing())
-    sizes = iter(_bristles(mechanism))
     for number, (name, joint) in enumerate(mechanism.scene.rubbing().items()):
         a, b = (mechanism.site(frame) for frame in joint.between)
         sites = numbering.site(a), numbering.site(b)
@@ -74,18 +82,18 @@ def fill(
         ranges = tables.add(list(entries), reaction, len(BEARINGS[joint.type]))
         tables.joints.append((*sites, link, int(reverse), closure, *ranges))
         for kind, side, axis in BEARINGS[joint.type]:
-            size = next(sizes)
+            size = _bristle(name, joint)
             law = laws.index(joint.friction.law) if joint.friction is not None else -1
             tables.bearings.append((number, kind, law, side, axis, bristle if size is not None else -1))
             tables.numbers.append(_numbers(name, joint, kind))
             bristle += 3 if size is not None else 0
     return {
-        m.RUBBING: tables.joints,
-        m.BEARINGS: tables.bearings,
-        m.RUBBING_ENTRIES: tables.entries,
-        m.REACTION_TERMS: tables.terms,
-        m.REACTION_LOOPS: tables.loops,
-        m.BEARING_NUMBERS: tables.numbers,
+        "rubbing": tables.joints,
+        "bearings": tables.bearings,
+        "rubbing_entries": tables.entries,
+        "reaction_terms": tables.terms,
+        "reaction_loops": tables.loops,
+        "bearing_numbers": tables.numbers,
     }
 
 

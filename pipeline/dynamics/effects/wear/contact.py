@@ -16,6 +16,9 @@ from flexclear.pipeline.dynamics.contact.forces import point_velocity, tangentia
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot, scale, sub
 
+#: of each contact in the ledger: sliding distance [m], and time integral of normal force times sliding speed [N m]
+LEDGER = m.layout("sliding load_path")
+
 
 def wearing(contacts: Callable) -> Callable:
     """The kernel of the contacts that also books sliding distance and load path of those that wear."""
@@ -28,9 +31,9 @@ def wearing(contacts: Callable) -> Callable:
         outer, inner, point = d.site_frames[contact.outer], d.site_frames[contact.inner], touch.point
         normal = scale(1.0 / d.contact_numbers[c].radius, sub(point, inner.origin))
         slip = tangential(normal, sub(point_velocity(inner, point), point_velocity(outer, point)))
-        speed, slots = np.sqrt(dot(slip, slip)), d.wear_slot + m.WEAR_LEDGER.size * k
-        d.ledger_rate[slots + m.WEAR_LEDGER.sliding] = speed
-        d.ledger_rate[slots + m.WEAR_LEDGER.load_path] = speed * touch.normal_force
+        speed, slots = np.sqrt(dot(slip, slip)), d.wear_slot + LEDGER.size * k
+        d.ledger_rate[slots + LEDGER.sliding] = speed
+        d.ledger_rate[slots + LEDGER.load_path] = speed * touch.normal_force
 
     @kernel
     def wear_if_closed(d, k):

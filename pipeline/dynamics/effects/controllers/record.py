@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from flexclear.pipeline.core.artifacts.coordinates import motion
 from flexclear.pipeline.core.scene.loads import Pid, SampledPid
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series
 from flexclear.pipeline.dynamics.loads.sampled_pid import INTEGRAL
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.loads import along_coordinates, turning_loads
 
 
-def controllers(
-    model: Model, seen: Observed
-) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
+def controllers(model: Model, seen: Observed) -> Series:
     """Force along the coordinate that a controller pushes, and its integral part [N or N m]."""
     kinds = {name: load for name, load in model.scene.forces().items() if isinstance(load, (Pid, SampledPid))}
     rows = {name: model.arrays.table(m.LOADS)[k] for k, (name, _) in enumerate(model.loads)}

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexclear.pipeline.dynamics.effects.stops.model import End
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.stops import End
 
 
 def on_stopped_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:

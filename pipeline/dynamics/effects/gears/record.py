@@ -5,14 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.coordinates import motion
-from flexclear.pipeline.dynamics.equations.observation import Observed
-from flexclear.pipeline.dynamics.model.couplings import Coupling, Side
+from flexclear.pipeline.dynamics.effects.gears.model import Coupling, Side
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series
 from flexclear.pipeline.dynamics.model.model import Model
 
 
-def gear_series(
-    model: Model, seen: Observed
-) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
+def gear_series(model: Model, seen: Observed) -> Series:
     """Force [N] or torque [N m] of every gear along its second coordinate, on the joint's second body."""
     series = {coupling.gear: _force(model, seen, c, coupling) for c, coupling in _couplings(model)}
     turns = {coupling.gear: coupling.second.coordinate.turning for _, coupling in _couplings(model)}

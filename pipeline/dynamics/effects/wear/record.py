@@ -5,21 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.effects.wear.contact import LEDGER
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series
 from flexclear.pipeline.dynamics.model.model import Model
 
 
-def wear_series(
-    model: Model, seen: Observed
-) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
+def wear_series(model: Model, seen: Observed) -> Series:
     """Sliding distance [m] and load path [N m] since the start, and the direction of the contact in both surfaces.
 
     A direction is a unit vector from the centre of a surface to the contact, in the axes of the surface's frame; zero
     while the centres coincide.
     """
-    ledger, first = seen.state[:, model.speeds.stop :], model.arrays.size(m.WEAR_SLOT)
-    rows = model.arrays.table(m.WORN)["contact"]
-    books = m.named(m.WEAR_LEDGER, ledger[:, first : first + m.WEAR_LEDGER.size * len(rows)])
+    ledger, first = seen.state[:, model.speeds.stop :], model.arrays.size(m.SIZES["wear_slot"])
+    rows = model.arrays.table(m.NAMED["worn"])["contact"]
+    books = m.named(LEDGER, ledger[:, first : first + LEDGER.size * len(rows)])
     wiring, offset = model.arrays.table(m.CONTACTS)[rows], seen.touch["offset"][:, rows]
     length = np.linalg.norm(offset, axis=-1, keepdims=True)
     outer = np.divide(offset, length, out=np.zeros_like(offset), where=length > 0.0)

@@ -11,14 +11,12 @@ import numpy as np
 
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.driving import named_coordinate
-from flexclear.pipeline.dynamics.model.gauges import Gauges
 from flexclear.pipeline.dynamics.model.merge import Placement
-from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.model.filling import Filling
     from flexclear.pipeline.dynamics.model.mechanism import Mechanism, Site
 
 
@@ -99,15 +97,15 @@ def _side(mechanism: Mechanism, text: str, path: str) -> Side:
     return Side(joint, coordinate, *sites)
 
 
-def tables(
-    coupled: Sequence[Coupling], numbering: Numbering, gauges: Gauges, poses: Sequence[Placement]
-) -> dict[Any, Any]:
-    """The tables COUPLINGS and COUPLING_NUMBERS; gauges: take those of both sides; poses: of the links at the start."""
+def fill(filling: Filling) -> dict[str, Any]:
+    """The tables of the couplings, whose offsets are those of the start."""
+    numbering, mechanism = filling.numbering, filling.numbering.mechanism
+    coupled, poses = couplings(mechanism), [link.start for link in mechanism.links]
 
     def gauge(side: Side) -> int:
-        return gauges.add(numbering.site(side.a), numbering.site(side.b), side.coordinate, counts=True)
+        return filling.gauges.add(numbering.site(side.a), numbering.site(side.b), side.coordinate, counts=True)
 
     return {
-        m.COUPLINGS: [(gauge(one.first), gauge(one.second)) for one in coupled],
-        m.COUPLING_NUMBERS: [(one.ratio, one.offset(poses)) for one in coupled],
+        "couplings": [(gauge(one.first), gauge(one.second)) for one in coupled],
+        "coupling_numbers": [(one.ratio, one.offset(poses)) for one in coupled],
     }

@@ -323,14 +323,15 @@ def find_loads(d):
     return found
 
 
-def make_joint_friction(tractions: tuple[Callable, ...], closed: bool, tree: Any) -> Callable:
+def make_joint_friction(laws: tuple[Any, ...], closed: bool, tree: Any) -> Callable:
     """The kernel joint_friction(d): accelerations, multipliers and ledger, completed by friction in joints.
 
-    To be called when accelerations and multipliers are there, before the drives' forces are.  tractions: kernels of the
-    laws present (`contact.friction`).  closed: whether there are closures.  tree: what factors the mass matrix, the
+    To be called when accelerations and multipliers are there, before the drives' forces are.  laws: modules of the laws
+    present (`contact.friction`).  closed: whether there are closures.  tree: what factors the mass matrix, the
     module `equations.articulated` or `equations.composite`.
     """
-    unit_wrench, forward, backward = make_unit_wrench(choose(tractions)), tree.forward, tree.backward
+    unit_wrench = make_unit_wrench(choose(tuple(law.traction for law in laws)))
+    forward, backward = tree.forward, tree.backward
     close, transmit, reaction = keep_closed if closed else no_loops, tree.transmit, make_reaction(tree.demand)
 
     @kernel
@@ -372,7 +373,7 @@ def make_joint_friction(tractions: tuple[Callable, ...], closed: bool, tree: Any
         for e in range(d.n_bearings):
             bearing = d.bearing[e]
             load_coordinates(d, e, bearing.load)
-            d.ledger_rate[d.rubbing_slot + d.bearings[e].joint] += bearing.load * bearing.loss
+            d.ledger_rate[d.joint_friction_slot + d.bearings[e].joint] += bearing.load * bearing.loss
         solve(d)
         for k in range(d.nv):
             d.du[k] += d.force[k]

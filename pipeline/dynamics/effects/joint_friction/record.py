@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series
 from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.run.run import Run
 
 
-def friction_series(
-    model: Model, seen: Observed
-) -> tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]:
+def friction_series(model: Model, seen: Observed) -> Series:
     """Load [N], largest sliding speed [m/s] and power [W] of the bearings of each joint, and the wrench of friction.
 
     The wrench is part of the joint's own; on its second body, about the second frame's origin.
     """
-    bearings, joints = seen.bearings, model.arrays.table(m.RUBBING)
+    bearings, joints = seen.bearings, model.arrays.table(m.NAMED["rubbing"])
     size = bearings["load"]
     wrench = {half: size[..., None] * bearings[f"unit_{half}"] for half in ("moment", "force")}
     middle = seen.sites[:, joints["site_b"]]["origin"]
@@ -43,9 +40,9 @@ def _summed(joints: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.stack([values[:, _mine(row)].sum(axis=1) for row in joints], axis=1)
 
 
-def warnings(model: Model, redundant: Collection[str]) -> list[str]:
-    """Sentences about friction that follows reactions which rigid bodies leave undetermined (of joints `redundant`)."""
-    doubted = [name for name in model.scene.rubbing() if name in redundant]
+def warnings(run: Run) -> list[str]:
+    """Sentences about friction that follows reactions which rigid bodies leave undetermined."""
+    doubted = [name for name in run.scene.rubbing() if name in run.engine.mobility.redundant_joints]
     if not doubted:
         return []
     return [

@@ -1,0 +1,1 @@
+"""Bushings: rotation vectors beyond half a turn, and how far they give."""

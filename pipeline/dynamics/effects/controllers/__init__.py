@@ -1,0 +1,1 @@
+"""Controllers along joint coordinates: samples, divergence, and what they do."""

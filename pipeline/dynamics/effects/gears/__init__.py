@@ -1,0 +1,1 @@
+"""Gears and racks: joint coordinates that follow each other."""

@@ -1,0 +1,1 @@
+"""Friction of ideal joints that follows their reactions."""

@@ -1,0 +1,72 @@
+"""The declaration of friction of ideal joints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from flexclear.pipeline.dynamics.effects.effect import Effect
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.scene.schema import Scene
+
+
+def _named(scene: Scene) -> Iterator[tuple[str, str, str]]:
+    for name, joint in scene.rubbing().items():
+        if joint.friction is not None:
+            yield "contact.friction", joint.friction.law, f"[joint.{name}.friction]"
+
+
+JOINT_FRICTION = Effect(
+    "joint_friction",
+    lambda scene: sorted({law for _, law, _ in _named(scene)}) or None,
+    "contact.friction",
+    _named,
+    wiring={
+        # site_a, site_b: of its frames; link: whose inboard joint it is, or -1; reversed: whether that link is on the
+        # side of the first frame; closure: that it is, or -1
+        "rubbing": "site_a site_b link reversed closure entry0 n_entries momentum0 n_momenta column0 n_columns loop0 "
+        "n_loops bearing0 n_bearings",
+        # where such a joint rubs. kind: see `equations`; side, axis: of its frame; bristle: as of CONTACTS
+        "bearings": "joint kind law side axis bristle",
+        "rubbing_entries": "coordinate column sign",  # what moves it; prescribed coordinates after the free ones
+        "reaction_terms": "coordinate column",  # free coordinates whose acceleration the joint of a link feels
+        "reaction_loops": "closure sign part",  # closures that act beyond it
+    },
+    # radius: arm of the friction; lever: pairs of forces at the ends per moment; axial, torsion: normal forces per
+    # force along the axis and per moment about it; preload: normal force that is always there
+    numbers={"bearing_numbers": "radius lever axial torsion preload law:6"},
+    work={
+        # unit: wrench of its friction on the joint's second body per normal force, about the kernels' origin; loss:
+        # what it takes per normal force [m/s]
+        "bearing": "load slip loss unit_moment:3 unit_force:3",
+        # what bends its friction where it reverses: sliding velocity, force along the axis, moment about it and forces
+        # at both ends as they press
+        "bends": "sliding:3 along about one_end:2 other_end:2",
+        # of the joints: without friction, then per normal force of each bearing; about the second frame's origin
+        "reactions": "moment:3 force:3",
+    },
+    # of the bearings' loads: slopes of their equations, and residuals; of the closures: multipliers without friction
+    stretches=("bearing_slopes", "bearing_residuals", "smooth_multiplier"),
+    lengths={
+        **dict.fromkeys(("bearing", "bends", "bearing_residuals"), lambda size: size("n_bearings")),
+        "reactions": lambda size: size("n_rubbing") * (1 + size("n_bearings")),
+        "bearing_slopes": lambda size: size("n_bearings") ** 2,
+        "smooth_multiplier": lambda size: size("n_closure_rows") if size("n_bearings") else 0,
+    },
+    compose={
+        "evaluate": {
+            "friction": "(<equations.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "
+            "<equations.load_drives>)"
+        },
+        "observe": {"friction": "<equations.take_off_closures>"},
+    },
+    iterates=True,
+    fill="model:fill",
+    ledger="model:ledger",
+    guards="model:guards",
+    losses="run:losses",
+    explains="run:explanation",
+    records={("joint_bearing", "joint_sliding", "joint_friction_"): "record:friction_series"},
+    warns="record:warnings",
+)

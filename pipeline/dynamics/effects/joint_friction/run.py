@@ -1,0 +1,48 @@
+"""What friction of ideal joints loses, and in words why it may have no solution."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.ledger import Losses
+
+#: why a run stops, whether or not a trial jammed at last
+OTHERWISE = (m.CAP_REACHED, m.NOT_A_NUMBER, m.STUCK_EVENT, m.STEPPED_OVER)
+
+
+def losses(model: Model) -> Losses:
+    """What each joint loses."""
+    joints = model.scene.rubbing().items()
+    sites = [(model.mechanism.site(joint.between[0]), model.mechanism.site(joint.between[1])) for _, joint in joints]
+    return "joint_friction_loss", "rubbing", sites, [f"the friction of joint {name}" for name, _ in joints]
+
+
+def explanation(engine: Engine) -> str | None:
+    """Why the last evaluation found no loads of the bearings that friction could grow to; None where it did."""
+    if engine.n[m.EVALUATION] != m.JAMMED or engine.n[m.STATUS] in OTHERWISE:
+        return None
+    names, gains = list(engine.model.scene.rubbing()), _gains(engine)
+    worst = int(np.argmax(gains))
+    return (
+        f"the friction of joint {names[worst]} presses the joint the more, the more it rubs (by {gains[worst]:.3g} of "
+        "each newton): it jams, and rigid bodies with Coulomb's law have no motion there, or several (Painleve's "
+        "paradox); a smaller coefficient, a longer guide or a flexible body next to the joint is the remedy"
+    )
+
+
+def _gains(engine: Engine) -> np.ndarray:
+    """How much friction of each joint adds to the normal forces of its own bearings, per normal force there."""
+    arrays, size = engine.model.arrays, engine.model.arrays.size(m.SIZES["n_bearings"])
+    reactions = engine.table(m.NAMED["reactions"]).reshape(-1, 1 + size)
+    levers = arrays.table(m.NAMED["bearing_numbers"])["lever"]
+    gains = []
+    for row, mine in zip(arrays.table(m.NAMED["rubbing"]), reactions, strict=True):
+        own = range(row["bearing0"], row["bearing0"] + row["n_bearings"])
+        felt = [
+            np.linalg.norm(mine[1 + e]["force"]) + 2.0 * levers[e] * np.linalg.norm(mine[1 + e]["moment"]) for e in own
+        ]
+        gains.append(max(felt))
+    return np.array(gains)

@@ -1,0 +1,1 @@
+"""Bending shortens beams, which stiffens them when they turn or are pulled."""

@@ -1,0 +1,1 @@
+"""Stops: contacts at the ends of joint coordinates."""

@@ -1,0 +1,19 @@
+"""The declaration of wear.
+
+Sliding distance and load path are part of the state, so that steps and impacts are as exact in them as in the motion.
+"""
+
+from __future__ import annotations
+
+from flexclear.pipeline.dynamics.effects.effect import Effect
+
+WEAR = Effect(
+    "wear",
+    lambda scene: () if scene.worn() else None,
+    wiring={"worn": "contact"},  # contacts whose wear is counted
+    compose={"forces": {"contacts": "<contact.wearing>({file.given[contacts]})"}},
+    changeable=("joint.wear",),
+    fill="model:fill",
+    ledger="model:ledger",
+    records={("wear_",): "record:wear_series"},
+)

@@ -1,0 +1,26 @@
+"""The contacts that wear, and their variables in the ledger."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flexclear.pipeline.dynamics.model.components import Floors, Group
+from flexclear.pipeline.dynamics.model.contacts import part_of
+from flexclear.pipeline.dynamics.model.filling import Filling
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism
+
+
+def _worn(mechanism: Mechanism) -> list[int]:
+    names = [contact.name for contact in mechanism.contacts]
+    return [names.index(name) for name in mechanism.scene.worn()]
+
+
+def fill(filling: Filling) -> dict[str, Any]:
+    """The table of the contacts that wear."""
+    return {"worn": _worn(filling.numbering.mechanism)}
+
+
+def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Group]:
+    """Sliding distance and load path of each contact that wears."""
+    parts = [part_of(mechanism, mechanism.contacts[k]) for k in _worn(mechanism)]
+    return [(floor[part], 1, part) for part in parts for floor in (lengths, energies)]
