@@ -71,7 +71,9 @@ def test_points_are_the_same_to_the_last_bit_whoever_is_beside_them(root: Path, 
     assert evaluations_abreast == ([points_of.ABREAST] * 3 if not INTERPRETED else [])
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "exponential"])  # that evaluates with the kernels now and then
+@pytest.mark.parametrize(
+    "integrator", ["dop853", "dopri5", "exponential"]
+)  # that evaluates with the kernels now and then
 def test_points_of_a_closed_mechanism_with_friction_are_the_same_to_the_last_bit(
     root: Path, monkeypatch: pytest.MonkeyPatch, integrator: str
 ) -> None:

@@ -11,7 +11,6 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
 from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate.method import MADE, LOST, await_rates, slope
+from flexclear.pipeline.dynamics.integrate.method import LOST, MADE, await_rates, slope
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
