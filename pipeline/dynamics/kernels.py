@@ -38,7 +38,8 @@ def lowering() -> Any:
     if not release_is_tested():
         return None
     try:
-        made = import_module("flexclear.pipeline.dynamics.lowering")
+        from flexclear.pipeline.dynamics import lowering as made
+
         return made if made.works() else None
     except Exception:  # whatever Numba raises where it is given what it does not know
         return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
@@ -77,7 +78,8 @@ def test_who_leads_is_called_back_for_a_stepper_that_comes_later() -> None:
     def run(words: np.ndarray) -> None:
         begun.set()
         if len(called) == 0:
-            while not made._table[lanes.WANTED]:
+            until = time.monotonic() + 60.0
+            while not made._table[lanes.WANTED] and time.monotonic() < until:
                 pass
         called.append(int((words[:, 0] == lanes.READY).sum()))
         if len(called) > 1:

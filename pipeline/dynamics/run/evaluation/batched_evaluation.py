@@ -74,7 +74,7 @@ class LaneGroup:
                 self._words[lane] = steps.words
         self._run(*(array.ctypes.data for array in (self._table, self._places, self._numbers)))
         for lane in np.flatnonzero(self._words[:, 0] == lanes.DONE):
-            self._free(lane)
+            self._free(int(lane))
 
     def _free(self, lane: int) -> None:
         self._words[lane, 0] = lanes.IDLE
