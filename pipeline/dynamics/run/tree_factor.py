@@ -66,9 +66,10 @@ def bias_changes(engine: Engine, change: Callable[[int], np.ndarray]) -> np.ndar
     def changed(table: Any) -> np.ndarray:
         return m.named(table, change(table.place))
 
-    there, moved = tuple(map(engine.table, WRENCHES)), tuple(map(changed, WRENCHES))
-    at, on = _beyond(model, *_wrenches(*there)), _wrenches(*moved[:2], there[2])
-    on = _beyond(model, on[0] + np.cross(moved[2]["origin"], there[1]["own_force"]), on[1])
+    loads, bodies, frames = map(engine.table, WRENCHES)
+    moments, forces = _wrenches(changed(m.WRENCH), changed(m.ARTICULATED), frames)
+    moments = moments + np.cross(changed(m.LINK_FRAMES)["origin"], bodies["own_force"])
+    at, on = _beyond(model, *_wrenches(loads, bodies, frames)), _beyond(model, moments, forces)
     columns, turned = engine.table(m.COLUMNS), changed(m.COLUMNS)
     kept = _along(model, columns["angular"], on[0]) + _along(model, columns["linear"], on[1])
     return kept + _along(model, turned["angular"], at[0]) + _along(model, turned["linear"], at[1])

@@ -132,7 +132,7 @@ def plain(kernel: Any) -> Callable:
 
 def seeded(values: np.ndarray, changes: np.ndarray) -> list[Any]:
     """Return numbers of an array with their changes, shape (directions, len(values)); none where all are zero."""
-    moving = changes.any(axis=0)
+    moving = np.any(changes != 0.0, axis=0).tolist()
     return [Dual(v, changes[:, k].copy()) if moving[k] else v for k, v in enumerate(values)]
 
 
