@@ -12,8 +12,8 @@ from tests.analytic.linear_runs import frequencies
 from tests.analytic.mechanism_runs import TREE, bundles
 
 G = 9.81
-#: differences of smooth forces are wanted to 1e-7 and reach some 1e-11
-SMOOTH = 1e-9
+#: rounding of some hundred products
+SMOOTH = 1e-12
 
 
 def hertz(omega_squared: float | np.ndarray) -> np.ndarray:

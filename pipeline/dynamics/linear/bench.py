@@ -58,6 +58,11 @@ class Bench:
         """What counts as far for each drive: a radian, or the mechanism's size [m]; shape (known,)."""
         return np.array([1.0 if p.dimension == "angle" else self.model.length for p in prescribed(self.model.scene)])
 
+    @property
+    def fastest(self) -> float:
+        """Speed of the fastest drive [1/s]: radians, or sizes of the mechanism, per second."""
+        return float(np.max(np.abs(self.drives[:, 1]) / self.units, initial=0.0))
+
 
 @dataclass(frozen=True)
 class Balance:
@@ -212,3 +217,14 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
         engine.rows(m.JACOBIAN) @ modes.T,
         engine.view(m.RESIDUAL_RATE)[selection.kept_places(engine.model, engine.h)],
     )
+
+
+def balancing(bench: Bench) -> float:
+    """Size of the forces that balance each other in the state evaluated last, as moments [N m].
+
+    Those of inertia, gravity, loads and contacts on each link and what it carries, and those of each load and contact
+    alone.  What is left of them along the free coordinates says nothing: in balance that is rounding.
+    """
+    wrenches, loads, touch = (bench.engine.table(table) for table in (m.WRENCH, m.LOAD, m.TOUCH))
+    forces = [bench.model.length * rows["force"] for rows in (wrenches, loads, touch)]
+    return max(float(np.max(np.abs(v), initial=0.0)) for v in [*forces, wrenches["moment"], loads["moment"]])

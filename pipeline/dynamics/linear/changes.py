@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics.linear.bench import Bench, state
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.model.interface_basis import modes_of
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
-from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias_changes
+from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias
 from flexclear.pipeline.dynamics.specialise import dual
 
 
@@ -39,11 +39,10 @@ def force_changes(bench: Bench, q: np.ndarray, directions: np.ndarray, multiplie
     with np.errstate(all="ignore"):  # as in compiled code, what is not used may be infinite
         _rates(model.parts)(h, list(model.arrays.f), w, engine.n.tolist(), h[m.Y], h[m.SLOPES])
 
-    def change(stretch: int) -> np.ndarray:
-        return dual.changes(w[h[stretch] : h[stretch] + engine.lengths[stretch]], count)
-
-    rows = selection.dense(model, engine.h, change(m.JACOBIAN))
-    return (bias_changes(engine, change) - multipliers @ rows) @ modes_of(model.arrays).T
+    o = h[m.JACOBIAN]
+    rows = selection.dense(model, engine.h, dual.changes(w[o : o + engine.lengths[m.JACOBIAN]], count))
+    forces = dual.changes(bias(engine, np.array(w, dtype=object)), count)
+    return (forces - multipliers @ rows) @ modes_of(model.arrays).T
 
 
 @cache

@@ -20,8 +20,7 @@ from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, closed, hold, set_drives
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, closed, hold, set_drives
 from flexclear.pipeline.dynamics.linear.equilibrium import BALANCED, LONGEST, SHORT, Equilibrium, descend, residual
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, stiffness, tangent
 from flexclear.pipeline.dynamics.linear.vibrations import NOTHING, Vibrations, vibrations
@@ -126,7 +125,7 @@ def newton(bench: Bench, q: np.ndarray) -> Equilibrium:
     at, last, iteration = tangent(bench, q), np.inf, 0
     size = bench.model.speed_scales
     for iteration in range(1, CORRECTIONS + 1):
-        forces = _forces(bench) * float(np.linalg.norm(np.abs(at.Z).T @ (1.0 / size)))
+        forces = balancing(bench) * float(np.linalg.norm(np.abs(at.Z).T @ (1.0 / size)))
         step = _correction(bench, at, BALANCED * forces)
         length = float(np.max(np.abs(step) / size, initial=0.0))
         if length <= SHORT or (length <= ROUNDED and length > CONTRACTION * last):
@@ -161,11 +160,11 @@ def _correction(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
 
 def _require_steady(bench: Bench, at: Tangent) -> None:
     """SolverError unless the pose stays in balance, and the loops closed, while the drives move on."""
-    fastest = float(np.max(np.abs(bench.drives[:, 1]) / bench.units, initial=0.0))
+    fastest = bench.fastest
     if fastest == 0.0:
         return
     model, before = bench.model, balance(bench, at.q)
-    forces = _forces(bench)
+    forces = balancing(bench)
     along = built_rows(model, bench.engine.h) == 0
     loops = float(np.max(np.abs(before.slip) / np.where(along, model.length, 1.0), initial=0.0))
     if loops <= STEADY * fastest:
@@ -173,7 +172,7 @@ def _require_steady(bench: Bench, at: Tangent) -> None:
             bench, bench.drives + np.stack([PROBE * bench.drives[:, 1] / fastest, 0.0 * bench.drives[:, 1]], axis=1)
         )
         after = balance(bench, at.q)
-        forces = max(forces, _forces(bench))
+        forces = max(forces, balancing(bench))
         set_drives(bench, bench.drives)
         change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))
         if change <= STEADY * forces + _rounding(bench, at):
@@ -204,14 +203,3 @@ def _require_turning_frames(bench: Bench) -> None:
                 f"no pose of it is steady; give it a joint of type `free` with the frames of the bushing {name}: "
                 f'between = ["{load.between[0]}", "{load.between[1]}"]'
             )
-
-
-def _forces(bench: Bench) -> float:
-    """Size of the forces that balance each other in the state evaluated last, as moments [N m].
-
-    Those of inertia, gravity, loads and contacts on each link and what it carries, and those of each load and contact
-    alone.  What is left of them along the free coordinates says nothing: in balance that is rounding.
-    """
-    wrenches, loads, touch = (bench.engine.table(table) for table in (m.WRENCH, m.LOAD, m.TOUCH))
-    forces = [bench.model.length * rows["force"] for rows in (wrenches, loads, touch)]
-    return max(float(np.max(np.abs(v), initial=0.0)) for v in [*forces, wrenches["moment"], loads["moment"]])

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, displacement_map
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, displacement_map
 from flexclear.pipeline.dynamics.linear.changes import force_changes
 
 #: singular values of the closures below this fraction of the largest are redundant rows
@@ -75,21 +75,27 @@ def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarra
     """Forces per displacement along motions (columns), shape (n, n) [1/s^2], and what rounding does to each column."""
     directions = np.zeros((motions.shape[1], bench.model.ny))
     directions[:, : len(at.q)] = (at.moves @ motions).T
-    return _along(motions, at, bench, force_changes(bench, at.q, directions, at.multipliers))
+    changes = force_changes(bench, at.q, directions, at.multipliers)
+    return motions.T @ changes.T, _rounding(bench, motions, changes, balancing(bench))
 
 
 def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces per speed along motions (columns), gyroscopic ones included, shape (n, n) [1/s], and rounding likewise."""
     directions = np.zeros((motions.shape[1], bench.model.ny))
     directions[:, bench.model.speeds] = motions.T
-    return _along(motions, at, bench, force_changes(bench, at.q, directions, np.zeros_like(at.multipliers)))
+    changes = force_changes(bench, at.q, directions, np.zeros_like(at.multipliers))
+    turning = bench.fastest
+    return motions.T @ changes.T, _rounding(bench, motions, changes, balancing(bench) / turning if turning else 0.0)
 
 
-def _along(motions: np.ndarray, at: Tangent, bench: Bench, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Changes of forces along motions, (n, n), and rounding of each column: of all terms, whatever is left of them."""
+def _rounding(bench: Bench, motions: np.ndarray, changes: np.ndarray, forces: float) -> np.ndarray:
+    """What rounding does to changes of forces along motions, by the size of all that is summed up, shape (n,).
+
+    forces: that balance, as moments, per displacement or speed: what they leave may itself be rounding.
+    """
     reach = np.max(np.abs(motions) / bench.model.speed_scales[:, None], axis=0, initial=0.0)
-    terms = np.linalg.norm(np.abs(motions).T @ np.abs(changes).T, axis=0) + magnitude(motions, at.bias) * reach
-    return motions.T @ changes.T, EPSILON * terms
+    terms = np.linalg.norm(np.abs(motions).T @ np.abs(changes).T, axis=0)
+    return EPSILON * np.asarray(terms + forces * reach * np.linalg.norm(reach))
 
 
 def magnitude(motions: np.ndarray, bias: np.ndarray) -> float:

@@ -1,8 +1,8 @@
 r"""Natural vibrations about an equilibrium, or about steady motion: :math:`\ddot z + D\dot z + Kz = 0`.
 
-Stiff contacts next to soft pendulums: a stiffness differenced along mixed directions would leave rounding of the stiff
-ones in the soft. So it is taken twice, the second time along the vibrations that the first gave, and the eigenvalue
-problem is solved in coordinates scaled by their own frequency.
+Stiff contacts next to soft pendulums: a stiffness taken along mixed directions leaves rounding of the stiff ones in the
+soft. So it is taken twice, the second time along the vibrations that the first gave, and the eigenvalue problem is
+solved in coordinates scaled by their own frequency.
 
 Source: Meirovitch, *Principles and Techniques of Vibrations*, ch. 4 (undamped), 6 and 11 (damped, gyroscopic).
 """
@@ -17,7 +17,7 @@ import scipy.linalg
 from flexclear.pipeline.dynamics.linear.bench import Bench
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, damping, stiffness
 
-#: an eigenvalue of the stiffness within this many estimated errors of zero is zero
+#: an eigenvalue of the stiffness within this many roundings of zero is zero
 NOTHING = 10.0
 #: the same, as a fraction of the largest eigenvalue
 NOTHING_BESIDE = 1e-13
@@ -76,7 +76,7 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
 
 
 def _limp(K: np.ndarray, error: np.ndarray) -> np.ndarray:
-    """Which motions have no stiffness as far as the differences can show."""
+    """Which motions have no stiffness as far as rounding shows."""
     own = np.abs(np.diag(K))
     return own <= np.maximum(NOTHING * error, NOTHING_BESIDE**2 * own.max())
 

@@ -10,7 +10,7 @@ Source: Griewank & Walther, *Evaluating Derivatives*, 2nd ed. (2008), sec. 3.1 (
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,7 @@ class Dual:
 
     __slots__ = ("change", "value")
     __hash__ = None  # type: ignore[assignment]
+    __array_ufunc__ = None  # numbers of NumPy leave what they do with one to it
 
     def __init__(self, value: Any, change: Any) -> None:
         self.value, self.change = value, change
@@ -132,11 +133,11 @@ def plain(kernel: Any) -> Callable:
 
 def seeded(values: np.ndarray, changes: np.ndarray) -> list[Any]:
     """Return numbers of an array with their changes, shape (directions, len(values)); none where all are zero."""
-    moving = changes.any(axis=0)
+    moving = np.any(changes != 0.0, axis=0).tolist()
     return [Dual(v, changes[:, k].copy()) if moving[k] else v for k, v in enumerate(values)]
 
 
-def changes(numbers: Sequence[Any], directions: int) -> np.ndarray:
+def changes(numbers: Iterable[Any], directions: int) -> np.ndarray:
     """Return the changes of numbers, shape (directions, len(numbers))."""
     nothing = np.zeros(directions)
     made = [number.change if isinstance(number, Dual) else nothing for number in numbers]

@@ -42,8 +42,10 @@ class Plain:
         return self._made[id(value)]
 
     def _plain(self, value: Any) -> Any:
-        if isinstance(value, Kernel) or (INTERPRETED and isinstance(value, FunctionType)):
-            return self._kernel(getattr(value, "py_func", value))
+        if isinstance(value, Kernel):
+            return self._kernel(value.py_func)
+        if INTERPRETED and isinstance(value, FunctionType):
+            return self._kernel(value)
         if isinstance(value, ModuleType):
             return self._functions if value is np else _Names(self, value)
         if isinstance(value, tuple):

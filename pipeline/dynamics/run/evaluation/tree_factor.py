@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-
-#: tables that hold what acts on links
-WRENCHES = (m.WRENCH, m.ARTICULATED, m.LINK_FRAMES)
 
 
 def mass_factor(engine: Engine) -> np.ndarray:
@@ -42,54 +37,30 @@ def _from_gains(engine: Engine) -> np.ndarray:
     return L
 
 
-def bias(engine: Engine) -> np.ndarray:
-    """Return the generalised forces that the motion needs without free accelerations, shape (nv,)."""
-    model = engine.model
-    if not model.parts.articulated:
-        return engine.view(m.BIAS)[: model.nv].copy()
-    moments, forces = _beyond(model, *_wrenches(*map(engine.table, WRENCHES)))
-    columns = engine.table(m.COLUMNS)
-    return _along(model, columns["angular"], moments) + _along(model, columns["linear"], forces)
+def bias(engine: Engine, w: np.ndarray | None = None) -> np.ndarray:
+    """Return the generalised forces that the motion needs without free accelerations, shape (nv,).
 
-
-def bias_changes(engine: Engine, change: Callable[[int], np.ndarray]) -> np.ndarray:
-    """Return the changes of `bias` along directions, shape (directions, nv).
-
-    change(stretch): those of a stretch of the work space, (directions, length).
+    w: the work space; that of the last evaluation, or one of numbers with changes (`specialise.dual`).
     """
-    model = engine.model
+    model, w = engine.model, engine.w if w is None else w
+
+    def stretch(index: int) -> np.ndarray:
+        return w[engine.h[index] : engine.h[index] + engine.lengths[index]]
+
+    def vectors(table: Any, field: int) -> np.ndarray:
+        return stretch(table.place).reshape(-1, table.size)[:, field : field + 3]
+
     if not model.parts.articulated:
-        return change(m.BIAS)[:, : model.nv]
-
-    def changed(table: Any) -> np.ndarray:
-        return m.named(table, change(table.place))
-
-    there, moved = tuple(map(engine.table, WRENCHES)), tuple(map(changed, WRENCHES))
-    at, on = _beyond(model, *_wrenches(*there)), _wrenches(*moved[:2], there[2])
-    on = _beyond(model, on[0] + np.cross(moved[2]["origin"], there[1]["own_force"]), on[1])
-    columns, turned = engine.table(m.COLUMNS), changed(m.COLUMNS)
-    kept = _along(model, columns["angular"], on[0]) + _along(model, columns["linear"], on[1])
-    return kept + _along(model, turned["angular"], at[0]) + _along(model, turned["linear"], at[1])
-
-
-def _wrenches(loads: np.ndarray, bodies: np.ndarray, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return moments and forces on the links and what they carry, shape (..., links, 3)."""
-    moments = loads["moment"] + bodies["own_moment"] + np.cross(frames["origin"], bodies["own_force"])
-    return moments, loads["force"] + bodies["own_force"]
-
-
-def _beyond(model: Model, *wrenches: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return those of each link with all links beyond it."""
-    for total in wrenches:
-        for i in range(len(model.links) - 1, 0, -1):
-            total[..., model.links[i].branch.parent, :] += total[..., i, :]
-    return wrenches
-
-
-def _along(model: Model, columns: np.ndarray, total: np.ndarray) -> np.ndarray:
-    """Return the products of the columns of coordinates with what acts on their links, shape (..., nv)."""
-    pairs = [(k, i) for i, mine in enumerate(model.numbering.coordinates) if i for k in mine if k < model.nv]
-    coordinates, links = np.array(pairs, dtype=np.int64).reshape(-1, 2).T
-    made = np.zeros((*np.broadcast_shapes(columns.shape[:-2], total.shape[:-2]), model.nv))
-    made[..., coordinates] = np.sum(columns[..., coordinates, :] * total[..., links, :], axis=-1)
-    return made
+        return stretch(m.BIAS)[: model.nv].copy()
+    carried, origins = vectors(m.ARTICULATED, m.ARTICULATED.own_force), vectors(m.LINK_FRAMES, m.LINK_FRAMES.origin)
+    moments = vectors(m.WRENCH, m.WRENCH.moment) + vectors(m.ARTICULATED, m.ARTICULATED.own_moment)
+    moments, pushes = moments + np.cross(origins, carried), vectors(m.WRENCH, m.WRENCH.force) + carried
+    turns, shifts = vectors(m.COLUMNS, m.COLUMNS.angular), vectors(m.COLUMNS, m.COLUMNS.linear)
+    forces = np.zeros(model.nv, dtype=w.dtype)
+    for i in range(len(moments) - 1, 0, -1):
+        for k in (c for c in model.numbering.coordinates[i] if c < model.nv):
+            forces[k] = np.sum(turns[k] * moments[i] + shifts[k] * pushes[i])
+        above = model.links[i].branch.parent
+        moments[above] += moments[i]
+        pushes[above] += pushes[i]
+    return forces
