@@ -260,6 +260,11 @@ def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
     return {name: functions.digest(text) for name, text in sources(found, scheme).items()}
 
 
+def test_the_tables_of_all_effects_are_part_of_the_key() -> None:
+    """They decide where kernels find the others: code of another map of the memory must not be taken."""
+    assert {f"{PACKAGE}.{effect.name}.effect" for effect in DECLARED} <= reached(sources(CASES["tree"][0], SCHEME))
+
+
 def test_the_numbers_of_event_kinds_are_part_of_the_key() -> None:
     """Kernels have them compiled in, and datasets hold them: code of another numbering must not be taken."""
     assert "flexclear.pipeline.core.scene.event_kinds" in reached(sources(CASES["clearance"][0], SCHEME))

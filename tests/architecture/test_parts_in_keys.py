@@ -140,6 +140,11 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
     known = Sources(root).closure(["flexclear.stages.simulation", *modules(scene)]).keys()
     assert module in reached
     assert reached <= set(known)
-    assert module not in modules(scene_with({"type": "cylindrical"}))
+    without = modules(scene_with({"type": "cylindrical"}))
+    assert module not in without
+    for effect in parts.present:
+        assert effect.modules
+        assert effect.modules <= set(modules(scene))
+        assert effect.modules & set(without) == set()
     if family == "stop":
         assert "flexclear.pipeline.dynamics.contact.normal.flores" in modules(scene)

@@ -165,11 +165,6 @@ def no_energy(d, component):
 
 
 @kernel
-def no_couplings(d):
-    """No closure acts on four links."""
-
-
-@kernel
 def no_friction(d, out, column):
     """No joint rubs."""
 
@@ -250,7 +245,7 @@ def make_observation(
     kinematics, laws = make_kinematics(joints, flexible), make_laws(harmonics)
     forces = make_forces(flexible, contacts, loads, stops)
     modal_inertia = nothing if flexible is None else flexible.modal_inertia
-    couple = no_couplings if couplings is None else couplings
+    couple = nothing if couplings is None else couplings
     rub = no_friction if friction is None else friction
     flexible_energy = no_energy if flexible is None else flexible.energies
 

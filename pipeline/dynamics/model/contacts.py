@@ -47,7 +47,7 @@ def fill(
         length = mechanism.components.lengths[part_of(mechanism, contact)]
         friction_kind, numbers, stick = -1, (0.0,) * 6, 0.0
         if joint.friction is not None:
-            friction = _friction(name, joint)
+            friction = friction_law(name, joint)
             friction_kind = parts.frictions.index(joint.friction.law)
             numbers, stick = friction.parameters(joint.friction), friction.stick_speed(joint.friction)
         if isinstance(joint, End):
@@ -87,7 +87,7 @@ def _bristle_places(numbering: Numbering, slot: int) -> list[int]:
 
 def _bristles(mechanism: Mechanism) -> list[float | None]:
     return [
-        None if joint.friction is None else _friction(name, joint).bristle(joint.friction)
+        None if joint.friction is None else friction_law(name, joint).bristle(joint.friction)
         for name, joint, *_ in mechanism.contacts
     ]
 
@@ -99,8 +99,8 @@ def _floor(joint: Clearance | End, length: float) -> float:
     return LEAST_RATE if ends_an_angle(joint) else min(LEAST_RATE, SLOW * length)
 
 
-def _friction(name: str, joint: Clearance | End) -> Any:
-    assert joint.friction is not None
+def friction_law(name: str, joint: Any) -> Any:
+    """The friction law of a joint that has one."""
     return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects import FRICTION_LAWS, Parts
+from flexclear.pipeline.dynamics.effects import Parts
+from flexclear.pipeline.dynamics.model.contacts import friction_law
 from flexclear.pipeline.dynamics.model.loads import Loaded
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 
@@ -35,7 +35,7 @@ def speeds(table: Any, offset: int, count: int, levels: tuple[float, ...], conta
 def _of_contacts(mechanism: Mechanism) -> Iterator[Guard]:
     for c, (name, joint, *_) in enumerate(mechanism.contacts):
         if joint.friction is not None:
-            law = lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
+            law = friction_law(name, joint)
             yield from speeds(m.TOUCH, c * m.TOUCH.size + m.TOUCH.slip, 1, law.kinks(joint.friction), c)
 
 

@@ -148,25 +148,9 @@ def filled(
         },
         numbering.columns,
     )
-    return Model(
-        mechanism,
-        numbering,
-        parts,
-        arrays,
-        mechanism.scene,
-        mechanism.links,
-        ordered,
-        mechanism.contacts,
-        normals,
-        loaded.loads,
-        mechanism.drives,
-        mechanism.drive_signs,
-        gravity,
-        mechanism.length,
-        numbering.nq,
-        numbering.nv,
-        len(groups),
-    )
+    of_mechanism = (mechanism.drives, mechanism.drive_signs, gravity, mechanism.length)
+    made = (mechanism, numbering, parts, arrays, mechanism.scene, mechanism.links, ordered, mechanism.contacts, normals)
+    return Model(*made, loaded.loads, *of_mechanism, numbering.nq, numbering.nv, len(groups))
 
 
 def _recorded(mechanism: Mechanism) -> dict[Any, Any]:
@@ -201,20 +185,18 @@ def _symmetric(J: np.ndarray) -> list[float]:
 DEEP = 8.0
 #: tables that follow from links, joints, frames and flexible bodies alone
 WIRED = (
+    *(m.LINKS, m.SITES, m.SITE_NUMBERS, m.FLEXES, m.BASIS, m.MOMENTS, m.MOMENT_ROWS, m.PORTS, m.PAIRS, m.KNOWN_PAIRS),
     *(
-        m.LINKS,
-        m.SITES,
-        m.SITE_NUMBERS,
-        m.FLEXES,
-        m.BASIS,
-        m.MOMENTS,
-        m.MOMENT_ROWS,
-        m.PORTS,
-        m.PAIRS,
-        m.KNOWN_PAIRS,
         m.ENVELOPE,
+        m.CLOSURES,
+        m.CLOSURE_ROWS,
+        m.SUPPORT,
+        m.PATHS,
+        m.ENTRIES,
+        m.KNOWN_ENTRIES,
+        m.CLOSURE_PAIRS,
+        m.COMMON,
     ),
-    *(m.CLOSURES, m.CLOSURE_ROWS, m.SUPPORT, m.PATHS, m.ENTRIES, m.KNOWN_ENTRIES, m.CLOSURE_PAIRS, m.COMMON),
     *(m.CLOSURE_ENVELOPE, m.FLEX_NUMBERS, m.FLEX_DATA, m.MOMENT_VALUES, m.PORT_NUMBERS, m.PORT_DATA),
     *(m.BASIS_VALUES, m.INTERFACE_DATA),
 )

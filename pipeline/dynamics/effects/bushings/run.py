@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
@@ -21,12 +23,18 @@ def rotations(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int
     sites: frames of all sites, rows of SITE_FRAMES with named fields.  internal: states that the vectors continue.
     """
     vectors = {}
-    for (name, _), row in zip(model.loads, model.arrays.table(m.LOADS), strict=True):
+    for row in _rows(model).values():
         first = int(row["internal0"])
-        if first >= 0 and isinstance(model.scene.load[name], Bushing):
+        if first >= 0:
             R = sites[row["a"]]["axes"].T @ sites[row["b"]]["axes"]
             vectors[first] = nearest(R, internal[first : first + 3])
     return vectors
+
+
+def _rows(model: Model) -> dict[str, Any]:
+    """Row of LOADS of every bushing by name, as the scene has them."""
+    rows = {name: row for (name, _), row in zip(model.loads, model.arrays.table(m.LOADS), strict=True)}
+    return {name: rows[name] for name, load in model.scene.forces().items() if isinstance(load, Bushing)}
 
 
 def nearest(R: np.ndarray, before: np.ndarray) -> np.ndarray:
@@ -44,32 +52,30 @@ def explanation(engine: Engine) -> str | None:
     """What to say where a bushing has come to a full turn in the engine's state, else None."""
     model, y = engine.model, engine.view(m.Y)
     first = model.ny - model.arrays.size(m.N_INTERNAL)
-    for (name, _), row in zip(model.loads, model.arrays.table(m.LOADS), strict=True):
+    for name, row in _rows(model).items():
         at = first + int(row["internal0"])
-        if isinstance(model.scene.load[name], Bushing) and row["internal0"] >= 0:
-            angle = float(np.linalg.norm(y[at : at + 3]))
-            if angle > 0.99 * LARGEST:
-                return (
-                    f"bushing {name} has turned by {np.degrees(angle):.0f} deg: it is an elastic mount, whose rotation "
-                    "vector loses its direction at a full turn; let a joint carry the turning, with a joint-spring "
-                    "for its torque, or give the bushing no stiffness and no damping against rotation"
-                )
+        angle = float(np.linalg.norm(y[at : at + 3])) if row["internal0"] >= 0 else 0.0
+        if angle > 0.99 * LARGEST:
+            return (
+                f"bushing {name} has turned by {np.degrees(angle):.0f} deg: it is an elastic mount, whose rotation "
+                "vector loses its direction at a full turn; let a joint carry the turning, with a joint-spring "
+                "for its torque, or give the bushing no stiffness and no damping against rotation"
+            )
     return None
 
 
 def give(model: Model, seen: Observed) -> Series:
     """Displacement [m] and rotation vector [rad] of each second frame in the first one's axes, and their coordinate."""
-    names = [name for name, load in model.scene.forces().items() if isinstance(load, Bushing)]
-    wiring, places = model.arrays.table(m.LOADS), {name: k for k, (name, _) in enumerate(model.loads)}
-    displacement, rotation = (np.zeros((len(seen.state), len(names), 3)) for _ in range(2))
-    for k, name in enumerate(names):
-        a, b = (seen.sites[:, wiring[places[name]][end]] for end in ("a", "b"))
+    rows = _rows(model)
+    displacement, rotation = (np.zeros((len(seen.state), len(rows), 3)) for _ in range(2))
+    for k, row in enumerate(rows.values()):
+        a, b = (seen.sites[:, row[end]] for end in ("a", "b"))
         to_first = np.swapaxes(a["axes"], 1, 2)
         displacement[:, k] = np.einsum("tij,tj->ti", to_first, b["origin"] - a["origin"])
-        first = int(wiring[places[name]]["internal0"])
+        first = int(row["internal0"])
         at = model.ny - model.arrays.size(m.N_INTERNAL) + first
         # without resistance to rotation nothing follows it
         before = seen.state[:, at : at + 3] if first >= 0 else np.zeros((len(seen.state), 3))
         rotation[:, k] = [nearest(R, v) for R, v in zip(to_first @ b["axes"], before, strict=True)]
     dims = ("time", "bushing", "axis")
-    return {"bushing_displacement": (dims, displacement), "bushing_rotation": (dims, rotation)}, {"bushing": names}
+    return {"bushing_displacement": (dims, displacement), "bushing_rotation": (dims, rotation)}, {"bushing": list(rows)}

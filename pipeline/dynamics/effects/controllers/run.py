@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -27,58 +25,33 @@ NEAR = 1e-6
 LOST = 100.0
 
 
-@dataclass(frozen=True)
-class _Sampled:
-    """A controller: its row of LOADS, its numbers, its part, the indices of its internal states."""
-
-    row: Any
-    numbers: np.ndarray
-    part: Any
-    states: slice
-    period: float
-
-    def due(self, elapsed: float) -> bool:
-        """Whether it samples so long [s] after the start."""
-        return abs(elapsed - self.period * round(elapsed / self.period)) <= NEAR * self.period
-
-
 def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
     """The function sample(y, t): state after the samples that are due at time t, from that before; shape (NY,)."""
-    controllers = list(_controllers(engine))
+    model, gauges, numbers = engine.model, *(engine.model.arrays.table(one) for one in (m.GAUGES, m.LOAD_NUMBERS))
+    loads = zip((model.scene.load.get(name) for name, _ in model.loads), model.arrays.table(m.LOADS), strict=True)
+    sampled = [(load, row) for load, row in loads if isinstance(load, SampledPid)]
 
     def sample(y: np.ndarray, t: float) -> np.ndarray:
-        due = [one for one in controllers if one.due(t - engine.start)]
+        due = [(load, row) for load, row in sampled if _is_due(load.period, t - engine.start)]
         if not due:
             return y
         y = y.copy()
         engine.select_pieces_after(t)
         engine.attempt(y, t)
-        sites, laws, gauges = (
-            engine.table(m.SITE_FRAMES),
-            engine.table(m.LAW)["value"],
-            engine.model.arrays.table(m.GAUGES),
-        )
-        internal = y[len(y) - engine.model.arrays.size(m.N_INTERNAL) :]
-        for one in due:
-            value = values(gauges[[one.row["measured"]]], sites, internal)[0]
-            error = float(laws[one.row["law0"]]) - value
-            internal[one.states] = one.part.sample(one.numbers, internal[one.states], error, first=t == engine.start)
+        sites, laws = engine.table(m.SITE_FRAMES), engine.table(m.LAW)["value"]
+        internal = y[len(y) - model.arrays.size(m.N_INTERNAL) :]
+        for load, row in due:
+            error = float(laws[row["law0"]]) - values(gauges[[row["measured"]]], sites, internal)[0]
+            mine, states = numbers["value"][row["number0"] :][:7], internal[int(row["internal0"]) :][:3]
+            states[:] = lookup(LOADS, load.type, where="[load]").sample(mine, states, error, first=t == engine.start)
         return y
 
     return sample
 
 
-def _controllers(engine: Engine) -> list[_Sampled]:
-    model, controllers = engine.model, []
-    for k, (name, _) in enumerate(model.loads):
-        load = model.scene.load[name]
-        if isinstance(load, SampledPid):
-            row = model.arrays.table(m.LOADS)[k]
-            numbers = model.arrays.table(m.LOAD_NUMBERS)["value"][row["number0"] : row["number0"] + 7]
-            states = slice(int(row["internal0"]), int(row["internal0"]) + 3)
-            part = lookup(LOADS, load.type, where=f"[load.{name}]")
-            controllers.append(_Sampled(row, numbers, part, states, load.period))
-    return controllers
+def _is_due(period: float, elapsed: float) -> bool:
+    """Whether a controller samples so long [s] after the start."""
+    return abs(elapsed - period * round(elapsed / period)) <= NEAR * period
 
 
 def require_controlled(model: Model, trajectory: Trajectory, seen: Observed) -> None:

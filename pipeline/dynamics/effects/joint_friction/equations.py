@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.choice import choose
+from flexclear.pipeline.dynamics.choice import choose, nothing
 from flexclear.pipeline.dynamics.equations.closures import respond
 from flexclear.pipeline.dynamics.joints.bearings import BALL, PIN, SLIDER
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -116,11 +116,6 @@ def make_unit_wrench(traction: Callable) -> Callable:
         now.slip, now.loss = np.sqrt(dot(slip, slip)), -dot(force, slip)
 
     return unit_wrench
-
-
-@kernel
-def no_loops(d):
-    """No loop is closed."""
 
 
 @kernel
@@ -332,7 +327,7 @@ def make_joint_friction(laws: tuple[Any, ...], closed: bool, tree: Any) -> Calla
     """
     unit_wrench = make_unit_wrench(choose(tuple(law.traction for law in laws)))
     forward, backward = tree.forward, tree.backward
-    close, transmit, reaction = keep_closed if closed else no_loops, tree.transmit, make_reaction(tree.demand)
+    close, transmit, reaction = keep_closed if closed else nothing, tree.transmit, make_reaction(tree.demand)
 
     @kernel
     def solve(d):

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from flexclear.pipeline.core.scene.parts import IdealJoint
-from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects import FRICTION_LAWS
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.joints.bearings import BEARINGS, SLIDER
 from flexclear.pipeline.dynamics.model.components import Floors, Group
+from flexclear.pipeline.dynamics.model.contacts import friction_law
 from flexclear.pipeline.dynamics.model.filling import Filling
 from flexclear.pipeline.dynamics.model.guards import Guard, speeds
 from flexclear.pipeline.dynamics.model.mechanism import Closure, Mechanism
@@ -37,20 +36,15 @@ def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> list[Grou
 
 def _bristle(name: str, joint: IdealJoint) -> float | None:
     """Size of the bristles of each of its bearings, or None."""
-    size: float | None = _law(name, joint).bristle(joint.friction)
+    size: float | None = friction_law(name, joint).bristle(joint.friction)
     return size
-
-
-def _law(name: str, joint: IdealJoint) -> Any:
-    assert joint.friction is not None
-    return lookup(FRICTION_LAWS, joint.friction.law, where=f"[joint.{name}.friction]")
 
 
 def guards(mechanism: Mechanism) -> Iterator[Guard]:
     """Of each bearing: speeds, sliding that reverses under a law with bristles, and what presses that reverses."""
     bearing = 0
     for name, joint in mechanism.scene.rubbing().items():
-        law = _law(name, joint)
+        law = friction_law(name, joint)
         assert joint.friction is not None
         for _ in BEARINGS[joint.type]:
             row = bearing * BENDS.size
@@ -68,10 +62,13 @@ def fill(filling: Filling) -> dict[str, Any]:
     Articulated inertias find what a joint transmits without terms of reactions.
     """
     numbering, closures, articulated = filling.numbering, filling.closures, filling.parts.articulated
-    mechanism, tables, ends = numbering.mechanism, _Tables(), closure_ends(numbering, closures)
-    laws = filling.parts.kinds("joint_friction")
-    slot = filling.slots["joint_friction"]
-    bristle = numbering.nq + numbering.nv + slot + len(mechanism.scene.rubbing())
+    mechanism, ends, laws = (
+        numbering.mechanism,
+        closure_ends(numbering, closures),
+        filling.parts.kinds("joint_friction"),
+    )
+    bristle = numbering.nq + numbering.nv + filling.slots["joint_friction"] + len(mechanism.scene.rubbing())
+    tables: dict[str, list[Any]] = defaultdict(list)
     for number, (name, joint) in enumerate(mechanism.scene.rubbing().items()):
         a, b = (mechanism.site(frame) for frame in joint.between)
         sites = numbering.site(a), numbering.site(b)
@@ -79,22 +76,15 @@ def fill(filling: Filling) -> dict[str, Any]:
         closure = next((c for c, one in enumerate(closures) if isinstance(one, Closure) and one.name == name), -1)
         entries = uncommon(closure_route(numbering, *sites))
         reaction = _terms(numbering, link, ends, articulated) if link >= 0 else _Reaction([], [], [])
-        ranges = tables.add(list(entries), reaction, len(BEARINGS[joint.type]))
-        tables.joints.append((*sites, link, int(reverse), closure, *ranges))
+        ranges = _add(tables, list(entries), reaction, len(BEARINGS[joint.type]))
+        tables["rubbing"].append((*sites, link, int(reverse), closure, *ranges))
         for kind, side, axis in BEARINGS[joint.type]:
             size = _bristle(name, joint)
             law = laws.index(joint.friction.law) if joint.friction is not None else -1
-            tables.bearings.append((number, kind, law, side, axis, bristle if size is not None else -1))
-            tables.numbers.append(_numbers(name, joint, kind))
+            tables["bearings"].append((number, kind, law, side, axis, bristle if size is not None else -1))
+            tables["bearing_numbers"].append(_numbers(name, joint, kind))
             bristle += 3 if size is not None else 0
-    return {
-        "rubbing": tables.joints,
-        "bearings": tables.bearings,
-        "rubbing_entries": tables.entries,
-        "reaction_terms": tables.terms,
-        "reaction_loops": tables.loops,
-        "bearing_numbers": tables.numbers,
-    }
+    return tables
 
 
 class _Reaction(NamedTuple):
@@ -105,27 +95,16 @@ class _Reaction(NamedTuple):
     loops: Rows
 
 
-@dataclass
-class _Tables:
-    """Rows given out so far."""
-
-    joints: Rows = field(default_factory=list)
-    bearings: Rows = field(default_factory=list)
-    entries: Rows = field(default_factory=list)
-    terms: Rows = field(default_factory=list)
-    loops: Rows = field(default_factory=list)
-    numbers: list[list[float]] = field(default_factory=list)
-
-    def add(self, entries: Rows, reaction: _Reaction, bearings: int) -> tuple[int, ...]:
-        """Keep the rows of one joint; where they begin and how many there are, in the order of RUBBING."""
-        terms, momenta, columns = len(self.terms), len(reaction.momenta), len(reaction.columns)
-        of_terms = (terms, momenta, terms + momenta, columns)
-        loops = (len(self.loops), len(reaction.loops))
-        ranges = (len(self.entries), len(entries), *of_terms, *loops, len(self.bearings), bearings)
-        self.entries += entries
-        self.terms += [*reaction.momenta, *reaction.columns]
-        self.loops += reaction.loops
-        return ranges
+def _add(tables: dict[str, list[Any]], entries: Rows, reaction: _Reaction, bearings: int) -> tuple[int, ...]:
+    """Add the rows of one joint; where they begin and how many there are, in the order of the table `rubbing`."""
+    terms, loops = tables["reaction_terms"], tables["reaction_loops"]
+    momenta, columns, first = len(reaction.momenta), len(reaction.columns), len(terms)
+    of_terms, of_loops = (first, momenta, first + momenta, columns), (len(loops), len(reaction.loops))
+    ranges = (len(tables["rubbing_entries"]), len(entries), *of_terms, *of_loops, len(tables["bearings"]), bearings)
+    tables["rubbing_entries"] += entries
+    terms += [*reaction.momenta, *reaction.columns]
+    loops += reaction.loops
+    return ranges
 
 
 def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
@@ -136,7 +115,7 @@ def _numbers(name: str, joint: IdealJoint, kind: int) -> list[float]:
     axial = (friction.axial_radius or radius) / radius if joint.type == "revolute" else 0.0
     torsion = 1.0 / radius if kind == SLIDER and radius else 0.0
     lever = 1.0 / friction.length if friction.length else 0.0
-    return [radius, lever, axial, torsion, friction.preload, *_law(name, joint).parameters(friction)]
+    return [radius, lever, axial, torsion, friction.preload, *friction_law(name, joint).parameters(friction)]
 
 
 def _link(mechanism: Mechanism, name: str) -> tuple[int, bool]:

@@ -21,7 +21,7 @@ def losses(model: Model) -> Losses:
 
 
 def explanation(engine: Engine) -> str | None:
-    """Why the last evaluation found no loads of the bearings that friction could grow to; None where it did."""
+    """Why the last evaluation has no loads of the bearings that friction could grow to; None where it has."""
     if engine.n[m.EVALUATION] != m.JAMMED or engine.n[m.STATUS] in OTHERWISE:
         return None
     names, gains = list(engine.model.scene.rubbing()), _gains(engine)

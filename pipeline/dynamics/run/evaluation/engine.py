@@ -174,8 +174,8 @@ class Engine:
 
     def explained(self) -> str | None:
         """Why an effect ends the run, in words; None where none does."""
-        found = (explain(self) for explain in self.model.parts.functions("explains"))
-        return next((why for why in found if why is not None), None)
+        reasons = (explain(self) for explain in self.model.parts.functions("explains"))
+        return next((why for why in reasons if why is not None), None)
 
     def attempt(self, y: np.ndarray, t: float, repeat: int = 1) -> bool:
         """Evaluate f(t, y) in the work space; whether it could be."""
