@@ -96,7 +96,9 @@ def command(options: argparse.Namespace) -> None:
     """Print the findings line by line; raise UnwellError at the end when something is wrong."""
     if options.out is not None:
         if options.bundle is None:
-            raise InputError(f"--out {options.out}", "is where --bundle writes, which is not given", "add --bundle SCENE")
+            raise InputError(
+                f"--out {options.out}", "is where --bundle writes, which is not given", "add --bundle SCENE"
+            )
         export.check_format(options.out, (".zip",))
         scenes.check_target(options.out)
     if options.bundle is not None:

@@ -73,8 +73,8 @@ def annotated(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarr
     axes.imshow(pixels, extent=(0, width, height, 0), aspect="auto", interpolation="nearest")
     if said := exaggeration(drawn):
         pale = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 3.0}
-        low, look = height - 18, {"fontsize": 10.5, "color": style.SOFT, "va": "bottom", "bbox": pale}
-        axes.text(20, low, "\n".join(said), parse_math=False, **look)
+        text = axes.text(20, height - 18, "\n".join(said), va="bottom", bbox=pale, parse_math=False)
+        text.set(fontsize=10.5, color=style.SOFT)
     ruler(axes, drawn, (width, height), margin)
     axes.set(xlim=(0, width), ylim=(height, 0))
     canvas.draw()
