@@ -22,7 +22,7 @@ from flexclear.stages import rendering
 
 PICTURES = DOCS / "gallery"
 #: of the pictures: pixels, how much finer they are drawn first, and colours, so that a page of them stays small
-WIDTH, HEIGHT, FINER, COLOURS = 640, 480, 2, 128
+WIDTH, HEIGHT, FINER, COLOURS = 640, 480, 2, 256
 Bundles = Mapping[str, xr.Dataset]
 
 

@@ -153,7 +153,7 @@ def test_parts_of_a_command_are_told_apart_in_each_of_its_threads(monkeypatch: p
 
 def test_a_name_that_is_no_family_is_refused_with_those_there_are(capsys: pytest.CaptureFixture):
     assert main(["zoology"]) == 2
-    assert "evaluation, exudyn, gallery, geometry, growth" in capsys.readouterr().err
+    assert "evaluation, exudyn, faults, gallery, geometry, growth" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

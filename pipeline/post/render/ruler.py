@@ -71,8 +71,10 @@ def annotated(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarr
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.imshow(pixels, extent=(0, width, height, 0), aspect="auto", interpolation="nearest")
-    text = "\n".join(exaggeration(drawn))
-    axes.text(20, height - 18, text, fontsize=10.5, color=style.SOFT, va="bottom", parse_math=False)
+    if said := exaggeration(drawn):
+        pale = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 3.0}
+        text = axes.text(20, height - 18, "\n".join(said), va="bottom", bbox=pale, parse_math=False)
+        text.set(fontsize=10.5, color=style.SOFT)
     ruler(axes, drawn, (width, height), margin)
     axes.set(xlim=(0, width), ylim=(height, 0))
     canvas.draw()
