@@ -328,9 +328,8 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 # of the polynomial that lies ready (0: none), the fraction of it that the present step is, the least fraction that a
 # row has left of the most that it had, steps in a row that ended blindly close to a pose;
 # then what `adaptive` keeps: length and error norm of the step rejected last (0: none since the last accepted one),
-# what the last first step with a contact closed could have been, whether the next accepted step is the first one of a
-# segment;
-# then what an attempt leaves that waits for rates (`method.await_rates`): its length, its error norm, the state's time
+# what the last first step with a contact closed could have been, whether the next accepted step is a segment's first;
+# then of an attempt that waits for rates (`method.await_rates`): its length, its error norm, the state's time
 # fmt: off
 (
     TIME, STEP, END, RTOL, SPAN, LENGTH, DRIFT, LAST_NORM, MOST_GROWTH, FIXED, PARAMETER, RATE_DRIFT, STEEPEST,
@@ -346,20 +345,17 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
 N_CONTROLS = AWAITED_TIME + 1
 
 # Integers in n -------------------------------------------------------------------------------------------------------
-# report of the last evaluation; where the laws' active pieces and the contacts' modes start in n; where the state
-# being evaluated starts in w; whether the last evaluation left no more than the steps read; whether the stepper comes
-# back wherever an attempt waits for rates; then the stepper's own, at the end how far an attempt has come (0: there is
-# none) and where in w the state is whose rates it waits for, and these shall be
+# report of the last evaluation; where active pieces and modes start in n, and its state in w; whether it left only what
+# steps read; whether others make awaited rates; the stepper's own, last a step's stage, where its state and rates are
 _INTEGERS = _numbered(
     "evaluation active mode state abridged together status evaluations steps rejected next_output n_recorded n_events "
-    "budget cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps stage awaited "
-    "awaited_slope"
+    "budget cap fresh immediate projections projection_evaluations jacobians culprit stiff_steps stage awaited rates_in"
 )
 # fmt: off
 (
     EVALUATION, ACTIVE, MODE, STATE, ABRIDGED, TOGETHER,
     STATUS, EVALUATIONS, STEPS, REJECTED, NEXT_OUTPUT, N_RECORDED, N_EVENTS, BUDGET, CAP, FRESH, IMMEDIATE,
-    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, STAGE, AWAITED, AWAITED_SLOPE,
+    PROJECTIONS, PROJECTION_EVALUATIONS, JACOBIANS, CULPRIT, STIFF_STEPS, STAGE, AWAITED, RATES_IN,
 ) = _INTEGERS.values()
 # fmt: on
 INTEGERS = len(_INTEGERS)

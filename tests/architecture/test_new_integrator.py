@@ -36,8 +36,8 @@ def error(d, step):
 
 
 def make_kernels(evaluate, retract):
-    _, attempt = make_stages(evaluate, A, B, C)
-    return begin_afresh, attempt, error, hermite.make_extend(2), keep_nothing
+    _, proceed = make_stages(evaluate, A, B, C)
+    return begin_afresh, proceed, error, hermite.make_extend(2), keep_nothing
 
 
 METHOD = Method(
@@ -46,6 +46,7 @@ METHOD = Method(
     last=2,
     dense=hermite.ROWS,
     make_kernels=make_kernels,
+    staged=True,
     interpolate=hermite.interpolate,
     error_order=1,
 )

@@ -22,8 +22,8 @@ C = np.array([0.0, 0.5, 1.0])
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     """The method's kernels; it has no error estimate."""
-    _, attempt = make_stages(evaluate, A, B, C)
-    return begin_afresh, attempt, None, hermite.make_extend(STAGES), keep_nothing
+    _, proceed = make_stages(evaluate, A, B, C)
+    return begin_afresh, proceed, None, hermite.make_extend(STAGES), keep_nothing
 
 
 METHOD = Method(
@@ -32,6 +32,7 @@ METHOD = Method(
     last=STAGES,
     dense=hermite.ROWS,
     make_kernels=make_kernels,
+    staged=True,
     interpolate=hermite.interpolate,
     stability=2.512,  # where its stability polynomial 1 + z + z^2/2 + z^3/6 is -1
 )

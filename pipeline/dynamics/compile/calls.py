@@ -90,7 +90,7 @@ def rates(d, t, y, dy):
 def awaited(h, f, w, n):
     """The rates that an attempt waits for: `integrate.method.await_rates`."""
     d = data(h, f, w, n)
-    rates(d, d.awaited_time, d.awaited, d.awaited_slope)
+    rates(d, d.awaited_time, d.awaited, d.rates_in)
 
 
 @kernel

@@ -95,7 +95,7 @@ def make_lanes(laws: Callable, note: Callable, abreast: Callable, lanes: int) ->
             d = engine(table, stepper)
             for e in range(4):
                 places[e * lanes + k] = table[stepper + ARGUMENTS + e]
-            places[4 * lanes + k], places[5 * lanes + k] = d.awaited, d.awaited_slope
+            places[4 * lanes + k], places[5 * lanes + k] = d.awaited, d.rates_in
             if places[6 * lanes + k] != places[lanes + k]:
                 places[6 * lanes + k] = places[lanes + k]
                 note(d.h, d.f, numbers, k)

@@ -26,7 +26,7 @@ AWAITS, MADE, LOST = range(3)
 @kernel
 def await_rates(d, t, y, dy):
     """Ask whoever lets the attempt proceed for the rates of the state in w from y at time t, into w from dy."""
-    d.awaited_time, d.awaited, d.awaited_slope = t, y, dy
+    d.awaited_time, d.awaited, d.rates_in = t, y, dy
     d.stage += 1
     d.evaluations += 1
     return AWAITS
@@ -40,7 +40,7 @@ def make_attempt(evaluate: Callable, proceed: Callable) -> Callable:
         d.stage = 0
         come = proceed(d, step)
         while come == AWAITS:
-            evaluate(d, d.awaited_time, d.awaited, d.awaited_slope)
+            evaluate(d, d.awaited_time, d.awaited, d.rates_in)
             come = proceed(d, step)
         d.stage = 0
         return come == MADE
