@@ -359,6 +359,13 @@ _INTEGERS = _numbered(
 ) = _INTEGERS.values()
 # fmt: on
 INTEGERS = len(_INTEGERS)
+
+# Table of lanes (`compile.lanes`) -------------------------------------------------------------------------------------
+# a lane: nobody is in it; its stepper may proceed, waits for rates, has come to its end
+LANE_IDLE, LANE_READY, LANE_WAITING, LANE_DONE = range(4)
+# its words: whether to return at once, then of each lane its state, the address of what takes its steps, and the
+# arguments of that: h, f, w, n, and eight of the record
+LANES_CALLED_BACK, LANES_HEAD, LANE_FUNCTION, LANE_ARGUMENTS, LANE_WORDS = 0, 1, 1, 2, 14
 #: stretches of n by the names that kernels use (`fields`), and the other integers there
 LISTS = {"active": ACTIVE, "mode": MODE}
 REPORTS = {name: index for name, index in _INTEGERS.items() if name not in LISTS}

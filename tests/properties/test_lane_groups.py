@@ -9,14 +9,14 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.compile import lanes
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Places
 
 ARGUMENTS = 12
 
 
 def group(width: int, run: Callable[[np.ndarray], None]) -> LaneGroup:
-    """A group whose compiled function is replaced by one that gets the words of all lanes, shape (width, WORDS)."""
+    """A group whose compiled function is replaced by what gets all words, shape (width, LANE_WORDS)."""
     made = LaneGroup(b"", 0, 1, width)
     made._run = lambda *_: run(made._words)
     return made
@@ -24,7 +24,7 @@ def group(width: int, run: Callable[[np.ndarray], None]) -> LaneGroup:
 
 def finish(words: np.ndarray, number: int) -> None:
     """Let the first of the steppers that may proceed come to their end."""
-    words[np.flatnonzero(words[:, 0] == lanes.READY)[:number], 0] = lanes.DONE
+    words[np.flatnonzero(words[:, 0] == m.LANE_READY)[:number], 0] = m.LANE_DONE
 
 
 def asked(made: LaneGroup, count: int) -> list[BaseException | None]:
@@ -44,13 +44,13 @@ def test_more_steppers_than_lanes_all_come_to_their_end() -> None:
     seen = set[tuple[int, ...]]()
 
     def run(words: np.ndarray) -> None:
-        seen.update(tuple(row) for row in words[words[:, 0] == lanes.READY].tolist())
+        seen.update(tuple(row) for row in words[words[:, 0] == m.LANE_READY].tolist())
         finish(words, 1)
 
     made = group(2, run)
     assert asked(made, 7) == [None] * 7
-    assert seen == {(lanes.READY, 100 + k, *[k] * ARGUMENTS) for k in range(7)}
-    assert (made._words[:, 0] == lanes.IDLE).all()
+    assert seen == {(m.LANE_READY, 100 + k, *[k] * ARGUMENTS) for k in range(7)}
+    assert (made._words[:, 0] == m.LANE_IDLE).all()
     assert asked(made, 3) == [None] * 3  # whoever comes later leads again
 
 
@@ -67,21 +67,21 @@ def test_where_the_thread_that_leads_fails_another_one_leads() -> None:
     made = group(4, run)
     errors = [error for error in asked(made, 5) if error is not None]
     assert [str(error) for error in errors] == ["the first"]
-    assert (made._words[:, 0] == lanes.IDLE).all()
+    assert (made._words[:, 0] == m.LANE_IDLE).all()
     assert asked(made, 2) == [None, None]
 
 
 def test_who_leads_is_called_back_for_a_stepper_that_comes_later() -> None:
-    """`WANTED` says so to the compiled function, which looks at it between two evaluations."""
+    """`memory.LANES_CALLED_BACK` says so to the compiled function, which looks at it between two evaluations."""
     begun, called = threading.Event(), list[int]()
 
     def run(words: np.ndarray) -> None:
         begun.set()
         if len(called) == 0:
             until = time.monotonic() + 60.0
-            while not made._table[lanes.WANTED] and time.monotonic() < until:
+            while not made._table[m.LANES_CALLED_BACK] and time.monotonic() < until:
                 pass
-        called.append(int((words[:, 0] == lanes.READY).sum()))
+        called.append(int((words[:, 0] == m.LANE_READY).sum()))
         if len(called) > 1:
             finish(words, 2)
 

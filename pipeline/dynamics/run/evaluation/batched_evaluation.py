@@ -16,7 +16,8 @@ from threading import Event, Lock
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.compile import functions, lanes
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.compile import functions
 
 
 @dataclass(eq=False)
@@ -38,8 +39,8 @@ class LaneGroup:
     def __init__(self, rows: bytes, address: int, numbers: int, width: int) -> None:
         self.rows = rows
         self._run = functions.LANES(address)
-        self._table = np.zeros(lanes.HEAD + lanes.WORDS * width, np.int64)
-        self._words = self._table[lanes.HEAD :].reshape(width, lanes.WORDS)
+        self._table = np.zeros(m.LANES_HEAD + m.LANE_WORDS * width, np.int64)
+        self._words = self._table[m.LANES_HEAD :].reshape(width, m.LANE_WORDS)
         self._places = np.zeros(7 * width, np.int64)
         room = np.zeros((numbers + 1) * width)
         self._numbers = room[-room.ctypes.data // 8 % width :]  # of all lanes one number, in no two lines of the cache
@@ -48,10 +49,10 @@ class LaneGroup:
 
     def advance(self, function: int, arguments: Sequence[int]) -> None:
         """Let a stepper proceed until it comes back."""
-        mine = _Steps((lanes.READY, function, *arguments))
+        mine = _Steps((m.LANE_READY, function, *arguments))
         with self._lock:
             self._waiting.append(mine)
-            self._table[lanes.WANTED] = 1  # calls back who leads, who looks at it between two evaluations
+            self._table[m.LANES_CALLED_BACK] = 1  # calls back who leads, who looks at it between two evaluations
             if not self._led:
                 self._led = True
                 mine.turn.set()
@@ -67,17 +68,17 @@ class LaneGroup:
     def _proceed(self) -> None:
         """Give free lanes to who waits, let all proceed until one comes back, and give its lane back."""
         with self._lock:
-            self._table[lanes.WANTED] = 0
+            self._table[m.LANES_CALLED_BACK] = 0
             self._places[6 * len(self._words) :] = 0  # where arrays lie others may have lain before
-            for lane in np.flatnonzero(self._words[:, 0] == lanes.IDLE)[: len(self._waiting)]:
+            for lane in np.flatnonzero(self._words[:, 0] == m.LANE_IDLE)[: len(self._waiting)]:
                 steps = self._busy[lane] = self._waiting.popleft()
                 self._words[lane] = steps.words
         self._run(*(array.ctypes.data for array in (self._table, self._places, self._numbers)))
-        for lane in np.flatnonzero(self._words[:, 0] == lanes.DONE):
+        for lane in np.flatnonzero(self._words[:, 0] == m.LANE_DONE):
             self._free(int(lane))
 
     def _free(self, lane: int) -> None:
-        self._words[lane, 0] = lanes.IDLE
+        self._words[lane, 0] = m.LANE_IDLE
         steps = self._busy.pop(lane)
         steps.done = True
         steps.turn.set()
