@@ -203,7 +203,7 @@ def _files(folder: Path, environment: dict[str, str]) -> Counter[str]:
         said = process.communicate()[1].decode(errors="replace")
         left = [one for one in path.parent.glob(f"{path.name}*") if one.is_file()]
         sound = process.returncode in (0, 2, 4) and "Traceback" not in said
-        count["detected" if sound and any(one.read_text() == "stays" for one in left) else "used"] += 1
+        count["detected" if sound and any(one.read_text(encoding="utf-8") == "stays" for one in left) else "used"] += 1
         if path.is_file():
             path.unlink()
             away.rename(path)

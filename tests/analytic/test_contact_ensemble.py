@@ -17,10 +17,14 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import cores
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate.adaptive import LEAST_NORM
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.run import trajectory
 from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation, specialised
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
+from flexclear.pipeline.dynamics.run.run import engines
 from flexclear.pipeline.post import derive
 from tests.analytic.mechanism_runs import TREE, run
 from tests.reference import contact_solutions as exact
@@ -208,3 +212,12 @@ def test_members_whose_actuators_cannot_do_it_are_refused_like_the_run() -> None
     for made in (dynamics.simulate, dynamics.ensemble):
         with pytest.raises(InputError, match="spin"):
             made(asked, {}, silent)
+
+
+def test_the_next_step_knows_the_error_of_the_last_one() -> None:
+    """It is kept while the rates at the step's end are awaited."""
+    asked = load_scene(TREE / "scenes/sps4/csj.toml", override={"time.end": "10 ms"})
+    engine, _ = engines(asked, {}, silent)
+    trajectory.integrate(engine, consistent_start(engine), silent)
+    assert 0.0 < engine.control[m.NORM] <= 1.0
+    assert engine.control[m.LAST_NORM] == max(engine.control[m.NORM], LEAST_NORM)

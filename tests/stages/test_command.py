@@ -204,7 +204,7 @@ def test_cite_tells_the_methods_of_every_run_from_those_that_only_some_need(comm
         "integrate.radau",
         "integrate.newton",
         "run.horizon.periods",
-        "linear.differences",
+        "specialise.dual",
         "run.singular_poses.collocation",
     ):
         assert f"{module}:" in some
