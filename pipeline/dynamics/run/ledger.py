@@ -22,6 +22,8 @@ Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 #: rounding of the largest energies, which may cancel in the balance
 ROUNDING = 1e-12
+#: energies below this are nothing: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
+NOTHING = 1e-30
 #: no contact law is known to a thousandth of its energy; a run of chosen steps that is off by more says something
 #: else. Where more is requested, the balance is better: of three hundred hard cases at rtol 1e-10
 #: (benchmarks/stability) none is off by 1e-6, unless something is wrong; what damps by its order is not distinguished
@@ -149,7 +151,7 @@ def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
         mechanism = model.mechanism
         body = next(n for n in mechanism.moving_bodies if mechanism.components.of(mechanism.link_of[n]) == component)
         of = f" of body {body} and what it is connected to"
-    return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, ROUNDING * largest)
+    return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, max(ROUNDING * largest, NOTHING))
 
 
 def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchanged: float = 0.0) -> float:
