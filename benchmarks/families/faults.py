@@ -44,7 +44,7 @@ COMMANDS = {
 #: commands that have helpers, of which one is killed in their stead, and how often in proportion to their own kills
 HELPED, PER_KILL = ("run", "sweep", "cost", "report"), 0.5
 #: while a helper takes less processor time than this within so many seconds it is idle [s]
-IDLE, LOOK = 0.01, 0.1
+IDLE, LOOK = 0.005, 0.1
 #: exit codes that a command may have which lost a helper: it did without, or says that its memory may be full
 SAID = (0, 4)
 SWEEP = """
@@ -332,8 +332,11 @@ def _helpers(
         while process.poll() is None and (time.monotonic() < end or not system.children(process.pid)):
             time.sleep(0.01)
         children = system.children(process.pid)
-        if waiting := _idle(children) if idle else children:
-            system.kill(rng.choice(waiting))
+        waiting = _idle(process.pid, children) if idle else children
+        if not waiting:  # nothing was brought about
+            process.communicate()
+            continue
+        system.kill(rng.choice(waiting))
         said = process.communicate()[1].decode(errors="replace")
         sound = (
             process.returncode in SAID and "Traceback" not in said and not upkeep.inventory(store, whole=True).damaged
@@ -345,11 +348,12 @@ def _helpers(
     return counts
 
 
-def _idle(processes: Sequence[int]) -> list[int]:
-    """Those that take no processor time for a moment."""
+def _idle(parent: int, processes: Sequence[int]) -> list[int]:
+    """Those of a process's children that take no processor time for a moment."""
     before = {process: system.seconds_of(process) for process in processes}
     time.sleep(LOOK)
-    return [process for process in processes if system.seconds_of(process) - before[process] < IDLE]
+    there = set(system.children(parent))
+    return [p for p in processes if p in there and system.seconds_of(p) - before[p] < IDLE]
 
 
 def _artifacts(store: Store) -> dict[tuple[str, str], str]:

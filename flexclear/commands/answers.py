@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 #: without a budget the answers may take so many times the run's own processor time, and at least so long [s]
 TIMES, LEAST = 3.0, 40.0
+#: variants are run and compiled so many at a time
+AT_ONCE = 2.0
 #: of variants without a clearance or a flexible body, the kernels of so many are compiled next to the scene's own run
 AHEAD = 2
 #: tolerance of members with contacts, at most so tight: they start a thousandth of the clearance apart
@@ -249,7 +251,7 @@ class _Comparison:
         taken, total, known = list[str](), self._seconds("", MEMBERS[0]), self._compiled
         for name in names:
             kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
-            one = self._seconds(name, MEMBERS[0]) + (0.0 if kinds in known else cost.COMPILING / cost.AT_ONCE)
+            one = self._seconds(name, MEMBERS[0]) + (0.0 if kinds in known else cost.COMPILING / AT_ONCE)
             if not taken or total + one <= self.study.seconds:
                 taken.append(name)
                 total, known = total + one, known | {kinds}
@@ -293,7 +295,7 @@ class _Comparison:
     def _seconds(self, name: str, members: int) -> float:
         """Of wall time that so many members are predicted to take: as in the last round, else as the scene's run."""
         runs = members if self._touching(name) else 1
-        return (runs * self.took.get(name, self.study.own * self.study.pace) + cost.POINT) / cost.AT_ONCE
+        return (runs * self.took.get(name, self.study.own * self.study.pace) + cost.POINT) / AT_ONCE
 
     def _fitting(self, names: Sequence[str], members: int) -> list[str]:
         """Those that the rest of the budget holds, the first ones first: what the summary says before the others."""
@@ -313,7 +315,7 @@ class _Comparison:
             self.tasks.setdefault(name, {})[members] = task
             seconds = self.workplace.store.load(outcome.records[id(task)]).attrs
             self.took[name] = float(seconds["cpu_seconds"]) / (members if self._touching(name) else 1)
-            self.spent += self._seconds(name, members) + float(seconds["compile_seconds"]) / cost.AT_ONCE
+            self.spent += self._seconds(name, members) + float(seconds["compile_seconds"]) / AT_ONCE
 
     def _point(self, name: str, members: int) -> Point:
         task = self.tasks[name][members]

@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
 #: processor time that a study's runs may take [s]; what one takes besides its integration, and a new set of kernels
 BUDGET, POINT, COMPILING = 100.0, 0.6, 8.0
-#: points are made so many at a time, of which each counts its own processor time
-AT_ONCE = 2
 #: a point may take so many times the evaluations of the scene's own run, or this fraction of the budget if that is more
 MOST = 10.0
 #: of runs that were left undone, so many are named
@@ -123,7 +121,7 @@ class Study:
         """
         if self.points:
             return
-        (record,) = self._made(self._near[:1])
+        record = self._made(self._near[0])
         if "refused" in record.attrs:
             raise SolverError(f"{self.scene.name}: {record.attrs['refused']}")
         self.own = float(record.attrs["evaluations"])
@@ -217,51 +215,39 @@ class Study:
         self._compiled: dict[tuple[str, ...], Task] = {}
 
     def _queue(self, designs: Sequence[cost_design.Design]) -> None:
-        """Make points in this order, AT_ONCE at a time; those that the budget no longer holds are left undone."""
-        for k in range(0, len(designs), AT_ONCE):
-            spent, fitting = self.spent, list[cost_design.Design]()
-            for design in designs[k : k + AT_ONCE]:
-                seconds = design.evaluations(self.evaluations, self.own) * self.pace + POINT
-                compiling = COMPILING if kernels.shared(design.scene) not in self._compiled else 0.0
-                if spent + seconds + compiling > self.seconds:
-                    self.undone.append(design)
-                else:
-                    spent += seconds + compiling
-                    fitting.append(design)
-            self._made(fitting)
+        """Make points in this order; those that the budget no longer holds are left undone."""
+        for design in designs:
+            seconds = design.evaluations(self.evaluations, self.own) * self.pace + POINT
+            compiling = COMPILING if kernels.shared(design.scene) not in self._compiled else 0.0
+            if self.spent + seconds + compiling > self.seconds:
+                self.undone.append(design)
+            else:
+                self._made(design)
 
-    def _made(self, designs: Sequence[cost_design.Design]) -> list[xr.Dataset]:
-        """Points, brought up to date."""
+    def _made(self, design: cost_design.Design) -> xr.Dataset:
+        """One point, brought up to date."""
         if self.own:
-            limit = {"solver.evaluations": min(self.scene.solver.evaluations, self._most())}
-            designs = [replace(design, scene=edited(design.scene, limit)) for design in designs]
-        before, names, brief = set(self._compiled), [q.name for q in self._chosen], bool(self.points)
-        made = [self._kernels(design) for design in designs]
-        new = [task for shared, task in self._compiled.items() if shared not in before]
-        tasks = [
-            _measured(d, "run", {"quantities": names, "brief": brief}, k) for d, k in zip(designs, made, strict=True)
-        ]
-        outcome = self.workplace.bring([*tasks, *new])
+            limit = min(self.scene.solver.evaluations, self._most())
+            design = replace(design, scene=edited(design.scene, {"solver.evaluations": limit}))
+        names, first = [q.name for q in self._chosen], kernels.shared(design.scene) not in self._compiled
+        compiled = self._kernels(design)
+        task = _measured(design, "run", {"quantities": names, "brief": bool(self.points)}, compiled)
+        outcome = self.workplace.bring([task, compiled] if first else [task])
         check(outcome)
-        records = [self.workplace.store.load(outcome.records[id(task)]) for task in tasks]
-        stored = [self.workplace.store.load(outcome.records[id(task)]) for task in new]
-        self.spent += sum(float(one.attrs["compile_seconds"]) for one in stored)
-        for design, task, record in zip(designs, tasks, records, strict=True):
-            self._count(design, record)
-            self.runs[design.key] = task
-            self.points.append(design)
-        return records
-
-    def _count(self, design: cost_design.Design, record: xr.Dataset) -> None:
-        """What a point took, and what it says of the evaluations that others will take."""
+        record = self.workplace.store.load(outcome.records[id(task)])
+        if first:
+            self.spent += float(self.workplace.store.load(outcome.records[id(compiled)]).attrs["compile_seconds"])
+        self.runs[design.key] = task
+        self.points.append(design)
         solver = design.scene.solver
         if "refused" in record.attrs:
             self.spent += POINT + (self._most() * self.pace if "evaluations" in record.attrs["refused"] else 0.0)
-            return
-        self.spent += POINT + float(record["cpu_repeat"].sum()) + float(record.attrs["recording_seconds"])
-        if solver.step is None and design.group in ("tolerance", "sampling"):
-            known = self.evaluations.setdefault(solver.integrator, {})
-            known[solver.rtol] = float(record.attrs["evaluations"])
+        else:
+            self.spent += POINT + float(record["cpu_repeat"].sum()) + float(record.attrs["recording_seconds"])
+            if solver.step is None and design.group in ("tolerance", "sampling"):
+                known = self.evaluations.setdefault(solver.integrator, {})
+                known[solver.rtol] = float(record.attrs["evaluations"])
+        return record
 
     def _most(self) -> int:
         """Evaluations that a point may take: a power of ten, so that its key does not change with each budget."""

@@ -58,7 +58,7 @@ pose = {{}}
 #: run apart, where nothing is compiled: that would take longer than all else
 RUN = """import sys
 import flexclear as fc
-from flexclear.pipeline.core.system.errors import FlexclearError, InputError
+from flexclear.pipeline.core.system.errors import FlexclearError
 try:
     result = fc.run(sys.argv[1])
 except FlexclearError as error:

@@ -1,4 +1,5 @@
-"""The memory through which scene and compiled kernels speak: every index, row and field is declared here, once.
+"""The memory through which scene and compiled kernels speak: every index, row and field is declared once,
+here or by its effect (`effects`).
 
 A kernel's code depends only on the kinds of parts present. Everything else is in four flat arrays that kernels take:
 

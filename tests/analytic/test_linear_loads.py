@@ -159,3 +159,13 @@ def test_weights_that_balance_leave_no_stiffness_but_rounding(turn: float) -> No
     assert found.attrs["motions_without_stiffness"] == 1
     assert found.frequency.values == pytest.approx([0.0], abs=0.0)
     assert found.decay_rate.values == pytest.approx([0.0], abs=0.0)
+
+
+def test_a_spring_of_no_length_holds_in_every_direction() -> None:
+    """Its ends meet in the equilibrium, where it has no direction."""
+    body = {"type": "rigid", "mass": MASS, "inertia": [1e-3, 1e-3, 1e-3], "pose": {}, "frames": {"C": {}}}
+    spring = {"type": "spring-damper", "between": ["ground.O", "ball.C"], "stiffness": STIFFNESS, "free_length": 0.0}
+    table = {"body": {"ground": {"type": "ground", "frames": {"O": {}}}, "ball": body}, "load": {"s": spring}}
+    found = frequencies(table).undamped_frequency.values
+    omega = np.sqrt(STIFFNESS / MASS)
+    assert found[found > 0.0] == pytest.approx(np.full(3, omega / (2.0 * np.pi)), rel=SMOOTH)

@@ -178,3 +178,12 @@ def test_what_would_be_too_long_is_refused() -> None:
     assert STATE_CHANGE != RATES_CHANGE
     with pytest.raises(UnsuitedError, match="too long"):
         tangent(Program(tape.block, made.stores), 0)
+
+
+@pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
+@pytest.mark.parametrize("exponent", [9.0, -9.0])
+def test_whole_powers_have_their_slope_below_zero(exponent: float) -> None:
+    """Of symbols and of numbers with changes."""
+    base = dual.Dual(np.float64(-0.5), np.array([1.0]))
+    (found,) = dual.changes([base**exponent], 1)[0]
+    assert found == pytest.approx(exponent * (-0.5) ** (exponent - 1.0), rel=1e-14)

@@ -123,7 +123,7 @@ def test_what_is_not_listed_must_be_the_same(table: str) -> None:
 SCENES = [
     *("sps4/csj", "checks/stops", "checks/gears", "checks/bushing", "checks/controllers", "checks/oscillator"),
     *("checks/clearance_slider_crank", "checks/rubbing_slider_crank", "checks/ball_on_plane"),
-    "checks/driven_pendulum",
+    *("checks/driven_pendulum", "checks/expressions"),
 ]
 
 

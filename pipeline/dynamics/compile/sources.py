@@ -86,7 +86,8 @@ class Composition:
         """An argument that an effect declares, its own names imported."""
         kinds, own = self.parts.kinds(effect.name), f"{PACKAGE}.{effect.name}"
         text = re.sub(r"<(?:(\w+)\.)?(\w+)>", lambda m: self.take(f"{own}.{m[1]}" if m[1] else own, m[2]), text)
-        return text.format(file=self, kinds=self.family(f"{DYNAMICS}.{effect.family}", kinds) if kinds else "")
+        chosen = self.family(f"{DYNAMICS}.{effect.family}", kinds) if kinds and "{kinds}" in text else ""
+        return text.format(file=self, kinds=chosen)
 
 
 def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
@@ -202,6 +203,8 @@ def _observe(parts: Parts) -> str:
     if parts.harmonics:
         file.given["harmonics"] = _harmonics(file)
     file.add_effects("observe")
+    if parts.closures:
+        file.add_effects("observe closures")
     maker = file.take(f"{DYNAMICS}.equations.observation", "make_observation")
     what = f"what is recorded of {', '.join(parts.joints)}"
     return _text(file, what, "observation", maker, OBSERVE, _formulas(parts))
@@ -235,7 +238,7 @@ def _events(file: Composition, scheme: Scheme) -> str:
     touching = parts.surfaces or any(effect.touches for effect in parts.present)
     if touching and not scheme.located:
         return file.take(f"{INTEGRATORS}.step_end_events", "AT_STEP_ENDS")
-    guarded = chosen and (parts.frictions or parts.load_kinks or parts.functions("guards"))
+    guarded = chosen and (parts.frictions or parts.load_kinks or any(effect.guards for effect in parts.present))
     if touching:
         located = file.take(f"{INTEGRATORS}.contact_events", "located")
         given = [file.take(f"{INTEGRATORS}.contact_phases", "regimes" if parts.frictions else "no_regimes")]

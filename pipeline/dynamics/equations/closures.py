@@ -9,7 +9,7 @@ coordinate is that wrench times the coordinate's column. With :math:`M = LL^T` t
 with :math:`L^{-1}J^T` kept on the support of each closure (the coordinates on the way to the ground).
 
 Rows that follow from others (planar loops in space, Bricard's loop) are not solved for: the kept
-rows of a closure come first among its rows, the residuals of all are known (`assembly.selection`).
+rows of a closure come first among its rows, the residuals of all are known (`model.selection`).
 """
 
 from __future__ import annotations

@@ -191,7 +191,7 @@ def closed(bench: Bench, q: np.ndarray) -> np.ndarray:
         before = bench.internal[index]
         bench.internal[index] = angle + 2.0 * np.pi * np.round((before - angle) / (2.0 * np.pi))
     for index, vector in initial.of_effects(bench.model, seen.sites[0], bench.internal).items():
-        bench.internal[index : index + 3] = vector
+        bench.internal[index : index + len(vector)] = vector
     return seen.state[0, : len(q)].copy()
 
 
@@ -222,9 +222,14 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
 def balancing(bench: Bench) -> float:
     """Size of the forces that balance each other in the state evaluated last, as moments [N m].
 
-    Those of inertia, gravity, loads and contacts on each link and what it carries, and those of each load and contact
-    alone.  What is left of them along the free coordinates says nothing: in balance that is rounding.
+    What is left of them along the free coordinates says nothing: in balance that is rounding.
     """
+    return float(np.max(np.abs(acting(bench)), initial=0.0))
+
+
+def acting(bench: Bench) -> np.ndarray:
+    """Forces of inertia, gravity, loads and contacts on each link and what it carries, and those of each load and
+    contact alone, in the state evaluated last, as moments [N m]."""
     wrenches, loads, touch = (bench.engine.table(table) for table in (m.WRENCH, m.LOAD, m.TOUCH))
     forces = [bench.model.length * rows["force"] for rows in (wrenches, loads, touch)]
-    return max(float(np.max(np.abs(v), initial=0.0)) for v in [*forces, wrenches["moment"], loads["moment"]])
+    return np.concatenate([v.ravel() for v in [*forces, wrenches["moment"], loads["moment"]]])

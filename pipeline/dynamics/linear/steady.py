@@ -125,7 +125,7 @@ def newton(bench: Bench, q: np.ndarray) -> Equilibrium:
     at, last, iteration = tangent(bench, q), np.inf, 0
     size = bench.model.speed_scales
     for iteration in range(1, CORRECTIONS + 1):
-        forces = balancing(bench) * float(np.linalg.norm(np.abs(at.Z).T @ (1.0 / size)))
+        forces = at.forces * float(np.linalg.norm(np.abs(at.Z).T @ (1.0 / size)))
         step = _correction(bench, at, BALANCED * forces)
         length = float(np.max(np.abs(step) / size, initial=0.0))
         if length <= SHORT or (length <= ROUNDED and length > CONTRACTION * last):

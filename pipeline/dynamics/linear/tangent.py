@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, displacement_map
+from flexclear.pipeline.dynamics.linear.bench import Bench, acting, balance, balancing, displacement_map, set_drives
 from flexclear.pipeline.dynamics.linear.changes import force_changes
 
 #: singular values of the closures below this fraction of the largest are redundant rows
@@ -28,6 +28,7 @@ class Tangent:
 
     q: positions.  Z: speeds per free motion, shape (nv, mobility).  moves: positions per coordinate, (nq, nv).
     bias, mass, multipliers: as in `bench.Balance`; multipliers balance `bias` best.  slip: rates of the loops.
+    forces: that balance (`bench.balancing`).
     """
 
     q: np.ndarray
@@ -38,6 +39,7 @@ class Tangent:
     multipliers: np.ndarray
     slip: np.ndarray
     redundant: int
+    forces: float
 
     @property
     def unbalanced(self) -> np.ndarray:
@@ -47,7 +49,7 @@ class Tangent:
 
 def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     """The free motions at positions q whose loops are closed; SolverError where these are far beyond any real pose."""
-    b = balance(bench, q)
+    b, forces = balance(bench, q), balancing(bench)
     try:
         lower = np.linalg.cholesky(b.mass)
     except np.linalg.LinAlgError:
@@ -66,9 +68,8 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     load = scipy.linalg.solve_triangular(lower, b.bias, lower=True)
     multipliers = np.linalg.lstsq(spread.T, load, rcond=RANK)[0] if len(spread) else np.zeros(0)
     moves = displacement_map(bench, q)
-    return Tangent(
-        q, Z, moves, b.bias, b.mass, multipliers, b.slip, len(b.jacobian) - rank + bench.engine.mobility.redundant
-    )
+    redundant = len(b.jacobian) - rank + bench.engine.mobility.redundant
+    return Tangent(q, Z, moves, b.bias, b.mass, multipliers, b.slip, redundant, forces)
 
 
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -76,7 +77,7 @@ def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarra
     directions = np.zeros((motions.shape[1], bench.model.ny))
     directions[:, : len(at.q)] = (at.moves @ motions).T
     changes = force_changes(bench, at.q, directions, at.multipliers)
-    return motions.T @ changes.T, _rounding(bench, motions, changes, balancing(bench))
+    return motions.T @ changes.T, _rounding(bench, motions, changes, at.forces)
 
 
 def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -84,8 +85,20 @@ def damping(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray,
     directions = np.zeros((motions.shape[1], bench.model.ny))
     directions[:, bench.model.speeds] = motions.T
     changes = force_changes(bench, at.q, directions, np.zeros_like(at.multipliers))
-    turning = bench.fastest
-    return motions.T @ changes.T, _rounding(bench, motions, changes, balancing(bench) / turning if turning else 0.0)
+    return motions.T @ changes.T, _rounding(bench, motions, changes, _by_turning(bench, at))
+
+
+def _by_turning(bench: Bench, at: Tangent) -> float:
+    """What the motion of the drives adds to the forces that balance, per speed of the fastest; 0 where all rest."""
+    if not bench.fastest:
+        return 0.0
+    moving, drives = acting(bench), bench.drives
+    set_drives(bench, drives * [1.0, 0.0])
+    balance(bench, at.q)
+    resting = acting(bench)
+    set_drives(bench, drives)
+    balance(bench, at.q)
+    return float(np.max(np.abs(moving - resting), initial=0.0)) / bench.fastest
 
 
 def _rounding(bench: Bench, motions: np.ndarray, changes: np.ndarray, forces: float) -> np.ndarray:

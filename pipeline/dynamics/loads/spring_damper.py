@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.loads import SpringDamper as Declared
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, number
 from flexclear.pipeline.dynamics.loads.row import Row
-from flexclear.pipeline.dynamics.vectors import cross, dot, scale, sub
+from flexclear.pipeline.dynamics.vectors import add, cross, dot, scale, sub
 
 
 @kernel
@@ -27,7 +27,8 @@ def apply(d, k):
     along = scale(1.0 / length, r) if length > 0.0 else (0.0, 0.0, 0.0)
     rate = dot(along, sub(b.velocity, a.velocity))
     stretch, damped = length - number(d, k, 2), number(d, k, 1) * rate
-    force = scale(-(number(d, k, 0) * stretch + damped), along)
+    # the part without a direction also has its slope where the ends meet
+    force = add(scale(-number(d, k, 0), r), scale(number(d, k, 0) * number(d, k, 2) - damped, along))
     stored = 0.5 * number(d, k, 0) * stretch * stretch
     act(d, k, cross(p, force), force, length, rate, stored, 0.0, damped * rate)
 

@@ -67,7 +67,7 @@ def part_of(mechanism: Mechanism, contact: Contact) -> int:
 
 
 def ledger(mechanism: Mechanism, energies: Floors, lengths: Floors) -> dict[str, list[Group]]:
-    """Error groups of the contacts' variables in the ledger and of their bristles (`model.ledger`)."""
+    """Error groups of the contacts' variables in the ledger and of their bristles (`model.filling.blocks`)."""
     parts, ledger = [part_of(mechanism, contact) for contact in mechanism.contacts], list[Group]()
     for part in parts:
         floors = {"damping": energies, "friction": energies, "impulse": np.divide(energies, lengths)}  # [J], [N s]

@@ -39,7 +39,6 @@ class Loaded:
     bends: of each row of LOAD_BENDS, the levels at which it bends a load (`loads.row`).
     """
 
-    kinds: tuple[str, ...]
     loads: tuple[Load, ...]
     tables: dict[Any, Any]
     bends: list[tuple[float, ...]]
@@ -97,7 +96,7 @@ def tabulate(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, given: 
         m.LOAD_NUMBERS: numbers,
         m.LOOKS: looks,
     }
-    return Loaded(kinds, tuple(loads), tables, bends, laws)
+    return Loaded(tuple(loads), tables, bends, laws)
 
 
 def _look(mechanism: Mechanism, numbering: Numbering, gauges: Gauges, sort: str, name: str) -> int:

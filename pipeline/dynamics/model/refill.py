@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.core.scene.fields import Part
+from flexclear.pipeline.core.scene.formulas import formula
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import pieces_of
@@ -58,8 +59,10 @@ def refilled(model: Model, scene: Scene) -> Model | None:
     old = model.numbering
     numbering = replace(old, mechanism=mechanism, sites=list(old.sites), ports=list(old.ports))
     made = filled(mechanism, numbering, like=model)
-    # other kinds of laws are other kernels, and a drive that begins to move may contradict another one
-    return made if made.parts == model.parts and _moving(made) == _moving(model) else None
+    # other kinds of laws are other kernels, other variables have other places in the state, and a drive that begins to
+    # move may contradict another one
+    alike = (made.parts, made.ny, _moving(made)) == (model.parts, model.ny, _moving(model))
+    return made if alike else None
 
 
 def _same_structure(model: Model, scene: Scene) -> bool:
@@ -92,14 +95,22 @@ def _is_text(value: Any) -> bool:
     return isinstance(value, str) or (isinstance(value, tuple) and any(isinstance(one, str) for one in value))
 
 
+def _read(scene: Scene, load: str) -> set[str]:
+    """Names of bodies and frames that a load's expression reads."""
+    written = formula(scene, load)
+    return {name for _, name in written.reads} if written else set()
+
+
 def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
     """The mechanism with the masses of a scene; None where they decide more than numbers.
 
-    They do so where a link has its frame at its centre of mass, where closing moves it, and where it has hardly any
-    inertia: then a motion may be without mass.
+    They do so where a link has its frame at its centre of mass, where closing moves it, where an expression reads the
+    centre, which then is another site, and where it has hardly any inertia: then a motion may be without mass.
     """
     old = mechanism.scene.body
     changed = {name for name, body in scene.body.items() if body is not old[name]}
+    if changed & {name for load in scene.load for name in _read(scene, load)}:
+        return None
     links = list(mechanism.links)
     for i, link in enumerate(links):
         if link.inertia is not None and changed & link.places.keys():

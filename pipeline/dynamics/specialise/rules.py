@@ -35,7 +35,8 @@ def _power(tape: Any, z: Any, x: Any, dx: Any) -> Any:
     change = _times(tape, da, tape.multiply(b, lower))
     if not _nothing(db):
         change = tape.add(change, tape.multiply(db, tape.multiply(z, tape.write(FLOAT, "log", a))))
-    return tape.select(a > 0.0, change, 0.0)
+    # whole exponents have a slope on both sides of zero, others have no value below
+    return tape.select(a > 0.0, change, tape.select(a < 0.0, change, 0.0) if _nothing(db) else 0.0)
 
 
 def _arctan2(tape: Any, z: Any, x: Any, dx: Any) -> Any:

@@ -59,7 +59,7 @@ JOINT_FRICTION = Effect(
             "friction": "(<equations.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "
             "<equations.load_drives>)"
         },
-        "observe": {"friction": "<equations.take_off_closures>"},
+        "observe closures": {"friction": "<equations.take_off_closures>"},
     },
     iterates=True,
     fill="model:fill",

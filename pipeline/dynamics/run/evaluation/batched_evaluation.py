@@ -71,8 +71,8 @@ class LaneGroup:
             self._table[m.LANES_CALLED_BACK] = 0
             self._places[6 * len(self._words) :] = 0  # where arrays lie others may have lain before
             for lane in np.flatnonzero(self._words[:, 0] == m.LANE_IDLE)[: len(self._waiting)]:
-                steps = self._busy[lane] = self._waiting.popleft()
-                self._words[lane] = steps.words
+                self._words[lane] = self._waiting[0].words
+                self._busy[lane] = self._waiting.popleft()
         self._run(*(array.ctypes.data for array in (self._table, self._places, self._numbers)))
         for lane in np.flatnonzero(self._words[:, 0] == m.LANE_DONE):
             self._free(int(lane))
