@@ -62,8 +62,7 @@ class Kernel:
         """What Numba takes it for where other kernels name it."""
         from numba import typeof
 
-        made = lowering()
-        return made.KernelType(self.dispatcher) if made else typeof(self.dispatcher)
+        return typeof(self.dispatcher)
 
 
 def kernel(function: Callable) -> Any:
