@@ -93,11 +93,13 @@ def _by_turning(bench: Bench, at: Tangent) -> float:
     if not bench.fastest:
         return 0.0
     moving, drives = acting(bench), bench.drives
-    set_drives(bench, drives * [1.0, 0.0])
-    balance(bench, at.q)
-    resting = acting(bench)
-    set_drives(bench, drives)
-    balance(bench, at.q)
+    try:
+        set_drives(bench, drives * [1.0, 0.0])
+        balance(bench, at.q)
+        resting = acting(bench)
+    finally:
+        set_drives(bench, drives)
+    balance(bench, at.q)  # what follows reads the moving state
     return float(np.max(np.abs(moving - resting), initial=0.0)) / bench.fastest
 
 

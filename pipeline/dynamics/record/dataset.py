@@ -76,7 +76,7 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np
     for term in terms:
         mine = names.setdefault(KINDS[term.kind].owner, [])
         mine += [term.owner] if term.owner not in mine else []
-    wanted, parts, model = {KINDS[term.kind].variable for term in terms}, list[Series](), motions.model
+    requested, parts, model = {KINDS[term.kind].variable for term in terms}, list[Series](), motions.model
     if bodies := names.get("body"):
         those = motions.several(bodies)
         moved = motion_series(those, model.mechanism.origin)
@@ -89,9 +89,9 @@ def chosen(scene: Scene, motions: Motions, terms: Collection[Quantity], time: np
     if frames := names.get("frame"):
         places = shifted(motions.positions(frames), model.mechanism.origin)
         parts.append(({"frame_position": (("time", "frame", "axis"), places)}, {"frame": frames}))
-    parts += [made() for makes, made in _makers(scene, motions) if any(name.startswith(makes) for name in wanted)]
+    parts += [made() for makes, made in _makers(scene, motions) if any(name.startswith(makes) for name in requested)]
     parts.append(({"time": (("time",), time)}, {}))
-    variables = {name: values for part in parts for name, values in part[0].items() if name in wanted}
+    variables = {name: values for part in parts for name, values in part[0].items() if name in requested}
     return labelled(variables, {name: values for part in parts for name, values in part[1].items()})
 
 
