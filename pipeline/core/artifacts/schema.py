@@ -15,7 +15,7 @@ from flexclear.pipeline.core.artifacts.body_schema import BUNDLE, DEFICITS, MATR
 from flexclear.pipeline.core.artifacts.coordinates import AXES, COORDINATES, QUATERNION, turning, with_names
 from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays, of
 from flexclear.pipeline.core.scene.run_schema import RUN
-from flexclear.pipeline.core.scene.variable import Schema, Variable
+from flexclear.pipeline.core.scene.variable import Schema, Variable, table
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.version import DISTRIBUTION, version
 
@@ -45,70 +45,44 @@ __all__ = [
 
 CONVENTIONS = "CF-1.11"
 AnyRun = TypeVar("AnyRun", "xr.Dataset", LabelledArrays)
-_V = Variable
 
 #: stage 4, for scenes with an ensemble: members on the regular output times
-ENSEMBLE: Schema = {
-    "position": _V(("member", "time", "body", "axis"), "m", "centre of mass, world axes"),
-    "quaternion": _V(("member", "time", "body", "quat"), "1", "unit quaternion, body to world"),
-    "velocity": _V(("member", "time", "body", "axis"), "m s-1", "velocity of the centre of mass, world axes"),
-    "angular_velocity": _V(("member", "time", "body", "axis"), "rad s-1", "angular velocity, world axes"),
-    "acceleration": _V(("member", "time", "body", "axis"), "m s-2", "acceleration of the centre of mass, world axes"),
-    "contact_normal_force": _V(("member", "time", "contact"), "N", "normal contact force, >= 0", turning="N m"),
-    "contact_offset": _V(
-        ("member", "time", "contact", "axis"),
-        "m",
-        "ball centre relative to the socket centre, socket axes",
-        turning="rad",
-    ),
-    "impact_count": _V(("member", "contact"), "1", "closings with approach above 1e-4 m/s"),
-    "peak_force": _V(("member", "contact"), "N", "largest normal contact force of the run", turning="N m"),
-    "peak_acceleration": _V(
-        ("member", "body", "axis"), "m s-2", "largest magnitude of each component, of outputs and events"
-    ),
-    "contact_time_share": _V(("member", "contact"), "1", "fraction of the run spent in contact"),
-}
+ENSEMBLE: Schema = table("""
+position | member time body axis | m | centre of mass, world axes
+quaternion | member time body quat | 1 | unit quaternion, body to world
+velocity | member time body axis | m s-1 | velocity of the centre of mass, world axes
+angular_velocity | member time body axis | rad s-1 | angular velocity, world axes
+acceleration | member time body axis | m s-2 | acceleration of the centre of mass, world axes
+contact_normal_force | member time contact | N, N m | normal contact force, >= 0
+contact_offset | member time contact axis | m, rad | ball centre relative to the socket centre, socket axes
+impact_count | member contact | 1 | closings with approach above 1e-4 m/s
+peak_force | member contact | N, N m | largest normal contact force of the run
+peak_acceleration | member body axis | m s-2 | largest magnitude of each component, of outputs and events
+contact_time_share | member contact | 1 | fraction of the run spent in contact
+""")
 
 _OF_SECTION = {
-    name: _V(("section", *ENSEMBLE[name].dims[2:]), ENSEMBLE[name].units, ENSEMBLE[name].long_name)
+    name: replace(ENSEMBLE[name], dims=("section", *ENSEMBLE[name].dims[2:]))
     for name in ("position", "quaternion", "velocity", "angular_velocity", "acceleration")
 }
 #: sections of a periodic motion: the state once in each period, and the impacts of all recorded periods
-SECTIONS: Schema = _OF_SECTION | {
-    "orbit_position": _V(("waypoint", "body", "axis"), "m", "centre of mass at waypoints of the last period"),
-    "orbit_quaternion": _V(("waypoint", "body", "quat"), "1", "unit quaternion at waypoints of the last period"),
-    "orbit_velocity": _V(("waypoint", "body", "axis"), "m s-1", "velocity at waypoints of the last period"),
-    "orbit_contact_offset": _V(
-        ("waypoint", "contact", "axis"),
-        "m",
-        "ball centre relative to the socket centre there",
-        optional=True,
-        turning="rad",
-    ),
-    "contact_offset": _V(
-        ("section", "contact", "axis"),
-        "m",
-        "ball centre relative to the socket centre, socket axes",
-        optional=True,
-        turning="rad",
-    ),
-    "growth": _V(("followed",), "1", "logarithm of how a neighbour's distance grew in the period"),
-    "impact_section": _V(("impact",), "1", "number of the period in which the impact began", optional=True),
-    "impact_contact": _V(("impact",), "", "name of the contact", optional=True),
-    "impact_phase": _V(("impact",), "s", "time of the closing since the period began", optional=True),
-    "impact_approach_speed": _V(
-        ("impact",), "m s-1", "rate of penetration at the closing", optional=True, turning="rad s-1"
-    ),
-    "impact_peak_force": _V(
-        ("impact",), "N", "largest normal force of the contact that it begins", optional=True, turning="N m"
-    ),
-    "impact_duration": _V(("impact",), "s", "duration of that contact", optional=True),
-    "impact_position": _V(("impact", "body", "axis"), "m", "centre of mass at the closing, world axes", optional=True),
-    "impact_quaternion": _V(("impact", "body", "quat"), "1", "unit quaternion at the closing", optional=True),
-    "impact_velocity": _V(
-        ("impact", "body", "axis"), "m s-1", "velocity of the centre of mass at the closing", optional=True
-    ),
-}
+SECTIONS: Schema = _OF_SECTION | table("""
+orbit_position | waypoint body axis | m | centre of mass at waypoints of the last period
+orbit_quaternion | waypoint body quat | 1 | unit quaternion at waypoints of the last period
+orbit_velocity | waypoint body axis | m s-1 | velocity at waypoints of the last period
+orbit_contact_offset? | waypoint contact axis | m, rad | ball centre relative to the socket centre there
+contact_offset? | section contact axis | m, rad | ball centre relative to the socket centre, socket axes
+growth | followed | 1 | logarithm of how a neighbour's distance grew in the period
+impact_section? | impact | 1 | number of the period in which the impact began
+impact_contact? | impact | | name of the contact
+impact_phase? | impact | s | time of the closing since the period began
+impact_approach_speed? | impact | m s-1, rad s-1 | rate of penetration at the closing
+impact_peak_force? | impact | N, N m | largest normal force of the contact that it begins
+impact_duration? | impact | s | duration of that contact
+impact_position? | impact body axis | m | centre of mass at the closing, world axes
+impact_quaternion? | impact body quat | 1 | unit quaternion at the closing
+impact_velocity? | impact body axis | m s-1 | velocity of the centre of mass at the closing
+""")
 
 _STILL = """position quaternion frame_position joint_force joint_moment joint_position modal_coordinate
 drive_force drive_position load_force load_moment load_length contact_gap contact_penetration contact_force
@@ -117,49 +91,30 @@ contact_normal_force contact_offset potential elastic"""
 EQUILIBRIUM: Schema = {name: replace(RUN[name], dims=RUN[name].dims[1:]) for name in _STILL.split()}
 
 #: natural vibrations about it; shapes per unit of a coordinate with a modal mass of 1 kg, parts real and imaginary
-LINEAR: Schema = EQUILIBRIUM | {
-    "frequency": _V(("vibration",), "Hz", "frequency of the vibration, damping included"),
-    "undamped_frequency": _V(("vibration",), "Hz", "magnitude of the eigenvalue over 2 pi"),
-    "decay_rate": _V(("vibration",), "s-1", "rate at which the vibration decays; negative when it grows"),
-    "damping_ratio": _V(("vibration",), "1", "decay rate over the magnitude of the eigenvalue"),
-    "dominant": _V(("vibration",), "", "body with the largest fraction of the kinetic energy"),
-    "energy_share": _V(("vibration", "moving_body"), "1", "fraction of the body in the kinetic energy"),
-    "frame_translation": _V(("vibration", "part", "frame", "axis"), "1", "displacement of the named frame, world axes"),
-    "frame_rotation": _V(
-        ("vibration", "part", "frame", "axis"), "rad m-1", "rotation vector of the named frame, world axes"
-    ),
-    "modal_shape": _V(("vibration", "part", "mode"), "1", "modal coordinates of the flexible bodies", optional=True),
-}
+LINEAR: Schema = EQUILIBRIUM | table("""
+frequency | vibration | Hz | frequency of the vibration, damping included
+undamped_frequency | vibration | Hz | magnitude of the eigenvalue over 2 pi
+decay_rate | vibration | s-1 | rate at which the vibration decays; negative when it grows
+damping_ratio | vibration | 1 | decay rate over the magnitude of the eigenvalue
+dominant | vibration | | body with the largest fraction of the kinetic energy
+energy_share | vibration moving_body | 1 | fraction of the body in the kinetic energy
+frame_translation | vibration part frame axis | 1 | displacement of the named frame, world axes
+frame_rotation | vibration part frame axis | rad m-1 | rotation vector of the named frame, world axes
+modal_shape? | vibration part mode | 1 | modal coordinates of the flexible bodies
+""")
 
 #: Campbell diagram: vibrations about steady motion over the speed of a drive
-CAMPBELL: Schema = {
-    "frequency": _V(
-        ("speed", "branch"), "Hz", "frequency of the vibration in the axes of the mechanism, which turn", gaps=True
-    ),
-    "whirl_frequency": _V(
-        ("speed", "branch"),
-        "Hz",
-        "frequency in fixed axes, negative for backward whirls; NaN for what does not whirl",
-        gaps=True,
-    ),
-    "decay_rate": _V(
-        ("speed", "branch"), "s-1", "rate at which the vibration decays; negative when it grows", gaps=True
-    ),
-    "growth": _V(
-        ("speed",),
-        "s-1",
-        "largest rate at which a small motion grows; 0 where stable, NaN without steady motion",
-        gaps=True,
-    ),
-    "whirl": _V(("branch",), "", "forward or backward; empty for what does not whirl"),
-    "dominant": _V(("branch",), "", "body with the largest share of the kinetic energy at most speeds"),
-    "critical_speed": _V(
-        ("branch",), "rad s-1", "lowest speed at which the whirl is as fast as the turning, or NaN", gaps=True
-    ),
-    "frame_position": _V(
-        ("speed", "frame", "axis"), "m", "origin of the named frame in steady motion, world axes", gaps=True
-    ),
-}
+CAMPBELL: Schema = table("""
+frequency~ | speed branch | Hz | frequency of the vibration in the axes of the mechanism, which turn
+whirl_frequency~ | speed branch | Hz | frequency in fixed axes, negative for backward whirls; NaN for what does not
+    whirl
+decay_rate~ | speed branch | s-1 | rate at which the vibration decays; negative when it grows
+growth~ | speed | s-1 | largest rate at which a small motion grows; 0 where stable, NaN without steady motion
+whirl | branch | | forward or backward; empty for what does not whirl
+dominant | branch | | body with the largest share of the kinetic energy at most speeds
+critical_speed~ | branch | rad s-1 | lowest speed at which the whirl is as fast as the turning, or NaN
+frame_position~ | speed frame axis | m | origin of the named frame in steady motion, world axes
+""")
 
 
 #: variables that say what the entries of their dimension are, where their schema has them
