@@ -14,7 +14,7 @@ from pathlib import Path
 
 from flexclear.commands import export, reproduction, scenes
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
-from flexclear.pipeline.core.system import machine, platforms
+from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
 from flexclear.stages.workplace import add_options, open_workplace
@@ -36,8 +36,6 @@ OPTIONAL = ("pyvista", "vtk", "imageio")
 LABELS = {True: "ok   ", False: "WRONG", None: "lacks"}
 #: least space that is no reason to worry [B]
 LITTLE_MEMORY, LITTLE_DISK, LITTLE_FOR_KERNELS = 1e9, 2e9, 1e8
-#: characters of the longest path below the results, but for names of scenes that are longer than usual
-DEEPEST = 130
 #: a body in free fall: after the time T [s] it has fallen by g T^2/2
 GRAVITY, T = 9.81, 0.1
 SCENE = f"""
@@ -146,10 +144,6 @@ def _results(root: Path) -> tuple[str, bool]:
     wrong = [f"less than {machine.size(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
     if not os.access(next(p for p in (root, *root.parents) if p.exists()), os.W_OK):
         wrong.append("nothing can be written there: FLEXCLEAR_RESULTS names another folder")
-    if len(str(root)) + DEEPEST > platforms.longest_path():
-        wrong.append(
-            f"longer than paths to files may be here ({platforms.longest_path()} characters with {DEEPEST} of ours)"
-        )
     return "; ".join([f"{root}, {machine.size(free)} free", *wrong]), not wrong
 
 

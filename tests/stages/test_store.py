@@ -7,7 +7,6 @@ import os
 import resource
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import numpy as np
@@ -368,19 +367,3 @@ def test_whoever_writes_into_what_was_just_stored_is_noticed(store: Store) -> No
     os.utime(path, (1.0, 1.0))  # some clocks of disks are slower than this test
     with pytest.raises(ResourceError, match="changed while it was read"):
         store.load(record)
-
-
-def test_where_no_thread_is_to_be_had_files_are_forced_to_the_disk_all_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Containers limit threads; nor does a process have new ones that is about to end."""
-
-    def none(self: threading.Thread) -> None:
-        raise RuntimeError("can't start new thread")
-
-    forced: list[Path] = []
-    monkeypatch.setattr(threading.Thread, "start", none)
-    monkeypatch.setattr(disk, "force", forced.append)
-    assert disk.publish(tmp_path / "a", b"content") == disk.sha256(b"content")
-    assert (tmp_path / "a").read_bytes() == b"content"
-    assert len(forced) == 1

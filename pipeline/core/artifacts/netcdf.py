@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -129,39 +128,3 @@ def read(content: bytes) -> LabelledArrays:
 def _words(attrs: dict[str, Any]) -> list[str]:
     """The coordinates that attributes list, which are then taken away."""
     return str(attrs.pop(_COORDINATES, "")).split()
-
-
-def as_read(data: LabelledArrays) -> LabelledArrays:
-    """What `read` gives of the file that `write` makes of them, without the file.
-
-    Large arrays that are as they are read are not copied, but for parts of larger ones: of what an engine has observed
-    a run holds a third, and whoever keeps that would keep all of it.
-    """
-    variables = {
-        name: LabelledArray(array.dims, _values_as_read(array.values), _attributes_as_read(array.attrs))
-        for name, array in data.variables.items()
-    }
-    return replace(data, variables=variables, attrs=_attributes_as_read(data.attrs))
-
-
-def _values_as_read(values: np.ndarray) -> np.ndarray:
-    """In one piece and of its own, writable, as this machine has them; texts as long as the longest of them."""
-    if values.dtype.kind in "OU":
-        return np.asarray(values.astype(object), dtype=str)
-    small = values.nbytes < _LARGE  # may be of what stays in this process, and costs nothing to copy
-    native = values.astype(values.dtype.newbyteorder("="), order="C", copy=small or values.base is not None)
-    return np.require(native, requirements=["C", "W"])
-
-
-def _attributes_as_read(attrs: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: _attribute_as_read(value) for name, value in attrs.items()}
-
-
-def _attribute_as_read(value: Any) -> Any:
-    """Texts, lists of more than one of them, numbers of NumPy, arrays of more than one."""
-    if isinstance(value, str):
-        return value
-    numbers = np.array(value).reshape(-1)
-    if numbers.dtype.kind in "OU":
-        return [*map(str, numbers)] if numbers.size > 1 else str(numbers[0])
-    return numbers[0] if numbers.size == 1 else numbers

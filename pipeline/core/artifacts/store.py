@@ -54,8 +54,6 @@ REPORTED = ("warnings", "accuracy_verdict")
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
 PARTIAL = ".partial"
-#: what this process has stored last by the sha256 of its file: which file that is, and arrays, until they are loaded
-_STORED: dict[str, tuple[tuple[int, ...], LabelledArrays]] = {}
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
@@ -115,7 +113,6 @@ class Store:
             except OSError:
                 return f"{self._shown(path)} is missing, or no file"
             if actual != digest:
-                _STORED.pop(digest, None)
                 return f"{self._shown(path)} is corrupt (its content differs from its sha256)"
         return None
 
@@ -137,7 +134,7 @@ class Store:
             folder.mkdir(parents=True, exist_ok=True)
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
-                digests[name] = publish(path, content) if isinstance(content, bytes) else _store(path, content)
+                digests[name] = publish(path, content) if isinstance(content, bytes) else _written(path, content)
             said = {name: str(value) for name, value in _attributes(product).items() if name in REPORTED and value}
             record = Record(stage, key, digests, dict(facts), said, computed_by or {})
             publish(self.path(stage, key, "json"), checked(record.table()))
@@ -148,17 +145,10 @@ class Store:
         return self.arrays(record).to_xarray()
 
     def arrays(self, record: Record) -> LabelledArrays:
-        """The main file in memory. The bytes that were checked are those that are parsed.
-
-        What this process has stored last is not parsed: it is given once, where the file is still the one that was
-        written, since whoever gets it may change it.
-        """
+        """The main file in memory. The bytes that were checked are those that are parsed."""
         from flexclear.pipeline.core.artifacts import netcdf
 
         path = self.path(record.stage, record.key, MAIN)
-        file, stored = _STORED.pop(record.files[MAIN], (None, None))
-        if stored is not None and file == _identity(path):
-            return stored
         content = read_whole(path)
         if sha256(content) != record.files[MAIN]:
             raise ResourceError(f"{self._shown(path)} changed while it was read; run again to rebuild it")
@@ -329,16 +319,17 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
 
     Equal datasets give equal bytes: no times or names of this machine.
     """
-    from flexclear.pipeline.core.artifacts.labelled import of  # here, since what finds everything fresh writes nothing
-
-    digest = _written(path, of(dataset))
+    digest = _written(path, dataset)
     platforms.sync_folder(path.parent)
     return digest
 
 
-def _written(path: Path, data: LabelledArrays) -> str:
-    from flexclear.pipeline.core.artifacts import netcdf
+def _written(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
+    """The same; its name is not forced to the disk yet."""
+    from flexclear.pipeline.core.artifacts import netcdf  # here, since what finds everything fresh writes nothing
+    from flexclear.pipeline.core.artifacts.labelled import of
 
+    data = of(dataset)
     with temporary(path) as made:
         try:
             netcdf.write(made, data)
@@ -347,25 +338,3 @@ def _written(path: Path, data: LabelledArrays) -> str:
             made.write_bytes(bytes(data.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
         return settle(made, path)
-
-
-def _store(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
-    """Write a dataset, and keep its arrays for `Store.arrays` until the next one is stored.
-
-    Its name is forced to the disk with that of its record.
-    """
-    from flexclear.pipeline.core.artifacts import netcdf
-    from flexclear.pipeline.core.artifacts.labelled import of
-
-    data = of(dataset)
-    _STORED.clear()
-    digest = _written(path, data)
-    if data.nbytes < netcdf.COMPRESSED:
-        _STORED[digest] = _identity(path), netcdf.as_read(data)
-    return digest
-
-
-def _identity(path: Path) -> tuple[int, ...]:
-    """What distinguishes a file from others, and from itself after somebody wrote into it."""
-    status = path.stat()
-    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns

@@ -10,7 +10,7 @@ from threading import Event, Thread
 from typing import TypeVar
 
 from flexclear.pipeline.core.system.errors import StoppedError
-from flexclear.pipeline.core.system.platforms import cores, started
+from flexclear.pipeline.core.system.platforms import cores
 from flexclear.pipeline.core.system.progress import Progress, silent
 
 __all__ = ["cores", "free", "meanwhile", "side_by_side", "tell", "width"]
@@ -73,6 +73,15 @@ def side_by_side(
     return results
 
 
+def _started(thread: Thread) -> bool:
+    """Start a thread; whether the system lets this process have another one (a limit of a container, its own end)."""
+    try:
+        thread.start()
+    except RuntimeError:
+        return False
+    return True
+
+
 class _GivenUpError(Exception):
     """Nobody waits for this work any more."""
 
@@ -109,7 +118,7 @@ def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Resul
 
     thread = Thread(target=copy_context().run, args=(do,))
     try:
-        yield result if free() and started(thread) else lambda: work(silent)
+        yield result if free() and _started(thread) else lambda: work(silent)
     except BaseException as error:
         if not isinstance(error, StoppedError):  # of that the work hears itself, and leaves what it has in good order
             given_up.set()
