@@ -8,16 +8,27 @@ import platform
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from importlib import import_module
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from flexclear.commands import export, reproduction, scenes
+from flexclear.commands import export, new, reproduction, scenes
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
+from flexclear.pipeline.core.artifacts.store import Store
 from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
-from flexclear.stages.workplace import add_options, open_workplace
+from flexclear.stages import simulation
+from flexclear.stages.workplace import Workplace, add_options, open_workplace
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
+    from flexclear.stages.graph import Graph
 
 LIBRARIES = (
     "numpy",
@@ -63,6 +74,8 @@ except FlexclearError as error:
     sys.exit(str(error))
 print(float(result.position.sel(body="ball", axis="z")[-1]))
 """
+#: templates that represent the kinds of parts that most mechanisms have
+USUAL = ("pendulum", "four-bar", "slider-crank", "leg")
 #: integration is exact to its tolerance, 1e-10 of metres
 CLOSE = 1e-9
 
@@ -110,7 +123,7 @@ def command(options: argparse.Namespace) -> None:
             raise UnwellError("it does not end here as it did there")
         return
     if options.compile is not None:
-        names = import_module("flexclear.commands.compile_ahead").compiled(options.compile, open_workplace())
+        names = compiled_for(options.compile, open_workplace())
         print(f"compiled: all that runs of {', '.join(names)} call; {_kernels()[0]}")
         return
     wrong = []
@@ -198,3 +211,45 @@ def _self_test() -> tuple[str, bool]:
         return f"a free fall cannot be computed: {' '.join(line.strip() for line in last_lines)}", False
     fine = abs(float(lines[-1]) - expected) < CLOSE
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine
+
+
+def compiled_for(names: list[str], workplace: Workplace) -> list[str]:
+    """Compile, or fetch, what runs of scenes call; the usual ones' without names.  What each scene is called.
+
+    For an image, a cluster, or before a lesson: nothing is compiled behind a user's back, since a process that stays
+    after its command would take a laptop's battery, be billed or killed by a scheduler, and write into a folder that a
+    container is about to throw away. Code for one wiring is left to the runs that are long enough for it.
+    """
+    if names:
+        return _compiled(scenes.graphs(names), workplace)
+    with tempfile.TemporaryDirectory() as folder:
+        temporary = replace(workplace, store=Store(Path(folder) / "results"))
+        return _compiled(scenes.graphs([str(new.write(kind, Path(folder) / kind)[0]) for kind in USUAL]), temporary)
+
+
+def _compiled(requested: Sequence[Graph], workplace: Workplace) -> list[str]:
+    workplace.datasets(*(task for graph in requested for task in graph.bodies().values()))
+    workplace.monitor.start(len(requested))
+    for graph in requested:
+        bodies = graph.bodies()
+        known = dict(zip(bodies, workplace.datasets(*bodies.values()), strict=True))
+        name = workplace.monitor.begin(graph.scene.name, "kernels")
+        _compile(
+            simulation.rebuild(graph.simulate.params, known),
+            simulation.bundles(known),
+            partial(workplace.monitor.update, name),
+        )
+        workplace.monitor.finish(name, failed=False)
+    workplace.monitor.end()
+    return [graph.scene.name for graph in requested]
+
+
+def _compile(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) -> None:
+    """What a scene's methods call, and those that may take over."""
+    from flexclear.pipeline.dynamics.compile import functions
+    from flexclear.pipeline.dynamics.effects import schemes
+    from flexclear.pipeline.dynamics.run.run import engine_of
+
+    model = engine_of(scene, reduced, progress).model
+    for scheme in schemes(scene):
+        functions.entry(model.parts, scheme, lambda text: progress(None, text)).complete()

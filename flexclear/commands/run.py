@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from flexclear.commands import as_json, export, shown_folders
+from flexclear.commands import as_json, export
 from flexclear.commands.plan import planned_scenes
 from flexclear.commands.scenes import (
     FACTS,
     check_target,
+    claim,
     conclude,
     copy_run,
     deficits,
@@ -57,13 +58,13 @@ def command(options: argparse.Namespace) -> None:
     requested = [Graph(plan.planned) for plan in plans] or requested
     for graph in requested:
         check_run(graph.scene, workplace.store.root)
-        taken = shown_folders.claim(graph.scene, workplace.store)
+        taken = claim(graph.scene, workplace.store)
         if taken is not None:
             workplace.monitor.say(taken)
     outcome = workplace.bring([task for graph in requested for task in graph.up_to(options.to)])
     check(outcome)
     if options.to == "bundle" and not options.json:
-        print("\n\n".join(filter(None, (deficits(graph, workplace, outcome) for graph in requested))))
+        print("\n\n".join(filter(None, (deficits(graph, workplace) for graph in requested))))
     if options.out is not None:
         copy_run(requested[0], workplace, options.out)
     if options.json:

@@ -16,7 +16,7 @@ from pathlib import Path, PureWindowsPath
 import pytest
 
 import flexclear as fc
-from flexclear.commands import reproduction, shown_folders
+from flexclear.commands import reproduction, scenes
 from flexclear.commands.__main__ import COMMANDS, main
 from flexclear.pipeline.core.scene.load import scene_name
 from flexclear.pipeline.core.system import file_names, platforms
@@ -304,14 +304,14 @@ def test_names_are_the_same_where_any_system_takes_them_for_the_same() -> None:
 
 
 def test_scenes_that_differ_in_capitals_only_are_not_run_together(tmp_path: Path, root: Path) -> None:
-    scenes = []
+    alike = []
     for name in ("one/Pin", "two/pin"):
         path = tmp_path / f"{name}.toml"
         path.parent.mkdir()
         shutil.copy(root / "scenes" / "checks" / "pendulum.toml", path)
-        scenes.append(fc.load_scene(path))
+        alike.append(fc.load_scene(path))
     with pytest.raises(InputError, match="replace each other"):
-        shown_folders.refuse_namesakes(scenes)
+        scenes._refuse_namesakes(alike)
 
 
 def test_a_path_written_as_on_windows_is_told_how_to_write_it(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts import disk, netcdf
+from flexclear.pipeline.core.artifacts import disk
 from flexclear.pipeline.core.artifacts.disk import publish
 from flexclear.pipeline.core.artifacts.store import Record, Store, write_dataset
 from flexclear.pipeline.core.system.errors import ResourceError
@@ -343,20 +343,6 @@ def test_names_of_an_artifact_are_forced_to_the_disk_once_after_its_record(
     folder = store.path("simulate", KEY, "nc").parent
     assert [path.parent for path in forced[:2]] == [folder, folder]
     assert forced[2:] == [folder]
-
-
-def test_what_was_just_stored_is_not_parsed_and_given_once(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever loads it may change it: the next one gets it from the file."""
-    record = put(store)
-    with monkeypatch.context() as patch:
-        patch.delattr(netcdf, "read")
-        first = store.load(record)
-    second = store.load(record)
-    assert first.identical(second)
-    name = next(str(n) for n, v in first.data_vars.items() if v.dtype.kind == "f" and v.size)
-    first[name].values[...] = -1.0
-    assert not first.identical(second)
-    assert store.load(record).identical(second)
 
 
 def test_whoever_writes_into_what_was_just_stored_is_noticed(store: Store) -> None:

@@ -42,12 +42,7 @@ Known = dict[str, tuple[str, str, list[str], list[str]]]
 KNOWN: Known = {}
 #: modules that only word messages, citations and validation errors: no result depends on them
 _SCENE = "flexclear.pipeline.core.scene"
-WORDING = {
-    "flexclear.pipeline.core.scene.citations",
-    f"{_SCENE}.key_descriptions",
-    f"{_SCENE}.validation_errors",
-    f"{_SCENE}.plausibility",
-}
+WORDING = {f"{_SCENE}.{name}" for name in ("citations", "key_descriptions", "validation_errors", "plausibility")}
 #: the functions that `import flexclear` offers stand above the stages: no result reaches them
 ABOVE = {"flexclear.public"}
 #: packages whose modules' docstrings are titles on pages
@@ -221,42 +216,21 @@ def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[s
 
 
 def code_digest(tree: ast.Module, *, docstring: bool = False) -> str:
-    """Digest of what a module does: its syntax tree without docstrings and without the words of raised errors.
+    """Digest of what a module does: its syntax tree without docstrings and the words of raised errors, taken out of it.
 
     docstring: whether that of the module counts.
     """
-    words = [ast.get_docstring(tree) or ""] if docstring else []
-    _write_code(tree, words, worded=True)
-    return hashlib.sha256("\0".join(words).encode()).hexdigest()
-
-
-def _write_code(node: ast.AST, words: list[str], worded: bool) -> None:
-    """Append the names, constants and nesting of a syntax tree, in a form that all releases of Python share.
-
-    worded: whether texts count; in a statement that raises an error they do not.
-    """
-    worded = worded and not isinstance(node, ast.Raise)
-    words.append(type(node).__name__)
-    for name in node._fields:
-        value = getattr(node, name, None)
-        if name in ("ctx", "kind", "type_comment", "type_ignores") or value is None or value == []:
-            continue
-        words.append(name)
-        if name == "body" and isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
-            value = value[1:]
-        for part in value if isinstance(value, list) else [value]:
-            if not worded and (isinstance(part, ast.JoinedStr) or _is_text(part)):
-                words.append("text")
-            elif isinstance(part, ast.AST):
-                _write_code(part, words, worded)
-            else:
-                words.append(repr(part))
-        words.append("]")
-    words.append(")")
-
-
-def _is_text(node: object) -> bool:
-    return isinstance(node, ast.Constant) and isinstance(node.value, str)
+    title = ast.get_docstring(tree) if docstring else ""
+    for node in ast.walk(tree):
+        if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            del node.body[0]
+        elif isinstance(node, ast.Raise):
+            for part in ast.walk(node):
+                if isinstance(part, ast.JoinedStr):
+                    part.values = []
+                elif isinstance(part, ast.Constant) and isinstance(part.value, str):
+                    part.value = ""
+    return hashlib.sha256(f"{title}\0{ast.dump(tree)}".encode()).hexdigest()
 
 
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
