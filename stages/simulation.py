@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.appearance import UNSEEN
-from flexclear.pipeline.core.scene.resource_estimate import check_run
+from flexclear.pipeline.core.scene.limits import check_run
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.core.workflow.task import given_arrays
 from flexclear.stages import rigid_body

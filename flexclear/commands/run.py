@@ -18,7 +18,7 @@ from flexclear.commands.scenes import (
     print_files,
     scene_arguments,
 )
-from flexclear.pipeline.core.scene.resource_estimate import check_run
+from flexclear.pipeline.core.scene.limits import check_run
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages.graph import STAGES, Graph

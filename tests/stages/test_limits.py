@@ -16,9 +16,8 @@ import pytest
 
 from flexclear.commands import cost, sections
 from flexclear.commands.__main__ import main
-from flexclear.pipeline.core.scene.limits import check_cells
+from flexclear.pipeline.core.scene.limits import check_cells, check_run, row
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
-from flexclear.pipeline.core.scene.resource_estimate import check_run, row
 from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import InputError, ResourceError
 from flexclear.pipeline.structure.fe.exchange import files

@@ -169,7 +169,7 @@ class Part(BaseModel):
     @classmethod
     def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """The schema, with the meanings of keys from the docstring."""
-        from flexclear.pipeline.core.scene.key_descriptions import meanings  # reads docstrings, which only schemas need
+        from flexclear.pipeline.core.scene.citations import meanings  # reads docstrings, which only schemas need
 
         schema = handler(core)
         properties = handler.resolve_ref_schema(schema).get("properties", {})

@@ -42,7 +42,7 @@ Known = dict[str, tuple[str, str, list[str], list[str]]]
 KNOWN: Known = {}
 #: modules that only word messages, citations and validation errors: no result depends on them
 _SCENE = "flexclear.pipeline.core.scene"
-WORDING = {f"{_SCENE}.{name}" for name in ("citations", "key_descriptions", "validation_errors", "plausibility")}
+WORDING = {f"{_SCENE}.{name}" for name in ("citations", "validation_errors", "plausibility")}
 #: the functions that `import flexclear` offers stand above the stages: no result reaches them
 ABOVE = {"flexclear.public"}
 #: packages whose modules' docstrings are titles on pages
