@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from flexclear.commands import as_json
 from flexclear.commands.scenes import graphs, joined, print_files, scene_arguments
 from flexclear.pipeline.core.artifacts.store import Record, publish
-from flexclear.pipeline.core.scene.ideal import EFFECTS, ideal, loose
+from flexclear.pipeline.core.scene.variants import EFFECTS, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages.graph import Graph

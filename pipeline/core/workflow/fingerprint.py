@@ -21,19 +21,7 @@ from pathlib import Path
 from threading import Lock
 
 from flexclear.pipeline.core.artifacts.disk import checked, publish, read_checked
-from flexclear.pipeline.core.artifacts.paths import TREE
-
-__all__ = [
-    "TREE",
-    "Sources",
-    "code_digest",
-    "imported",
-    "library_version",
-    "library_versions",
-    "parents",
-    "source_file",
-    "sources_of",
-]
+from flexclear.pipeline.core.artifacts.paths import TREE as TREE
 
 OWN = ("flexclear", "benchmarks")
 #: by module: digest of its text, digest of its code, own modules and libraries that it imports
