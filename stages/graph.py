@@ -18,7 +18,6 @@ from flexclear.stages import (
     derived_series,
     meshing,
     modal_analysis,
-    overview_figures,
     reduction,
     rendering,
     rigid_body,
@@ -149,7 +148,7 @@ class Graph:
         """Whether that motion is periodic, quasi-periodic or chaotic; shown as ``verdict.nc`` and a figure."""
         # the figure is headed by the name, which is a fact for once
         params = {"scene": self.scene.name}
-        return self._task("verdict", "motion_verdict:run", params, {"sections": self.sections}, shown="verdict")
+        return self._task("verdict", "evaluation:verdict", params, {"sections": self.sections}, shown="verdict")
 
     @cached_property
     def post(self) -> Task:
@@ -252,7 +251,8 @@ class Graph:
     def overview(self) -> Task:
         """General figures of the run."""
         inputs = {"run": self.simulate, "post": self.post}
-        task = self._task("overview", "overview_figures:run", overview_figures.params(self.scene), inputs)
+        watched = {"watched": [quantity.written() for quantity in self.scene.watched()]}
+        task = self._task("overview", "evaluation:overview", watched, inputs)
         return replace(task, part="figures", folder=self._folder("figures"))
 
     @cached_property

@@ -146,13 +146,9 @@ def parts(comparison: Comparison) -> list[Part]:
     pictures = [
         media(name, comparison.file(name).read_bytes(), text)
         for name, text in PICTURES.items()
-        if _there(comparison, name)
+        if name in comparison.record.files
     ]
     return [Part("differences", "Differences and errors", tables), Part("runs", "Side by side", "".join(pictures))]
-
-
-def _there(comparison: Comparison, name: str) -> bool:
-    return name in comparison.record.files
 
 
 def _labels(sides: list[Scene]) -> list[str]:
@@ -168,7 +164,7 @@ def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
     return Task(
         stage="comparison",
         scene=labels[-1],
-        run="flexclear.stages.run_comparison:run",
+        run="flexclear.stages.evaluation:comparison",
         params={"labels": labels, "quantities": list(quantities.values())},
         inputs=inputs,
         folder=f"compare/{joined(labels)}",

@@ -9,7 +9,7 @@ from flexclear.commands import as_json, export
 from flexclear.commands.plan import planned_scenes
 from flexclear.commands.scenes import (
     FACTS,
-    check_target,
+    check_out,
     claim,
     conclude,
     copy_run,
@@ -45,11 +45,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring scenes up to date; say what their bundles lack where those were asked for."""
-    if options.out is not None and len(options.scenes) > 1:
-        raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "run the scenes one by one")
-    if options.out is not None:
-        export.check_format(options.out)
-        check_target(options.out)
+    check_out(options.out, options.scenes)
     if options.verify and not options.planned:
         raise InputError("--verify", "reports the true error of a plan, and no plan is requested", "add --planned")
     requested = graphs(options.scenes, options.set)

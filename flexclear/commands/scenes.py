@@ -18,6 +18,7 @@ from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
 from flexclear.pipeline.core.scene.references import dangling
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system import file_names
 from flexclear.pipeline.core.system.errors import InputError, InputErrors, ResourceError, SolverError
 from flexclear.pipeline.core.system.external_files import reading, require_file
@@ -343,6 +344,26 @@ def copy_run(graph: Graph, workplace: Workplace, target: Path) -> None:
     dataset = run(graph.scene, workplace)
     with disk_limits(target.parent):
         export.write(dataset, target)
+
+
+def check_out(
+    out: Path | None, given: Sequence[str], what: str = "scene", endings: Sequence[str] = tuple(export.NEEDS)
+) -> None:
+    """InputError for `--out` where no file of one of the scenes can be written; asked before the work."""
+    if out is None:
+        return
+    if len(given) > 1:
+        raise InputError("--out", f"takes one {what}, not {len(given)}", f"run the {what}s one by one")
+    export.check_format(out, endings)
+    check_target(out)
+
+
+def moment(text: str | None) -> float | None:
+    """The time that `--at` names [s]; InputError for what is no time."""
+    try:
+        return None if text is None else quantity(text, "time")
+    except ValueError as error:
+        raise InputError(f"--at {text}", str(error), "give seconds, or a number with a unit of time") from None
 
 
 def check_target(target: Path, option: str = "--out") -> None:
