@@ -18,10 +18,10 @@ from flexclear.commands.scenes import (
     print_files,
     scene_arguments,
 )
-from flexclear.pipeline.core.scene.limits import check_run
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages.graph import STAGES, Graph
+from flexclear.stages.simulation import check_run
 from flexclear.stages.workplace import Workplace, check, open_workplace
 
 

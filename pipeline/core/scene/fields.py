@@ -17,7 +17,6 @@ from pydantic import (
     WithJsonSchema,
     model_validator,
 )
-from pydantic_core.core_schema import CoreSchema, no_info_before_validator_function
 
 from flexclear.pipeline.core.numerics.axes import check_axes, check_axis
 from flexclear.pipeline.core.scene.units import a, components, quantity
@@ -33,10 +32,10 @@ class Measure:
     dimension: str
     vector: bool = False
 
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return no_info_before_validator_function(self.read, handler(source))
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
+        return handler.generate_schema(Annotated[source, BeforeValidator(self.read)])
 
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+    def __get_pydantic_json_schema__(self, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         one: dict[str, Any] = {"type": ["number", "string"]}
         if self.vector:
             return {"type": "array", "items": one, "minItems": 3, "maxItems": 3, "description": self.dimension}

@@ -1,18 +1,14 @@
-"""What a scene may ask of the machine, and what its run would ask, judged before anything is computed."""
+"""What a scene may ask of the machine."""
 
 import re
 from math import prod
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from flexclear.pipeline.core.scene.fields import Part, Time
-from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import ResourceError
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.scene.schema import Scene
 
 _UNITS = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9, "TB": 1e12}
 _SIZE = re.compile(r"(\d{1,15}(?:\.\d{1,15})?) ?([kMGT]?B)")
@@ -29,15 +25,6 @@ def _bytes(value: Any) -> Any:
 
 _TEXT = {"type": "string", "description": "size such as '4 GB'"}
 Bytes = Annotated[float, BeforeValidator(_bytes), Field(gt=0.0), WithJsonSchema(_TEXT)]
-
-
-#: bytes of a row of a run, fitted to runs of 1 to 24 bodies: always, of a body, joint, contact, load, coordinate
-ALWAYS, BODY, JOINT, CONTACT, LOAD, MODE = 200, 160, 100, 350, 100, 24
-#: a run is in memory so many times at its end, measured 3.5 to 4.4; and on disk, in the cache and shown
-HELD, KEPT = 4.5, 2.0
-#: of a member of an ensemble only some bodies' motion is recorded, at most as often as this
-MEMBER_ROWS = 2000
-SPEND = "choose a longer output.interval, or say more in [limits]"
 
 
 class Limits(Part):
@@ -109,31 +96,3 @@ def check_cells(shape: Any, elements: Any, limits: Limits, recipe: Path) -> None
     if count > limits.cells:
         text = f"{min(count, 10**300):.3g}"  # a whole number may be beyond any float
         raise ResourceError(f"{recipe}: {text} cells are more than the {limits.cells} that limits.cells allows")
-
-
-def check_run(scene: "Scene", results: Path) -> None:
-    """ResourceError when a run or an ensemble of the scene would need more memory or disk than it may."""
-    rows = (scene.time.end - scene.time.start) / scene.output.interval + 1.0
-    need = rows * row(scene)
-    what = f"a run of {rows:.3g} rows"
-    machine.require_memory(HELD * need, what, SPEND, scene.limits.memory)
-    machine.require_disk(KEPT * need, what, results, SPEND, scene.limits.disk)
-    if scene.ensemble is not None:
-        n_bodies = len(scene.ensemble.bodies or scene.contacts() or scene.body)
-        need = scene.ensemble.members * min(rows, MEMBER_ROWS) * n_bodies * BODY
-        what = f"an ensemble of {scene.ensemble.members} members"
-        machine.require_memory(HELD * need, what, "ask for fewer members, or say more in [limits]", scene.limits.memory)
-    for name, body in scene.flexible().items():
-        if isinstance(body.modes.count, int) and body.modes.count > scene.limits.modes:
-            raise ResourceError(
-                f"body.{name}.modes.count = {body.modes.count} is more than the {scene.limits.modes} that limits.modes "
-                "allows: matrices of that size are factorised at every step"
-            )
-
-
-def row(scene: "Scene") -> int:
-    """Bytes of a row of the scene's run, about."""
-    modes = sum(b.modes.count if isinstance(b.modes.count, int) else 30 for b in scene.flexible().values())
-    counts = (len(scene.owners()["body"]), len(scene.joint), len(scene.owners()["contact"]), len(scene.forces()), modes)
-    each = (BODY, JOINT, CONTACT, LOAD, MODE)
-    return ALWAYS + sum(count * size for count, size in zip(counts, each, strict=True))
