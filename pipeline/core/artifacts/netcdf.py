@@ -19,8 +19,6 @@ from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledAr
 
 #: bytes of a dataset from which on room on the disk counts for more than time
 COMPRESSED = 1 << 26
-#: bytes of values from which on the library is given not to keep what it has read: that would cost more than it takes
-_LARGE = 1 << 16
 #: how the library takes values of a kind, where otherwise than they are
 _TAKEN = {"U": np.dtype("O"), "b": np.dtype("i1")}
 _LOCK = Lock()
@@ -73,7 +71,6 @@ def _define(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str
         shuffle=True,
         fletcher32=numeric,
         fill_value=values.dtype.type(np.nan) if kind == "f" else None,
-        chunk_cache=1,  # byte: nothing is written twice
     )
     variable.setncatts({**array.attrs, **listed, **truth})
     variable.set_auto_maskandscale(False)
@@ -114,10 +111,7 @@ def read(content: bytes) -> LabelledArrays:
         for name, variable in file.variables.items():
             own = {key: variable.getncattr(key) for key in variable.ncattrs() if key != _FILL}
             coords |= set(_words(own))
-            text = variable.dtype is str
-            if not text and variable.size * variable.dtype.itemsize >= _LARGE:
-                variable.set_var_chunk_cache(1)
-            values = np.asarray(variable[...], dtype=str if text else None)
+            values = np.asarray(variable[...], dtype=str if variable.dtype is str else None)
             if own.get("dtype") == "bool":
                 del own["dtype"]
                 values = values.astype(bool)

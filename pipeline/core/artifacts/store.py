@@ -111,9 +111,9 @@ class Store:
             try:
                 actual = digest_of(path)
             except OSError:
-                return f"{self._shown(path)} is missing, or no file"
+                return f"{self.below(path)} is missing, or no file"
             if actual != digest:
-                return f"{self._shown(path)} is corrupt (its content differs from its sha256)"
+                return f"{self.below(path)} is corrupt (its content differs from its sha256)"
         return None
 
     def put(
@@ -151,11 +151,11 @@ class Store:
         path = self.path(record.stage, record.key, MAIN)
         content = read_whole(path)
         if sha256(content) != record.files[MAIN]:
-            raise ResourceError(f"{self._shown(path)} changed while it was read; run again to rebuild it")
+            raise ResourceError(f"{self.below(path)} changed while it was read; run again to rebuild it")
         try:
             return netcdf.read(content)
         except (OSError, ValueError, RuntimeError, TypeError) as error:  # sums are right: it was never a dataset
-            raise ResourceError(f"{self._shown(path)} holds no dataset ({shown(str(error))}); remove it") from None
+            raise ResourceError(f"{self.below(path)} holds no dataset ({shown(str(error))}); remove it") from None
 
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
         """Make the current artifact visible: read-only copies in `folder`, and its facts in ``folder/.facts``.
@@ -189,9 +189,7 @@ class Store:
         if digest_of(target) != known if known else target.stat().st_mode & 0o222:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
             platforms.replace(target, aside)
-            self.say(
-                f"{self._shown(target)} was edited; the edit is stored as {aside.name}, and the result shown again"
-            )
+            self.say(f"{self.below(target)} was edited; the edit is stored as {aside.name}, and the result shown again")
 
     def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:
         """Put what is left of work that was stopped next to what is shown; its path, where anything is shown.
@@ -283,7 +281,8 @@ class Store:
         """Remove what killed processes left anywhere."""
         sweep(self.root)
 
-    def _shown(self, path: Path) -> str:
+    def below(self, path: Path) -> str:
+        """A path as messages name it."""
         return str(path.relative_to(self.root.parent))
 
 

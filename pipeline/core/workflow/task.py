@@ -105,22 +105,13 @@ def flatten(node: Any, where: str = "") -> list[tuple[str, str]]:
     Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
     date or a nan that somebody wrote into a recipe) is stored as text; the stage will refuse it.
     """
-    leaves: list[tuple[str, str]] = []
-    _gather(node, where, leaves)
-    return leaves
-
-
-def _gather(node: Any, where: str, leaves: list[tuple[str, str]]) -> None:
-    """`flatten` into a list: a report has tens of thousands of leaves."""
     if isinstance(node, Mapping) and node:
-        items = ((str(name), value) for name, value in node.items())
+        below = [(str(name), value) for name, value in node.items()]
     elif isinstance(node, (list, tuple)) and any(isinstance(x, (dict, list, tuple, Mapping)) for x in node):
-        items = ((str(n), value) for n, value in enumerate(node))
+        below = [(str(number), value) for number, value in enumerate(node)]
     else:
-        leaves.append((where, _JSON.encode(node)))
-        return
-    for name, value in items:
-        _gather(value, f"{where}.{name}" if where else name.lstrip("."), leaves)
+        return [(where, _JSON.encode(node))]
+    return [leaf for name, value in below for leaf in flatten(value, f"{where}.{name}" if where else name.lstrip("."))]
 
 
 def reasons(new: Mapping[str, str], last: Mapping[str, str] | None, unknown: frozenset[str] = frozenset()) -> list[str]:
