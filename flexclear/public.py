@@ -232,7 +232,9 @@ def equilibrium(
     >>> round(rest["position"].sel(body="mass", axis="z").item(), 9)  # where its spring is free [m]
     0.25
     """
-    return _linear(scene, time, drives, moving=moving, vibrations=False)
+    from flexclear.commands import scenes
+
+    return scenes.linear(_loaded(scene), time, drives, moving=moving, vibrations=False)
 
 
 def frequencies(
@@ -256,9 +258,7 @@ def frequencies(
     """
     from flexclear.commands import scenes
 
-    if speeds is None:
-        return _linear(scene, time, drives, moving=moving, vibrations=True)
-    return scenes.linear(_loaded(scene), time, drives, speeds=speeds, drive=drive)
+    return scenes.linear(_loaded(scene), time, drives, moving=moving, speeds=speeds, drive=drive)
 
 
 def compare(
@@ -362,19 +362,6 @@ def open(scene: Scene | str | Path) -> xr.DataTree:
     from flexclear.commands import scenes
 
     return scenes.results(scene)
-
-
-def _linear(
-    scene: Scene | str | Path,
-    time: float | None,
-    drives: Mapping[str, float] | None,
-    *,
-    moving: bool,
-    vibrations: bool,
-) -> xr.Dataset:
-    from flexclear.commands import scenes
-
-    return scenes.linear(_loaded(scene), time, drives, moving=moving, vibrations=vibrations)
 
 
 def _loaded(scene: Scene | str | Path) -> Scene:

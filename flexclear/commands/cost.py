@@ -113,6 +113,9 @@ class Study:
     evaluations: dict[str, dict[float, float]] = field(default_factory=dict)
     own: float = 0.0
     pace: float = 0.0
+    _complete: bool = False
+    _ensembles: dict[str, Task] = field(default_factory=dict)
+    _compiled: dict[tuple[str, ...], Task] = field(default_factory=dict)
 
     def begin(self) -> None:
         """Make the scene's own run, which predicts what others will take.
@@ -204,11 +207,6 @@ class Study:
             task = _measured(design, "run_ensemble", {"quantities": names}, self._kernels(design))
             self.workplace.datasets(task)
             self._ensembles[f"ensemble:rtol {rtol:g}"] = task
-
-    def __post_init__(self) -> None:
-        self._complete = False
-        self._ensembles: dict[str, Task] = {}
-        self._compiled: dict[tuple[str, ...], Task] = {}
 
     def _queue(self, designs: Sequence[cost_design.Design]) -> None:
         """Make points in this order; those that the budget no longer holds are left undone."""
