@@ -84,16 +84,11 @@ def settle(made: Path, path: Path) -> str:
 
     The name is on the disk after `system.sync_folder`, together with all others of its folder.
     """
-    force(made)
+    with made.open("rb+") as file:  # Windows forces only what could be written
+        os.fsync(file.fileno())
     digest = digest_of(made)
     platforms.replace(made, path)
     return digest
-
-
-def force(path: Path) -> None:
-    """Force the bytes of a file to the disk; OSError where it takes them no more."""
-    with path.open("rb+") as file:  # Windows forces only what could be written
-        os.fsync(file.fileno())
 
 
 def checked(table: Mapping[str, Any]) -> bytes:
