@@ -46,6 +46,16 @@ def reference() -> xr.Dataset:
     return simulated(load_scene(RINGING, {**SHORT, "solver.rtol": 1e-11}))
 
 
+def test_forces_of_rounding_are_requested_by_no_default() -> None:
+    """A balanced rotor about an oblique axis, without weight: all its joints' forces are rounding."""
+    rotor = TREE / "scenes" / "checks" / "overhung_rotor.toml"
+    frame, speed = {"axis": (1.0, 2.0, 3.0)}, (0.0, 100.0)
+    turned = {"body.ground.frames.axle": frame, "body.disc.pose": None, "drive.axle.law.coefficients": speed}
+    run = simulated(load_scene(rotor, {**turned, "time.end": "1 s", "solver.by_need": True}))
+    assert run.attrs["accuracy_verdict"] == "met"
+    assert "force" not in run.attrs["accuracy_wanted"]
+
+
 def test_ringing_modes_get_the_method_that_follows_them() -> None:
     told: list[str] = []
     scene = load_scene(RINGING, {**SHORT, "accuracy": WANTED})
