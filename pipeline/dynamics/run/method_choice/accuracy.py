@@ -47,8 +47,8 @@ REFUSED_FOR_GOOD, TIGHTER = 1e-9, 0.1
 STUCK = 0.3
 #: the default request, as a fraction of each quantity's range; it is searched for at so many tolerances at most
 BY_DEFAULT, FEW_TRIES = 1e-3, 3
-#: forces below this fraction of the kinetic energy over the largest distance are rounding: stiff rods magnify it most
-NO_FORCE = 1e-9
+#: what is below this fraction of the motion's natural size is rounding, which stiff rods magnify in forces
+NOTHING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,8 @@ class Search:
             absolute = want.absolute
             if absolute is None:
                 size = quantities.scale(run, quantity)
-                absolute = 0.0 if self.predictable and _rounds(run, quantity, size) else (want.relative or 0.0) * size
+                rounding = self.predictable and size <= NOTHING * quantities.natural_size(run, quantity.unit)
+                absolute = 0.0 if rounding else (want.relative or 0.0) * size
             if not absolute > 0.0 and self.predictable:
                 continue
             if not absolute > 0.0:
@@ -157,12 +158,6 @@ class Search:
                 )
             requested[quantity] = absolute
         return requested
-
-
-def _rounds(run: xr.Dataset, quantity: Quantity, size: float) -> bool:
-    """Whether a force or moment of this size [N, N m] is nothing but rounding of the motion."""
-    distances = {"force": float(np.linalg.norm(np.ptp(run["frame_position"].values, axis=(0, 1)))), "moment": 1.0}
-    return size * distances.get(quantity.kind, np.inf) <= NO_FORCE * float(run["kinetic"].values.max())
 
 
 def deliver(
