@@ -21,7 +21,7 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.effects import schemes
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.run import progress_rate, trajectory
-from flexclear.pipeline.dynamics.run.method_choice.accuracy import FINER, Attempt, Search
+from flexclear.pipeline.dynamics.run.method_choice.accuracy import FINER_TOLERANCE, Attempt, Search
 from flexclear.pipeline.dynamics.run.method_choice.method_selection import Rates, Suit
 from flexclear.pipeline.dynamics.run.progress_rate import Look, limited, pace
 from tests.analytic.mechanism_runs import TREE, bundles
@@ -251,7 +251,7 @@ def test_stability_is_looked_for_in_the_steps_of_late() -> None:
 
 def searched(method: str, loose: int, tight: int) -> Search:
     """Of which a run and one at a hundredth of its tolerance have been made."""
-    runs = {1e-4: (method, loose), 1e-4 * FINER: ("dop853", tight)}
+    runs = {1e-4: (method, loose), 1e-4 * FINER_TOLERANCE: ("dop853", tight)}
     made = {at: xr.Dataset(attrs={"method": name, "evaluations": n}) for at, (name, n) in runs.items()}
     return Search(load_scene(RIGID), lambda scene, judges: xr.Dataset(), runs=made)
 
