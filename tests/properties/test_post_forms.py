@@ -16,11 +16,10 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, shape_files, surfaces, vibrations
-from flexclear.pipeline.post.render.forms import Seat
+from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, surfaces, vibrations
+from flexclear.pipeline.post.render.forms import Seat, equivalent
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
 from flexclear.pipeline.post.render.pictures import Shown, make
-from flexclear.pipeline.post.render.solids import equivalent
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.wheels import wheels
 from flexclear.pipeline.post.shapes.body_shape import surface
@@ -129,7 +128,7 @@ def test_a_scene_says_what_a_body_looks_like_and_no_run_depends_on_it():
 def test_shapes_come_from_files_of_other_programs(suffix: str, tmp_path: Path):
     box = surfaces.box((100.0, 20.0, 10.0))
     meshio.Mesh(box.points, [("triangle", box.triangles)]).write(tmp_path / f"part{suffix}")
-    read = shape_files.read(tmp_path / f"part{suffix}", 1e-3)
+    read = forms.read(tmp_path / f"part{suffix}", 1e-3)
     np.testing.assert_allclose(spans(read), [0.1, 0.02, 0.01], rtol=SINGLE)
     assert volume(read) == pytest.approx(2e-5, rel=SINGLE)
 
@@ -137,7 +136,7 @@ def test_shapes_come_from_files_of_other_programs(suffix: str, tmp_path: Path):
 def test_of_a_volume_mesh_the_boundary_is_drawn(tmp_path: Path):
     x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
     meshio.Mesh(x, [("tetra", np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))]).write(tmp_path / "two.vtk")
-    read = shape_files.read(tmp_path / "two.vtk", 1.0)
+    read = forms.read(tmp_path / "two.vtk", 1.0)
     assert len(read.triangles) == 6  # of eight faces two are inside
     # the corner's sixth of a cube, and what lies beyond it: a third
     assert volume(read) == pytest.approx(1 / 6 + 1 / 3, rel=1e-12)
@@ -147,7 +146,7 @@ def test_of_a_volume_mesh_the_boundary_is_drawn(tmp_path: Path):
 def test_a_file_that_is_no_surface_is_refused_in_words(content: bytes, tmp_path: Path):
     (tmp_path / "part.stl").write_bytes(content)
     with pytest.raises(InputError, match=r"part\.stl"):
-        shape_files.read(tmp_path / "part.stl", 1.0)
+        forms.read(tmp_path / "part.stl", 1.0)
 
 
 def test_a_shape_file_that_is_not_there_is_told_with_its_place():
