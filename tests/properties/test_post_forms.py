@@ -179,7 +179,7 @@ def test_the_viewer_bends_a_rod_as_the_run_does():
     step = run.sizes["time"] // 2
     rest = surfaces_of(bundle)
     q = run.modal_coordinate.values[step, rod.columns]
-    fields = player.linear_fields(rod, rest)
+    fields = player.linear_fields(rod.bundle)
     points = rest - bundle.first_moment.values / float(bundle.mass) + np.tensordot(q, fields, axes=1)
     true, _ = placed(run, rod, step)
     own = true - run.position.values[step, rod.index]
