@@ -13,7 +13,7 @@ from typing import Any
 from benchmarks.family import Case, Family, Record, each
 from flexclear.pipeline.core.artifacts.store import write_dataset
 from flexclear.pipeline.post.plotting.table import pipe_table
-from flexclear.pipeline.structure.kinds.kind import of_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 from flexclear.stages.cost_point import peak_memory
@@ -63,7 +63,7 @@ def _body(case: Case) -> list[Record]:
     """Seconds by part, and the largest memory so far."""
     shape, parts, begun = case.of, Parts(), time.process_time()
     recipe = {"interfaces": list(FRAMES), "shape": shape, "material": MATERIAL, "frames": FRAMES}
-    mesh = of_recipe(recipe).build(recipe, Path())
+    mesh = kind.build(recipe, Path())
     modes = solve(mesh, "craig-bampton", COUNT, progress=parts)
     parts(None, "inertia integrals")
     with tempfile.TemporaryDirectory() as folder:

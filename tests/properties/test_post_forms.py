@@ -24,7 +24,7 @@ from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.wheels import wheels
 from flexclear.pipeline.post.shapes.body_shape import surface
 from flexclear.pipeline.post.shapes.rod_shape import AROUND, PER_CELL
-from flexclear.pipeline.structure.kinds.kind import of_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes.rigid import drawn
 from flexclear.stages import rendering, simulation
 from tests.paper import synthetic
@@ -348,10 +348,10 @@ def test_a_rectangular_rod_is_drawn_with_its_sides(root: Path):
     shape = {"type": "straight-beam", "length": 0.2}
     plain = {"elements": 2, "shape": shape, "material": recipe["material"], "frames": {"a": {"x": 0.0}}}
     rectangle = {"section": {"type": "rectangle", "width": 0.012, "height": 0.008}}
-    flat = drawn(of_recipe(plain).build(plain | rectangle, root))
+    flat = drawn(kind.build(plain | rectangle, root))
     points, _ = surface(flat, np.zeros(1))
     assert np.ptp(points, axis=0) == pytest.approx([0.2, 0.012, 0.008], abs=1e-15)
     corners = np.abs(np.abs(points[:, 1:]) - [0.006, 0.004]).max(axis=1) < 1e-12
     assert corners.sum() == 5 * (2 * PER_CELL + 1)  # the first one is there twice
     round_one = plain | {"section": {"type": "tube", "radius": 0.01, "inner_radius": 0.008}}
-    assert drawn(of_recipe(plain).build(round_one, root))["radius"].values == pytest.approx(0.01, rel=1e-12)
+    assert drawn(kind.build(round_one, root))["radius"].values == pytest.approx(0.01, rel=1e-12)
