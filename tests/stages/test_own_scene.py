@@ -156,7 +156,7 @@ def test_lines_are_those_of_the_text():
 @pytest.fixture(scope="module")
 def validators():
     jsonschema = pytest.importorskip("jsonschema")
-    from flexclear.pipeline.structure.fe.json_schema import recipe_schema
+    from flexclear.pipeline.structure.fe.recipe import recipe_schema
 
     found = [jsonschema.Draft202012Validator(schema) for schema in (scene_schema(), recipe_schema())]
     for one in found:

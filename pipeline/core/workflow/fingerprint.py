@@ -50,8 +50,6 @@ WORDING = {
 }
 #: the functions that `import flexclear` offers stand above the stages: no result reaches them
 ABOVE = {"flexclear.public"}
-#: packages whose modules' docstrings are titles on pages
-TITLED = ("flexclear.papers.wang_wang_2019.figures.",)
 #: how often a source is parsed at most, where threads of libraries come between
 ATTEMPTS = 10
 _PARSING = Lock()
@@ -161,7 +159,7 @@ class Sources:
         if KNOWN.get(name, [""])[0] != text:
             tree = _parsed(source)
             own, libraries = _imported(tree, name, package, deep=True)
-            code = code_digest(tree, docstring=name.startswith(TITLED))
+            code = code_digest(tree)
             KNOWN[name] = (text, code, sorted(own), sorted(libraries))
         _, code, own_names, library_names = KNOWN[name]
         return Module(text, code, frozenset(own_names), frozenset(library_names), package)
@@ -220,12 +218,9 @@ def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[s
     return own, libraries
 
 
-def code_digest(tree: ast.Module, *, docstring: bool = False) -> str:
-    """Digest of what a module does: its syntax tree without docstrings and without the words of raised errors.
-
-    docstring: whether that of the module counts.
-    """
-    words = [ast.get_docstring(tree) or ""] if docstring else []
+def code_digest(tree: ast.Module) -> str:
+    """Digest of what a module does: its syntax tree without docstrings and without the words of raised errors."""
+    words: list[str] = []
     _write_code(tree, words, worded=True)
     return hashlib.sha256("\0".join(words).encode()).hexdigest()
 
