@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING
 from flexclear.commands import cost
 from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.ideal import ideal, loose
 from flexclear.pipeline.core.scene.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect
+from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import effect_ranking, kernels, limit, watched_quantities

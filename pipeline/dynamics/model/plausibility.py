@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.variants import loose
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.effects.stops.model import STOP, End
 from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism

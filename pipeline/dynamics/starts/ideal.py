@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.ideal import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import Start
+from flexclear.pipeline.core.scene.variants import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m

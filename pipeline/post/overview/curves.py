@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts import quantities
-from flexclear.pipeline.core.numerics.angles import Turning, turning
-from flexclear.pipeline.core.numerics.rotations import first_largest
+from flexclear.pipeline.core.numerics.rotations import Turning, first_largest, turning
 from flexclear.pipeline.core.scene.quantity import KINDS, Quantity
 
 #: factor and unit of smaller and larger values, largest first
