@@ -192,7 +192,7 @@ def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[s
 
 
 def code_digest(tree: ast.Module) -> str:
-    """Digest of what a module does: its syntax tree without docstrings and the words of raised errors, which go here."""
+    """Digest of what a module does: its syntax tree, from which docstrings and words of raised errors are taken."""
     for node in ast.walk(tree):
         if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             del node.body[0]
