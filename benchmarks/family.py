@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import wraps
 from typing import Any
 
 #: one measurement: `case`, then numbers and words as JSON has them
@@ -21,6 +22,17 @@ class Case:
 
 
 Measured = Iterator[tuple[Case, list[Record]]]
+
+
+def each(of: Callable[[Case], list[Record]]) -> Callable[[Sequence[Case], int], Measured]:
+    """What measures cases one after the other, in this process."""
+
+    @wraps(of)  # sources of a result are those of its module
+    def measure(cases: Sequence[Case], jobs: int) -> Measured:
+        for case in cases:
+            yield case, of(case)
+
+    return measure
 
 
 @dataclass(frozen=True)

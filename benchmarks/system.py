@@ -5,14 +5,14 @@ Windows has no module `resource`. What needs it refuses there in words (`lacking
 
 from __future__ import annotations
 
-import os
 import signal
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
+
+import psutil
 
 
 def lacking() -> str:
@@ -49,42 +49,31 @@ def limit_files(size: int) -> Callable[[], None]:
     return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
 
 
-def children(process: int) -> list[int]:
-    """Numbers of the processes that a process has started and that still run (Linux); none elsewhere.
+def children(process: int) -> list[psutil.Process]:
+    """The processes that a process has started and that still run; none where it has ended.
 
     Python's own tracker of semaphores is left out: without it nothing is lost, but Python prints tracebacks at its end.
     So are processes that still have their parent's command line: any of them may become the tracker.
     """
-    numbers, own = list[int](), _command_line(process)
-    for task in Path(f"/proc/{process}/task").glob("*/children"):
-        with suppress(OSError):
-            started = map(int, task.read_text(encoding="utf-8").split())
-            lines = {n: _command_line(n) for n in started}
-            numbers += [n for n, line in lines.items() if line not in (b"", own) and b"resource_tracker" not in line]
-    return numbers
+    found = list[psutil.Process]()
+    with suppress(psutil.Error):
+        parent = psutil.Process(process)
+        own = parent.cmdline()
+        for child in parent.children():
+            with suppress(psutil.Error):
+                line = child.cmdline()
+                if line not in ([], own) and "resource_tracker" not in " ".join(line):
+                    found.append(child)
+    return found
 
 
-def _command_line(process: int) -> bytes:
-    """Empty where the process has ended."""
+def seconds_of(process: psutil.Process) -> float:
+    """Processor time that a process has used [s]; 0 where it has ended."""
     try:
-        return Path(f"/proc/{process}/cmdline").read_bytes()
-    except OSError:
-        return b""
-
-
-def seconds_of(process: int) -> float:
-    """Processor time that a process has used [s] (Linux); 0 where it has ended."""
-    try:
-        fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
-    except OSError:
+        times = process.cpu_times()
+    except psutil.Error:
         return 0.0
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-
-
-def kill(process: int) -> None:
-    """End a process as the system does where memory is full; nothing where it has ended."""
-    with suppress(ProcessLookupError):
-        os.kill(process, signal.SIGKILL)
+    return float(times.user + times.system)
 
 
 def ended_by(exit_code: int) -> str:

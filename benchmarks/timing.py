@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from benchmarks import system
 
+T = TypeVar("T")
 #: of times in the log, per second
 UNITS = {"s": 1.0, "us": 1e6}
 
@@ -56,13 +58,18 @@ def of_children(task: Callable[[], object]) -> float:
 
 def interleaved(tasks: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, Times]:
     """Each task, which returns its own time [s], once per round, one after the other; a first round does not count."""
-    found: dict[str, list[float]] = {name: [] for name in tasks}
+    return {name: Times(seconds) for name, seconds in in_turn(tasks, rounds).items()}
+
+
+def in_turn(tasks: Mapping[str, Callable[[], T]], rounds: int) -> dict[str, tuple[T, ...]]:
+    """What each task returns, once per round, one after the other; a first round, which compiles, does not count."""
+    found: dict[str, list[T]] = {name: [] for name in tasks}
     for number in range(rounds + 1):
         for name, task in tasks.items():
-            seconds = task()
+            made = task()
             if number:
-                found[name].append(seconds)
-    return {name: Times(tuple(values)) for name, values in found.items()}
+                found[name].append(made)
+    return {name: tuple(made) for name, made in found.items()}
 
 
 def slope(x: Sequence[float], y: Sequence[float]) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping
 from importlib import import_module
 from pathlib import Path
@@ -94,12 +93,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     from flexclear.pipeline.structure.kinds import kind
 
     folder = Path(params.get("folder", "."))
-    part = kind.of_recipe(params["recipe"])
     try:
-        result = part.build(params["recipe"], folder)
+        result = kind.build(params["recipe"], folder)
     except InputError as error:
         raise in_recipe(error, Path(params.get("file", PLACE))) from None
-    with tempfile.TemporaryDirectory() as made:
-        path = Path(made) / "mesh.vtu"
-        part.write_vtu(result, path)
-        return {"nc": result, "vtu": path.read_bytes()}
+    return {"nc": result, "vtu": kind.of_mesh(result).vtu(result)}

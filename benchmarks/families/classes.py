@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
 
-from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Measured, Record
+from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Record, each
 from benchmarks.page import Columns, table
 from benchmarks.stability.classes import CASES
 from flexclear.pipeline.core.system.errors import FlexclearError
@@ -17,13 +16,6 @@ COLUMNS: Columns = {
     "largest deviation": lambda r: "–" if r["deviation"] is None else f"{r['deviation']:.1e}",
     "counts as wrong above": lambda r: f"{r['limit']:.0e}" if r["limit"] else "–",
 }
-
-
-def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each case."""
-    del jobs
-    for case in cases:
-        yield case, [examined(case.name)]
 
 
 def examined(name: str) -> Record:
@@ -58,7 +50,7 @@ FAMILY = Family(
     takes="2 min",
     page="stability.md",
     cases=lambda: [Case(name) for name in CASES],
-    measure=measure,
+    measure=each(lambda case: [examined(case.name)]),
     show=show,
     times=False,
     modules=modules,

@@ -13,10 +13,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import Columns, short, table
 from benchmarks.timing import of_children
 from flexclear.pipeline.core.system.platforms import cores
@@ -24,11 +23,9 @@ from flexclear.pipeline.core.system.platforms import cores
 SCENES = ("ideal", "csj", "far_csj_cb")
 
 
-def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each scene."""
-    for case in cases:
-        with tempfile.TemporaryDirectory() as folder:
-            yield case, [_first_run(f"sps4/{case.name}", Path(folder))]
+def _measured(case: Case) -> list[Record]:
+    with tempfile.TemporaryDirectory() as folder:
+        return [_first_run(f"sps4/{case.name}", Path(folder))]
 
 
 def _first_run(scene: str, folder: Path) -> Record:
@@ -57,18 +54,15 @@ def _first_run(scene: str, folder: Path) -> Record:
     }
 
 
-def show(records: list[Record]) -> str:
-    """One row for each scene."""
-    columns: Columns = {
-        "scene": lambda r: r["case"],
-        "processors": lambda r: str(r["processors"]),
-        "nothing compiled, wall [s]": lambda r: short(r["wall_s"]),
-        "processor [s]": lambda r: short(r["processor_s"]),
-        "kernels on disk, wall [s]": lambda r: short(r["warm_wall_s"]),
-        "its processor [s]": lambda r: short(r["warm_processor_s"]),
-        "code [kB]": lambda r: str(r["kilobytes"]),
-    }
-    return table(records, columns)
+COLUMNS: Columns = {
+    "scene": lambda r: r["case"],
+    "processors": lambda r: str(r["processors"]),
+    "nothing compiled, wall [s]": lambda r: short(r["wall_s"]),
+    "processor [s]": lambda r: short(r["processor_s"]),
+    "kernels on disk, wall [s]": lambda r: short(r["warm_wall_s"]),
+    "its processor [s]": lambda r: short(r["warm_processor_s"]),
+    "code [kB]": lambda r: str(r["kilobytes"]),
+}
 
 
 FAMILY = Family(
@@ -76,7 +70,7 @@ FAMILY = Family(
     takes="1 min",
     page="benchmarks.md",
     cases=lambda: [Case(name) for name in SCENES],
-    measure=measure,
-    show=show,
+    measure=each(_measured),
+    show=lambda records: table(records, COLUMNS),
     children=True,
 )

@@ -6,15 +6,14 @@ both together needed for forces?
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import Columns, table
-from benchmarks.timing import once
+from benchmarks.timing import interleaved, once
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
@@ -52,15 +51,10 @@ def cases() -> list[Case]:
     ]
 
 
-def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """Each with its records."""
-    for case in cases:
-        if case.of is None:
-            yield case, _influences()
-        elif case.name.startswith("open"):
-            yield case, [_open(case.of)]
-        else:
-            yield case, [_modes(case.of)]
+def _measured(case: Case) -> list[Record]:
+    if case.of is None:
+        return _influences()
+    return [(_open if case.name.startswith("open") else _modes)(case.of)]
 
 
 def _influences() -> list[Record]:
@@ -105,14 +99,15 @@ def _started(name: str, **changes: Any) -> tuple[Any, Any, np.ndarray]:
 def _open(name: str) -> Record:
     """Processor time of an evaluation with the contact open, and without looking at it [s]."""
     engine, _, start = _started(name)
-    there, times = int(engine.h[m.N_SURFACES]), dict[str, list[float]](with_it=[], without=[])
-    for _ in range(ROUNDS):
-        for key, count in (("with_it", there), ("without", 0)):
-            engine.h[m.N_SURFACES] = count
-            seconds = once(lambda: closure_rows.evaluate(engine, start, engine.start, EVALUATIONS))
-            times[key].append(seconds / EVALUATIONS)
+    there = int(engine.h[m.N_SURFACES])
+
+    def evaluation(surfaces: int) -> float:
+        engine.h[m.N_SURFACES] = surfaces
+        return once(lambda: closure_rows.evaluate(engine, start, engine.start, EVALUATIONS)) / EVALUATIONS
+
+    tasks = {"with_it": partial(evaluation, there), "without": partial(evaluation, 0)}
+    with_it, without = (min(times.seconds) for times in interleaved(tasks, ROUNDS).values())
     engine.h[m.N_SURFACES] = there
-    with_it, without = min(times["with_it"]), min(times["without"])
     return {"scene": name, "evaluation_us": 1e6 * with_it, "share": (with_it - without) / with_it}
 
 
@@ -121,12 +116,7 @@ def _modes(name: str) -> Record:
     found: Record = {"scene": name}
     for key, change in (("all", {}), ("static", {"body.rod1.modes.count": STATIC})):
         engine, other, start = _started(name, **change, **{"solver.rtol": RTOL})
-        seconds = []
-        for _ in range(3):
-            begun = time.process_time()
-            follow(engine, start, silent, other)
-            seconds.append(time.process_time() - begun)
-        found[f"{key}_s"] = min(seconds)
+        found[f"{key}_s"] = min(once(lambda: follow(engine, start, silent, other)) for _ in range(3))  # noqa: B023
     return found
 
 
@@ -211,6 +201,6 @@ FAMILY = Family(
     takes="3 min",
     page="plan.md",
     cases=cases,
-    measure=measure,
+    measure=each(_measured),
     show=show,
 )

@@ -11,7 +11,7 @@ from typing import Any
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, mechanism
 from benchmarks.page import Columns, short, table
-from benchmarks.timing import Times, slope
+from benchmarks.timing import Times, in_turn, slope
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Ensemble
@@ -98,15 +98,9 @@ def _alone() -> Iterator[None]:
 
 
 def _in_turn(tasks: Mapping[str, Callable[[], tuple[float, float]]]) -> dict[str, tuple[Times, Times]]:
-    """Each task once per round, one after the other; a first round, which compiles, does not count."""
-    found: dict[str, list[tuple[float, float]]] = {name: [] for name in tasks}
-    for number in range(ROUNDS + 1):
-        for name, task in tasks.items():
-            times = task()
-            if number:
-                found[name].append(times)
-    walls = {name: Times(tuple(wall for wall, _ in times)) for name, times in found.items()}
-    return {name: (walls[name], Times(tuple(cpu for _, cpu in times))) for name, times in found.items()}
+    """Wall and processor times of each task."""
+    found = {name: list(zip(*pairs, strict=True)) for name, pairs in in_turn(tasks, ROUNDS).items()}
+    return {name: (Times(wall), Times(cpu)) for name, (wall, cpu) in found.items()}
 
 
 def show(records: list[Record]) -> str:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 from scipy.linalg.lapack import dgesv
 
 from benchmarks import maximal
-from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.family import Case, Family, Record, each
 from benchmarks.mechanisms import SCENES, evaluation_time, mechanism, states, trajectory
 from benchmarks.page import spread
 from benchmarks.timing import interleaved, once
@@ -19,14 +19,9 @@ from flexclear.pipeline.post.plotting.table import pipe_table
 EVALUATIONS, SOLUTIONS, ROUNDS = 2000, 30, 25
 
 
-def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each scene: both in turns in one process, the ratio the median of the ratios of neighbours."""
-    for case in cases:
-        yield case, [_scene(case.name)]
-
-
-def _scene(name: str) -> Record:
-    here = mechanism(name)
+def _scene(case: Case) -> list[Record]:
+    """Both in turns in one process, the ratio the median of the ratios of neighbours."""
+    here = mechanism(case.name)
     engine = here.engine()
     system = maximal.assemble(here.scene, here.bundles)
     tasks: dict[str, Callable[[], float]] = {"dgesv": dgesv_time(system)}
@@ -37,12 +32,9 @@ def _scene(name: str) -> Record:
             )
     times = interleaved(tasks, ROUNDS)
     dense = times.pop("dgesv")
-    return {
-        "unknowns": system.count.unknowns,
-        "derivation": system.count.derivation(),
-        "dgesv": dense.record("us"),
-        "ours": {label: found.record("us") | {"ratio": dense.over(found)} for label, found in times.items()},
-    }
+    ours = {label: found.record("us") | {"ratio": dense.over(found)} for label, found in times.items()}
+    count = {"unknowns": system.count.unknowns, "derivation": system.count.derivation()}
+    return [{**count, "dgesv": dense.record("us"), "ours": ours}]
 
 
 def dgesv_time(system: maximal.Maximal) -> Callable[[], float]:
@@ -82,7 +74,7 @@ FAMILY = Family(
     takes="1 min",
     page="benchmarks.md",
     cases=lambda: [Case(name) for name in SCENES],
-    measure=measure,
+    measure=each(_scene),
     show=show,
     quick="ideal",
 )

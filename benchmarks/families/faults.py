@@ -16,10 +16,13 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import psutil
 
 from benchmarks import system
 from benchmarks.family import FINISHED, WRONG, Case, Family, Measured, Record
@@ -107,7 +110,6 @@ def cases(seed: int, flips: int, cuts: int, kills: int) -> list[Case]:
 
 def measure(todo: Sequence[Case], jobs: int) -> Measured:
     """A record for each kind of fault, in folders of its own."""
-    del jobs
     with tempfile.TemporaryDirectory(prefix="faults_") as name:
         folder = Path(name)
         (folder / "sweep.toml").write_text(SWEEP, encoding="utf-8", newline="\n")
@@ -336,7 +338,8 @@ def _helpers(
         if not waiting:  # nothing was brought about
             process.communicate()
             continue
-        system.kill(rng.choice(waiting))
+        with suppress(psutil.NoSuchProcess):
+            rng.choice(waiting).kill()
         said = process.communicate()[1].decode(errors="replace")
         sound = (
             process.returncode in SAID and "Traceback" not in said and not upkeep.inventory(store, whole=True).damaged
@@ -348,12 +351,11 @@ def _helpers(
     return counts
 
 
-def _idle(parent: int, processes: Sequence[int]) -> list[int]:
+def _idle(parent: int, processes: Sequence[psutil.Process]) -> list[psutil.Process]:
     """Those of a process's children that take no processor time for a moment."""
     before = {process: system.seconds_of(process) for process in processes}
     time.sleep(LOOK)
-    there = set(system.children(parent))
-    return [p for p in processes if p in there and system.seconds_of(p) - before[p] < IDLE]
+    return [p for p in system.children(parent) if p in before and system.seconds_of(p) - before[p] < IDLE]
 
 
 def _artifacts(store: Store) -> dict[tuple[str, str], str]:
@@ -384,18 +386,13 @@ def _concurrent(folder: Path, environment: dict[str, str]) -> Counter[str]:
     return Counter("detected" if code == 0 and sound else "used" for code in codes)
 
 
-def show(records: list[Record]) -> str:
-    """The table."""
-    return table(records, COLUMNS)
-
-
 FAMILY = Family(
     what="damaged files, killed commands and helpers, full disks: what is detected, and what would be used",
     takes="20 min",
     page="reliability.md",
     cases=cases,
     measure=measure,
-    show=show,
+    show=lambda records: table(records, COLUMNS),
     settings={"seed": 1, "flips": 200, "cuts": 50, "kills": 20},
     times=False,
     children=True,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.family import Case, Family, Record, each
 from benchmarks.geometry import identify, predict
 from benchmarks.geometry.identify import DANGLE, DZ, Member
 from benchmarks.geometry.kinematics import answer
@@ -70,12 +70,6 @@ ROWS: dict[str, Callable[[], Iterator[Record]]] = {
 }
 
 
-def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """The rows of each group."""
-    for case in cases:
-        yield case, list(ROWS[case.name]())
-
-
 def show(records: list[Record]) -> dict[str, str]:
     """The parts of the page, of the groups of rows that are there."""
     rows = {name: of for name in TABLES if (of := [r for r in records if r["case"] == name])}
@@ -86,12 +80,12 @@ def _mm(name: str, digits: int = 1) -> Callable[[Record], str]:
     return lambda r: f"{1e3 * r[name]:.{digits}f}"
 
 
-PLACE: Columns = {
+JOINTS: Columns = {
     "A [mm]": lambda r: f"±{1e3 * r['ax']:.1f}, ±{1e3 * r['ay']:.1f}",
     "B [mm]": lambda r: f"±{1e3 * r['bx']:.1f}, ±{1e3 * r['by']:.1f}",
     "height [mm]": _mm("height"),
-    "leg [mm]": _mm("leg"),
 }
+PLACE: Columns = {**JOINTS, "leg [mm]": _mm("leg")}
 ERRORS: Columns = {
     "angle [mrad]": _mm("angle", 3),
     "z [mm]": _mm("displacement", 4),
@@ -195,7 +189,7 @@ FAMILY = Family(
     takes="2 min",
     page="geometry.md",
     cases=lambda: [Case(name) for name in ROWS],
-    measure=measure,
+    measure=each(lambda case: list(ROWS[case.name]())),
     show=show,
     quick="members",
     times=False,

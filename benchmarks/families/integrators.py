@@ -83,17 +83,15 @@ def _forces(run: xr.Dataset) -> np.ndarray:
     return run.event_peak_force.values[hard]
 
 
-def show(records: list[Record]) -> str:
-    """A row for each; a dash where forces cannot be compared."""
-    columns: Columns = {
-        "integrator": lambda r: r["integrator"],
-        "steps": steps,
-        "evaluations": lambda r: str(r.get("evaluations", f"refused: {r.get('reason')}")),
-        "impacts": lambda r: str(r.get("impacts", "")),
-        "force error / largest": lambda r: f"{r['force_error']:.1e}" if r.get("force_error") is not None else "-",
-        "velocity error mm/s": lambda r: f"{r['velocity_mm_s']:.1e}" if "velocity_mm_s" in r else "",
-    }
-    return table(records, columns)
+#: a dash where forces cannot be compared
+COLUMNS: Columns = {
+    "integrator": lambda r: r["integrator"],
+    "steps": steps,
+    "evaluations": lambda r: str(r.get("evaluations", f"refused: {r.get('reason')}")),
+    "impacts": lambda r: str(r.get("impacts", "")),
+    "force error / largest": lambda r: f"{r['force_error']:.1e}" if r.get("force_error") is not None else "-",
+    "velocity error mm/s": lambda r: f"{r['velocity_mm_s']:.1e}" if "velocity_mm_s" in r else "",
+}
 
 
 FAMILY = Family(
@@ -102,7 +100,7 @@ FAMILY = Family(
     page="integrators.md",
     cases=cases,
     measure=measure,
-    show=show,
+    show=lambda records: table(records, COLUMNS),
     quick="dopri5, rtol 1e-06",
     times=False,
 )

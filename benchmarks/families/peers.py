@@ -6,14 +6,14 @@ against Pinocchio's `aba` on open chains of hinged links, from 5 to 300.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 from importlib.metadata import version
 
 import numpy as np
 
 from benchmarks.families.growth import four_bars, hinged
-from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.family import Case, Family, Record, each
 from benchmarks.mechanisms import Mechanism, State, evaluation_time
 from benchmarks.page import Columns, short, spread, table
 from benchmarks.peers_models import CHAINS, LEAN, PEERS, bent
@@ -35,12 +35,6 @@ def cases() -> list[Case]:
     """Each number of loops against each program, and each number of links of an open chain."""
     closed = [Case(f"{name}, {loops} loops", (name, loops)) for loops in LOOPS for name in PEERS]
     return closed + [Case(f"{name}, {links} links", (name, links)) for links in LINKS for name in CHAINS]
-
-
-def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each; both take turns in one process."""
-    for case in cases:
-        yield case, [(_of_chain if case.of[0] in CHAINS else _record)(*case.of)]
 
 
 def _of_chain(name: str, links: int) -> Record:
@@ -146,7 +140,7 @@ FAMILY = Family(
     takes="3 min",
     page="benchmarks.md",
     cases=cases,
-    measure=measure,
+    measure=each(lambda case: [(_of_chain if case.of[0] in CHAINS else _record)(*case.of)]),
     show=show,
     needs=("pinocchio", "peers"),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.family import Case, Family, Measured
 from benchmarks.mechanisms import SCENES, Mechanism, mechanism
 from benchmarks.page import Columns, spread, table
 from benchmarks.timing import interleaved, once
@@ -48,16 +48,14 @@ def _stage(here: Mechanism) -> Callable[[], float]:
     return lambda: once(lambda: dynamics.simulated(here.scene, here.bundles, silent))
 
 
-def show(records: list[Record]) -> str:
-    """The table; the rest of the stage is the evaluation of every recorded row, and the dataset."""
-    columns: Columns = {
-        "scene": lambda r: r["case"],
-        "integration [s]": lambda r: spread(r["integration"], "s", 4),
-        "simulate stage [s]": lambda r: spread(r["stage"], "s", 3),
-        "evaluations": lambda r: str(r["evaluations"]),
-        "us per evaluation, all in": lambda r: f"{r['us_per_evaluation']:.2f}",
-    }
-    return table(records, columns)
+#: the rest of the stage is the evaluation of every recorded row, and the dataset
+COLUMNS: Columns = {
+    "scene": lambda r: r["case"],
+    "integration [s]": lambda r: spread(r["integration"], "s", 4),
+    "simulate stage [s]": lambda r: spread(r["stage"], "s", 3),
+    "evaluations": lambda r: str(r["evaluations"]),
+    "us per evaluation, all in": lambda r: f"{r['us_per_evaluation']:.2f}",
+}
 
 
 FAMILY = Family(
@@ -66,6 +64,6 @@ FAMILY = Family(
     page="benchmarks.md",
     cases=lambda: [Case(name) for name in SCENES],
     measure=measure,
-    show=show,
+    show=lambda records: table(records, COLUMNS),
     quick="ideal",
 )

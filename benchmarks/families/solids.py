@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.family import Case, Family, Record, each
 from flexclear.pipeline.core.artifacts.store import write_dataset
 from flexclear.pipeline.post.plotting.table import pipe_table
-from flexclear.pipeline.structure.kinds.kind import of_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 from flexclear.stages.cost_point import peak_memory
@@ -60,28 +59,19 @@ class Parts:
         self._now = max([self._now, *(k for k, said in enumerate(PARTS.values()) if said in text)])
 
 
-def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each body: seconds by part, and the largest memory so far."""
-    for case in cases:
-        yield case, [_body(case.of)]
-
-
-def _body(shape: dict[str, Any]) -> Record:
-    parts, begun = Parts(), time.process_time()
+def _body(case: Case) -> list[Record]:
+    """Seconds by part, and the largest memory so far."""
+    shape, parts, begun = case.of, Parts(), time.process_time()
     recipe = {"interfaces": list(FRAMES), "shape": shape, "material": MATERIAL, "frames": FRAMES}
-    mesh = of_recipe(recipe).build(recipe, Path())
+    mesh = kind.build(recipe, Path())
     modes = solve(mesh, "craig-bampton", COUNT, progress=parts)
     parts(None, "inertia integrals")
     with tempfile.TemporaryDirectory() as folder:
         write_dataset(Path(folder) / "bundle.nc", bundle.build(mesh, modes))
     parts(None, "done")
-    return {
-        "cells": f"{shape['element'].removeprefix('hex')}-node cells",
-        "displacements": 3 * mesh.sizes["node"],
-        "seconds": parts.seconds,
-        "together": time.process_time() - begun,
-        "gibibytes": peak_memory() / 2**30,
-    }
+    sizes = {"cells": f"{shape['element'].removeprefix('hex')}-node cells", "displacements": 3 * mesh.sizes["node"]}
+    whole = {"together": time.process_time() - begun, "gibibytes": peak_memory() / 2**30}
+    return [{**sizes, "seconds": parts.seconds, **whole}]
 
 
 def show(records: list[Record]) -> str:
@@ -98,6 +88,6 @@ FAMILY = Family(
     takes="11 min, 7 GiB of memory",
     page="structure.md",
     cases=lambda: [Case(name, shape) for name, shape in SHAPES.items()],
-    measure=measure,
+    measure=each(_body),
     show=show,
 )

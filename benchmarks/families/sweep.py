@@ -5,14 +5,15 @@ from __future__ import annotations
 import os
 import pickle
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import psutil
 
-from benchmarks.family import Case, Family, Measured, Record
+from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import percent, table
 from flexclear.commands.scenes import bundles
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
@@ -61,11 +62,9 @@ SHARED, TURNS = 80, 3
 LOOKS = (500, 5000)
 
 
-def measure(cases: Sequence[Case], jobs: int) -> Measured:
-    """A record for each."""
+def _measured(case: Case) -> list[Record]:
     makers: dict[str, Callable[[], Record]] = {"workers": _workers, "memory": _memory}
-    for case in cases:
-        yield case, [makers[case.name]() if case.name in makers else _point(KINDS[case.name])]
+    return [makers[case.name]() if case.name in makers else _point(KINDS[case.name])]
 
 
 def _point(kind: Kind) -> Record:
@@ -154,13 +153,8 @@ def _memory() -> Record:
     for k, end in enumerate(ends, start=1):
         run(float(end))
         if k in LOOKS:
-            found.append(_resident())
+            found.append(psutil.Process().memory_info().rss / 1e6)
     return {"looks": list(LOOKS), "megabytes": found}
-
-
-def _resident() -> float:
-    lines = Path("/proc/self/status").read_text(encoding="utf-8").splitlines()
-    return float(next(line for line in lines if line.startswith("VmRSS")).split()[1]) / 1e3
 
 
 def show(records: list[Record]) -> dict[str, str]:
@@ -192,7 +186,7 @@ FAMILY = Family(
     takes="2 minutes",
     page="sweeps.md",
     cases=lambda: [Case(name) for name in (*KINDS, "workers", "memory")],
-    measure=measure,
+    measure=each(_measured),
     show=show,
     quick="pendulum",
 )

@@ -17,7 +17,7 @@ from flexclear.pipeline.core.scene.load import load_scene, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes.solution import solve
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
@@ -130,7 +130,7 @@ def _told_apart(made: Task, case: Case) -> Task:
 def rod(finer: int) -> xr.Dataset:
     """The paper's rod in cells."""
     recipe = read_toml(Path(scene(Case(0, FULL)).flexible()[ROD].mesh))
-    return mesh.build(recipe | {"elements": finer * recipe["elements"]})
+    return kind.build(recipe | {"elements": finer * recipe["elements"]})
 
 
 @cache

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from functools import partial
 
+from benchmarks.families.geometry import JOINTS
 from benchmarks.family import Record as Row
 from benchmarks.page import Columns, table
 from benchmarks.reference_conditions.claims import CLAIMS, Claim, Rows
@@ -14,12 +15,7 @@ from benchmarks.reference_conditions.design import FULL, RIGID
 from flexclear.pipeline.post.plotting.table import pipe_table
 
 PLACE = ("layout", "ax", "ay", "bx", "by", "height")
-LAYOUT: Columns = {
-    "layout": lambda r: "first" if r.get("first") else str(r["layout"]),
-    "A [mm]": lambda r: f"±{1e3 * r['ax']:.1f}, ±{1e3 * r['ay']:.1f}",
-    "B [mm]": lambda r: f"±{1e3 * r['bx']:.1f}, ±{1e3 * r['by']:.1f}",
-    "height [mm]": lambda r: f"{1e3 * r['height']:.1f}",
-}
+LAYOUT: Columns = {"layout": lambda r: "first" if r.get("first") else str(r["layout"]), **JOINTS}
 
 
 def rows_of(rows: list[Row], layout: int) -> Rows:

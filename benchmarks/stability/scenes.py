@@ -12,19 +12,16 @@ from typing import Any
 import numpy as np
 
 from benchmarks.family import Case
-from flexclear.pipeline.core.scene.load import compose
+from benchmarks.geometry.kinematics import Layout
+from benchmarks.geometry.scenes import ROD_CENTRE, ROD_END, edits
+from flexclear.pipeline.core.scene.load import compose, scene_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 
 CLEARANCE, STIFFNESS = 0.5e-3, 1.3631e11  # Table 3 [m], eq. (26) with its data [N/m^1.5]
 #: radii of the joint circles, start height [m], and the angles of the joints that are far from singular [deg]
 RADIUS_A, RADIUS_B, HEIGHT = 0.1, 0.2, 0.35
-START = np.array([0.0, 0.0, HEIGHT])
 ANGLE_A, ANGLE_B, SINGULAR = 30.0, 60.0, 45.0
-SIGNS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
-#: along a leg [m]: from the base ball to the cylinder's centre; from the platform ball down to the rod's
-#: centre and to its lower end
-CYLINDER, ROD, LOWER_END = 0.146, 0.160, 0.280
 STROKE, LIFT = 0.18, 0.06  # duration [s] and change of the driven legs [m]
 #: evaluations after which a case counts as refused: with rigid bodies about a minute; a hundred strokes take half of it
 CAP = 8_000_000
@@ -112,8 +109,8 @@ def _random(seed: int, count: int) -> Iterator[Case]:
 
 def scene(p: Parameters, rtol: float | None = None) -> Scene:
     """The scene of a point. Raises InputError when it cannot be described."""
+    moved = edits(layout(p.nearness), flexible=bool(p.modes)) if p.nearness else {}
     table = compose(TREE / "scenes" / "sps4" / "variants" / "first_csj.toml")
-    _place(table, p)
     _scale_mass(table["body"]["platform"], p.mass)
     joint = _contact(table["joint"]["A1"], p)
     for name in ("A1", "A2", "A3", "A4", "C")[: p.joints]:
@@ -123,36 +120,19 @@ def scene(p: Parameters, rtol: float | None = None) -> Scene:
     _time(table, p)
     table["solver"] = {"evaluations": CAP} | ({"rtol": rtol} if rtol else {})
     table.pop("ensemble", None)
-    made = Scene.model_validate(table)
+    made = scene_of(table, moved)
     made._name = "stability"
     return made
 
 
-def circles(nearness: float) -> tuple[np.ndarray, np.ndarray]:
-    """Centres of the platform and the base joints in their planes, shape (4, 3) [m]."""
-    angles = (ANGLE_A + nearness * (SINGULAR - ANGLE_A), ANGLE_B + nearness * (SINGULAR - ANGLE_B))
-    corners = []
-    for radius, angle in zip((RADIUS_A, RADIUS_B), np.deg2rad(angles), strict=True):
-        x, y = radius * np.cos(angle), radius * np.sin(angle)
-        corners.append(np.array([[sx * x, sy * y, 0.0] for sx, sy in SIGNS]))
-    return corners[0], corners[1]
-
-
-def _place(table: dict[str, Any], p: Parameters) -> None:
-    """Joint positions, and the start poses of the legs that follow from them."""
-    if p.nearness == 0.0:
-        return
-    for k, (a, b) in enumerate(zip(*circles(p.nearness), strict=True), start=1):
-        table["body"]["platform"]["frames"][f"A{k}"] = {"position": a.tolist()}
-        table["body"]["ground"]["frames"][f"B{k}"] = {"position": b.tolist()}
-        leg = a + START - b
-        length = float(np.linalg.norm(leg))
-        axis = leg / length
-        axes = {"z": leg.tolist(), "x": [-leg[1], leg[0], 0.0]}
-        cylinder, rod = table["body"][f"cylinder{k}"], table["body"][f"rod{k}"]
-        cylinder["pose"] = {"position": (b + CYLINDER * axis).tolist(), "axes": axes}
-        cylinder["frames"]["P"] = {"position": [0.0, 0.0, length - LOWER_END - CYLINDER]}
-        rod["pose"] = {"position": (b + (length - ROD) * axis).tolist(), "axes": axes}
+def layout(nearness: float) -> Layout:
+    """Joints on two circles, from the scene's own angles (0) to those of aligned squares, which are singular (1)."""
+    angles = np.deg2rad([own + nearness * (SINGULAR - own) for own in (ANGLE_A, ANGLE_B)])
+    (ax, ay), (bx, by) = (
+        radius * np.array([np.cos(angle), np.sin(angle)])
+        for radius, angle in zip((RADIUS_A, RADIUS_B), angles, strict=True)
+    )
+    return Layout(float(ax), float(ay), float(bx), float(by), HEIGHT)
 
 
 def _contact(joint: Mapping[str, Any], p: Parameters) -> dict[str, Any]:
@@ -169,7 +149,7 @@ def _contact(joint: Mapping[str, Any], p: Parameters) -> dict[str, Any]:
 def _flexible(rod: Mapping[str, Any], p: Parameters) -> dict[str, Any]:
     """The paper's rod with Craig-Bampton modes; its mesh frame lies at the lower end, x along the rod."""
     z, x = (np.array(rod["pose"]["axes"][k]) for k in "zx")
-    lower = np.array(rod["pose"]["position"]) - (LOWER_END - ROD) * z / np.linalg.norm(z)
+    lower = np.array(rod["pose"]["position"]) - (ROD_END - ROD_CENTRE) * z / np.linalg.norm(z)
     return {
         "type": "flexible",
         "mesh": str(TREE / "meshes" / "actuated_rod.toml"),

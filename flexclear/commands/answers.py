@@ -239,9 +239,11 @@ class _Comparison:
             pairs |= dict.fromkeys(waiting, members)
             full = self._point("", members)
             waiting = [n for n in waiting if undecided(Pair(full, self._point(n, members), members), self.chosen)]
-        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: IDEAL}
+        both = self._gone.get(IDEAL)  # a single effect may be all of them: it is not listed twice
+        alone = any(gone == both for name, gone in self._gone.items() if name != IDEAL)
+        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if alone else IDEAL}
         made = {name: (self._variant(name), self.tasks[name]) for name in ("", *names)}
-        left = [words[name] for name in undone]
+        left = [words[name] for name in undone if words[name]]
         return effect_ranking.task(self.scene, self.chosen, words, made, pairs, left)
 
     def _affordable(self) -> tuple[list[str], list[str]]:

@@ -173,10 +173,10 @@ def _recipes(path: Path) -> Iterator[Callable[[], Any]]:
 
 
 def _beam(path: Path) -> None:
-    from flexclear.pipeline.structure.fe import mesh
-    from flexclear.pipeline.structure.fe.recipe import read_recipe
+    from flexclear.pipeline.structure.fe import beam_mesh
+    from flexclear.pipeline.structure.fe.recipe import parse, read_recipe
 
-    mesh.build(read_recipe(path), where=str(path))
+    beam_mesh.build(parse(read_recipe(path), str(path)), path.parent, str(path))
 
 
 def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:

@@ -107,15 +107,14 @@ def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
     named = meshing.files(table, path.parent)
     if any(file.stat().st_size > LARGEST_FILE for file in named):
         return
-    part = kind.of_recipe(table)
     try:
-        mesh = part.build(table, path.parent)
+        mesh = kind.build(table, path.parent)
     except InputError as error:
         raise meshing.in_recipe(error, path) from None
     seen.warnings += _unit(mesh, table, path)
     if 3 * mesh.sizes.get("node", 0) > LARGEST_MESH:
         return
-    model = part.assemble(mesh)
+    model = kind.of_mesh(mesh).assemble(mesh)
     yield Body(model, rigid.of_model(model, mesh.attrs["title"]), tuple(mesh.attrs["interfaces"].split()))
 
 

@@ -22,5 +22,5 @@ def command(options: argparse.Namespace) -> None:
     elif options.kind == "sweep":
         from flexclear.pipeline.core.scene.json_schema import sweep_schema as schema
     else:
-        from flexclear.pipeline.structure.fe.json_schema import recipe_schema as schema
+        from flexclear.pipeline.structure.fe.recipe import recipe_schema as schema
     print(json.dumps(schema(), indent=2))

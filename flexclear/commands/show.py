@@ -144,7 +144,7 @@ def _body(recipe: Path) -> xr.Dataset:
     from flexclear.pipeline.structure.modes import rigid
 
     table: dict[str, Any] = meshing.params(recipe)["recipe"]
-    return rigid.drawn(kind.of_recipe(table).build(table, recipe.parent))
+    return rigid.drawn(kind.build(table, recipe.parent))
 
 
 def _unplaced(scene: Scene) -> list[str]:

@@ -62,7 +62,7 @@ def html_page(content: Content, drawn: Sequence[tuple[str, str]], assumptions: S
         Part(
             "discrepancies",
             "Discrepancies",
-            prose(("place", "matter", "here"), [(d.place, d.matter, d.here) for d in DISCREPANCIES]),
+            prose(("place", "matter", "here"), DISCREPANCIES),
         ),
         Part("versions", "How it was computed, and by which versions", _versions(content)),
         Part("downloads", "Downloads", _downloads(content)),

@@ -6,6 +6,7 @@ import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
@@ -15,8 +16,12 @@ from flexclear.papers.wang_wang_2019.documents import section
 from flexclear.papers.wang_wang_2019.page import Content, html_page
 from flexclear.papers.wang_wang_2019.published import CITATION
 from flexclear.pipeline.core.system.file_dependencies import note
+from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.pages import figures_of
 from flexclear.pipeline.post.plotting.table import Table, from_markdown
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.core.system.progress import Progress
 
 #: what the page shows of the project's own pages: file, sections, endings of the pictures
 DOCUMENTS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
@@ -31,6 +36,19 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
 }
 #: of a run's attributes, those that the page shows
 FACTS = ("title", "method", "evaluations", "steps", "versions")
+
+
+def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Stage: ``index.html`` and ``paper.md``, out of the results folder.
+
+    params: the folder, the run of each scene below it, where its values come from, the scene whose film and pictures
+    are shown, and the digest of everything that is shown, so that the page is written again when any of it changes.
+    """
+    results = Path(params["results"])
+    by_scene = run_attributes({scene: results / path for scene, path in params["runs"].items()})
+    attributes = {scene: {**attributes_of, **params["origins"][scene]} for scene, attributes_of in by_scene.items()}
+    content = collect(results, attributes, params["rendered"], TREE)
+    return {"index.html": page(content), "paper.md": paper_markdown(content).encode()}
 
 
 def collect(
@@ -104,7 +122,7 @@ def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[s
 def page(content: Content) -> bytes:
     """The report, results/report/index.html: one page, images and film inside."""
     return html_page(
-        content, [(name, figures.title(name)) for name in content.figures], assumption_rows(content)
+        content, [(name, figures.figure(name).title) for name in content.figures], assumption_rows(content)
     ).encode()
 
 
@@ -128,7 +146,7 @@ def paper_markdown(content: Content) -> str:
         "What the paper leaves open or prints in conflict with itself. Differences in numbers stand below each "
         "table. Which of its statements on mode sets hold, and for which position of the prismatic joint: "
         "[reference-conditions.md](reference-conditions.md).\n",
-        _pipe(("place", "matter", "here"), [(d.place, d.matter, d.here) for d in DISCREPANCIES]),
+        _pipe(("place", "matter", "here"), DISCREPANCIES),
     ]
     return "\n".join(parts)
 
@@ -158,7 +176,7 @@ def weight(where: str) -> int:
 
 def scenes_of(name: str) -> tuple[str, ...]:
     """Scenes that a figure or table reads, in order, each once."""
-    return tuple(dict.fromkeys(reference.partition(":")[0] for reference in figures.needs(name)))
+    return tuple(dict.fromkeys(reference.partition(":")[0] for reference in figures.figure(name).needs))
 
 
 def command(name: str) -> str:
@@ -173,7 +191,7 @@ def _index() -> str:
         scenes = ", ".join(
             f"`{scene}`" if "/" in scene else f"timing of the `{scene}` scenes" for scene in scenes_of(name)
         )
-        rows.append((figures.title(name), scenes, f"`{command(name)}`"))
+        rows.append((figures.figure(name).title, scenes, f"`{command(name)}`"))
     return _pipe(("figure or table", "scenes", "command"), rows)
 
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from flexclear.papers.wang_wang_2019 import timing
-from flexclear.papers.wang_wang_2019.figure_stage import FIGURES
+from flexclear.papers.wang_wang_2019 import figures, timing
 from flexclear.pipeline.core.artifacts.paths import DATA
 from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.pipeline.core.workflow.task import Task
@@ -94,9 +93,9 @@ def bring(workplace: Workplace) -> Outcome:
 
 def report_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
     """All figures, tables and pictures. What takes longest comes first, with all that it needs: film and times."""
-    figures = figure_tasks(workplace, scenes)
-    times = [task for task in figures if any(above.stage == "timing" for above in task.inputs.values())]
-    others = [task for task in figures if task not in times]
+    drawn = figure_tasks(workplace, scenes)
+    times = [task for task in drawn if any(above.stage == "timing" for above in task.inputs.values())]
+    others = [task for task in drawn if task not in times]
     return [*scenes.graph(HEADLINE).of("render").values(), *times, *others]
 
 
@@ -106,15 +105,15 @@ def figure_tasks(workplace: Workplace, scenes: Scenes) -> list[Task]:
 
 
 def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
-    """What each figure and table needs, see `papers.wang_wang_2019.figure_stage.index`."""
-    names = list(import_module(FIGURES).NAMES)
+    """What each figure and table needs, see `papers.wang_wang_2019.figures.index`."""
+    names = list(figures.NAMES)
     task = Task(
         stage="figures",
         scene="report",
         part="index",
-        run="flexclear.papers.wang_wang_2019.figure_stage:index",
+        run=f"{figures.__name__}:index",
         params={"names": names},
-        modules=tuple(f"{FIGURES}.{name}" for name in names),
+        modules=tuple(dict.fromkeys(module_of(figures.__name__, name) for name in names)),
         folder="",
     )
     outcome = workplace.bring([task])
@@ -132,7 +131,7 @@ def page_task(workplace: Workplace, records: Mapping[int, Record], graphs: list[
         stage="report",
         scene="report",
         part="page",
-        run="flexclear.papers.wang_wang_2019.page_stage:run",
+        run="flexclear.papers.wang_wang_2019.report:run",
         params={
             "results": str(workplace.store.root),
             "runs": {graph.scene.name: f"runs/{graph.scene.name}/run.nc" for graph in graphs},
@@ -154,9 +153,9 @@ def _figure_task(name: str, entry: Mapping[str, Any], scenes: Scenes) -> Task:
         stage="figures",
         scene="report",
         part=name,
-        run="flexclear.papers.wang_wang_2019.figure_stage:run",
+        run=f"{figures.__name__}:draw",
         params={"figure": name},
         inputs={reference: scenes.artifact(reference) for reference in entry["needs"]},
-        modules=(f"{FIGURES}.{name}",),
+        modules=(module_of(figures.__name__, name),),
         folder="tables" if name.startswith("table") else "figures",
     )

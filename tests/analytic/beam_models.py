@@ -8,7 +8,8 @@ import numpy as np
 import scipy.linalg
 import xarray as xr
 
-from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe import beam
+from flexclear.pipeline.structure.kinds import kind
 from tests.analytic.beam_solutions import PAPER_ROD
 
 RECIPE = {
@@ -34,7 +35,7 @@ RIGID = {"FF": 2, "PF": 1, "FP": 1, "GG": 1, "GF": 1, "FG": 1}
 
 def build(**changes: Any) -> xr.Dataset:
     """The paper's rod with other entries in its recipe."""
-    return mesh.build(RECIPE | changes)
+    return kind.build(RECIPE | changes)
 
 
 def held_system(rod: xr.Dataset, motions: tuple[int, ...], ends: str) -> tuple[np.ndarray, np.ndarray]:

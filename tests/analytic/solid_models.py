@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.structure.kinds.kind import of_recipe
+from flexclear.pipeline.structure.kinds import kind
 
 #: Wang & Wang (2019), Table 2
 ALUMINIUM = {"density": 2740.0, "youngs_modulus": 7.17e10, "poisson": 0.33}
@@ -46,7 +46,7 @@ def block(element: str, cells: tuple[int, int, int], size: tuple[float, float, f
 
 def build(recipe: dict[str, Any], folder: Path = Path()) -> xr.Dataset:
     """The mesh dataset of a recipe."""
-    return of_recipe(recipe).build(recipe, folder)
+    return kind.build(recipe, folder)
 
 
 def gauss(n: int) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe import beam
+from flexclear.pipeline.structure.kinds import kind
 from tests.analytic.beam_models import BENDING, HELD, RECIPE, build, frequencies, order
 from tests.analytic.beam_solutions import PAPER_ROD
 
@@ -74,7 +75,7 @@ def test_a_cantilever_buckles_under_its_own_weight() -> None:
 def test_tension_raises_the_frequencies_of_a_pinned_rod() -> None:
     """w^2 = w0^2 (1 + N L^2 / (n^2 pi^2 EI)) without rotary inertia."""
     tension = 4e4
-    rod = mesh.build(RECIPE | {"elements": 24, "theory": "euler-bernoulli"})
+    rod = kind.build(RECIPE | {"elements": 24, "theory": "euler-bernoulli"})
     found = beam.assemble(rod)
     stiffened = found.stiffness + beam.geometric_stiffness(rod, np.full(24, tension))
     K, M = (plane(matrix, "PP", found) for matrix in (stiffened, found.mass))

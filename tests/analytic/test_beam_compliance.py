@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE
@@ -26,7 +26,7 @@ SOLVED = 1e-8
 
 
 def reduced(reference: str, count: int | None, interfaces: tuple[str, ...] = ("bottom", "top")) -> xr.Dataset:
-    rod = mesh.build(RECIPE)
+    rod = kind.build(RECIPE)
     return bundle.build(rod, solve(rod, reference, count, interfaces))
 
 

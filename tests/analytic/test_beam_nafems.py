@@ -10,7 +10,9 @@ import pytest
 import scipy.linalg
 
 from flexclear.pipeline.structure.closed_form import frequencies as closed_form
-from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe import beam
+from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.kinds import kind
 from tests.analytic.stepped_rods import Lump, Piece, frequencies
 
 CHECKS = Path(__file__).parents[2] / "meshes" / "checks"
@@ -46,7 +48,7 @@ FV5_TARGET = (42.65, 42.65, 71.2, 125.0, 148.15, 148.15, 213.61, 283.47, 283.47)
 
 def lowest(recipe: dict[str, object], start: str, end: str, count: int | None) -> np.ndarray:
     """Frequencies [Hz] with dofs held at both ends, by their digits; all of them without a count."""
-    found = beam.assemble(mesh.build(recipe))
+    found = beam.assemble(kind.build(recipe))
     held = [int(d) for d in start] + [found.nodal_size - 6 + int(d) for d in end]
     free = np.setdiff1d(np.arange(found.size), held)
     K, M = (matrix.toarray()[np.ix_(free, free)] for matrix in (found.stiffness, found.mass))
@@ -54,7 +56,7 @@ def lowest(recipe: dict[str, object], start: str, end: str, count: int | None) -
 
 
 def fv4(**changes: object) -> dict[str, object]:
-    return mesh.read_recipe(CHECKS / "nafems_fv4.toml") | changes
+    return read_recipe(CHECKS / "nafems_fv4.toml") | changes
 
 
 def fv4_exact(theory: str) -> np.ndarray:
@@ -69,7 +71,7 @@ def fv4_exact(theory: str) -> np.ndarray:
 
 
 def test_fv4_five_elements_meet_the_published_targets() -> None:
-    found = lowest(mesh.read_recipe(CHECKS / "nafems_fv4.toml"), "012345", "", 6)
+    found = lowest(read_recipe(CHECKS / "nafems_fv4.toml"), "012345", "", 6)
     np.testing.assert_allclose(found, FV4_TARGET, rtol=0.01)
 
 
@@ -103,12 +105,12 @@ def test_fv4_is_exact_to_a_hundredth_of_a_percent(theory: str) -> None:
 
 
 def test_fv5_deep_beam_has_the_exact_frequencies() -> None:
-    found = lowest(mesh.read_recipe(CHECKS / "nafems_fv5.toml"), "0123", "12", 9)
+    found = lowest(read_recipe(CHECKS / "nafems_fv5.toml"), "0123", "12", 9)
     expected = np.sort(np.concatenate([np.repeat(FV5_BENDING, 2), [FV5_AXIAL], FV5_TORSION]))
     # St. Venant's constant has four digits there; the third mode of 8 elements is (3 pi / 8)^4 / 1440 = 1.3e-3 high
     # without shear and less with it
     np.testing.assert_allclose(found, expected, rtol=1e-3)
-    fine = lowest(mesh.read_recipe(CHECKS / "nafems_fv5.toml") | {"elements": 24}, "0123", "12", 9)
+    fine = lowest(read_recipe(CHECKS / "nafems_fv5.toml") | {"elements": 24}, "0123", "12", 9)
     np.testing.assert_allclose(fine, expected, rtol=1e-4)
     # the published targets are up to 0.4 % above the exact values
     np.testing.assert_allclose(fine, FV5_TARGET, rtol=0.005)
@@ -121,7 +123,7 @@ def test_fv5_closed_form() -> None:
 
 
 def test_the_leg_has_every_kind_of_part_and_the_right_mass() -> None:
-    rod = mesh.build(mesh.read_recipe(CHECKS / "leg.toml"))
+    rod = kind.build(read_recipe(CHECKS / "leg.toml"))
     assert rod.attrs["section"] == "circle tube"
     neck = math.pi * 0.04 / 3.0 * (0.01**2 + 0.01 * 0.008 + 0.008**2)
     steel = math.pi * (0.01**2 * 0.04 + (0.02**2 - 0.012**2) * 0.212) + neck

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 
@@ -20,7 +21,7 @@ PRINTED = {
 
 
 def frequencies(recipe: str, reference: str) -> np.ndarray:
-    return solve(mesh.build(mesh.read_recipe(MESHES / recipe)), reference, 7)["frequency"].values
+    return solve(kind.build(read_recipe(MESHES / recipe)), reference, 7)["frequency"].values
 
 
 @pytest.mark.parametrize("reference", PRINTED)
@@ -38,7 +39,7 @@ def test_the_circle_differs_in_the_printed_digits(reference: str) -> None:
 
 def test_six_rigid_modes_of_the_free_rod_are_zero() -> None:
     """Table 5 prints six zeros first."""
-    modes = solve(mesh.build(mesh.read_recipe(MESHES / "actuated_rod.toml")), "free-free", 7)
+    modes = solve(kind.build(read_recipe(MESHES / "actuated_rod.toml")), "free-free", 7)
     assert modes.sizes["rigid_mode"] == 6
     # eps times the largest eigenvalue of 12 elements (1e6 Hz) is 0.01 Hz; the first elastic mode has 1564 Hz
     assert float(modes["rigid_frequency"].max()) < 0.05
@@ -46,7 +47,7 @@ def test_six_rigid_modes_of_the_free_rod_are_zero() -> None:
 
 def test_rigid_inertia_is_that_of_table_1() -> None:
     """Actuated rod: 0.21 kg, (996.802, 996.802, 10.330) kg mm^2, the last about its axis."""
-    rod = mesh.build(mesh.read_recipe(MESHES / "actuated_rod.toml"))
+    rod = kind.build(read_recipe(MESHES / "actuated_rod.toml"))
     data = bundle.build(rod, solve(rod, "free-free", 7))
     mass = float(data["mass"])
     com = data["first_moment"].values / mass

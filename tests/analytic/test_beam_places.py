@@ -10,7 +10,8 @@ import scipy.linalg
 import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
-from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe import beam
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE
@@ -37,7 +38,7 @@ SHAPE = 5e-10
 
 
 def reduced(reference: str, count: int, pose: dict[str, Any] | None = None) -> xr.Dataset:
-    rod = mesh.build(ROD | ({"pose": pose} if pose else {}))
+    rod = kind.build(ROD | ({"pose": pose} if pose else {}))
     return bundle.build(rod, solve(rod, reference, count))
 
 
@@ -96,7 +97,7 @@ def _signs(here: xr.Dataset, there: xr.Dataset) -> np.ndarray:
 @pytest.mark.parametrize("theory", ["rayleigh", "timoshenko"])
 def test_matrices_turn_with_the_rod(theory: str) -> None:
     recipe = ROD | {"theory": theory}
-    here, there = (beam.assemble(mesh.build(r)) for r in (recipe, recipe | {"pose": POSES["far"]}))
+    here, there = (beam.assemble(kind.build(r)) for r in (recipe, recipe | {"pose": POSES["far"]}))
     R = rotation_vector_to_matrix(np.array(POSES["far"]["rotation_vector"]))
     turn = np.eye(here.size)
     for start in range(0, here.nodal_size, 3):
@@ -109,7 +110,7 @@ def test_matrices_turn_with_the_rod(theory: str) -> None:
 
 
 def test_rigid_motions_of_a_turned_rod_store_no_energy() -> None:
-    found = beam.assemble(mesh.build(ROD | {"pose": POSES["turned"]}))
+    found = beam.assemble(kind.build(ROD | {"pose": POSES["turned"]}))
     force = found.stiffness @ beam.rigid_vectors(found)
     assert np.abs(force).max() <= 1e-12 * np.abs(found.stiffness).sum(axis=1).max()
 
@@ -129,7 +130,7 @@ FV2 = ((11.33624602646386, 1), (17.70937984816896, 7), (45.34498410585544, 1), (
 def double_cross(elements: int, *, centre_held: bool) -> np.ndarray:
     """The sixteen lowest in-plane frequencies [Hz] of eight arms, 45 deg apart, one node in common."""
     arms = [
-        mesh.build(ARM | {"elements": elements, "pose": {"rotation_vector": [0.0, 0.0, k * np.pi / 4.0]}})
+        kind.build(ARM | {"elements": elements, "pose": {"rotation_vector": [0.0, 0.0, k * np.pi / 4.0]}})
         for k in range(8)
     ]
     plane = np.array([0, 1, 5])
@@ -165,7 +166,7 @@ def test_nafems_fv2_double_cross_of_eight_turned_rods() -> None:
 def test_a_turned_frame_is_another_name_for_the_same_section(reference: str, count: int) -> None:
     """Pins across a rod: the frames' axes change, the shapes and frequencies do not."""
     across = {name: frame | {"axes": {"z": [0, 0, 1], "x": [1, 0, 0]}} for name, frame in ROD["frames"].items()}
-    along, turned = (mesh.build(ROD | {"frames": frames}) for frames in (ROD["frames"], across))
+    along, turned = (kind.build(ROD | {"frames": frames}) for frames in (ROD["frames"], across))
     here, there = (bundle.build(rod, solve(rod, reference, count)) for rod in (along, turned))
     assert np.array_equal(turned["frame_rotation"].values[0], np.eye(3))  # the axes given are the mesh frame's
     np.testing.assert_allclose(there["frequency"], here["frequency"], rtol=FREQUENCY)

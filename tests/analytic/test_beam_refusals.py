@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.kinds import kind
 from tests.analytic.beam_models import RECIPE
 
 CIRCLE = {"type": "circle", "radius": "10 mm"}
@@ -92,7 +92,7 @@ WRONG: dict[str, tuple[dict[str, Any], str]] = {
 def test_wrong_recipes_are_refused_in_words(name: str) -> None:
     recipe, message = WRONG[name]
     with pytest.raises(InputError, match=message) as caught:
-        mesh.build(recipe, where="rod.toml")
+        kind.build(recipe, where="rod.toml")
     assert caught.value.exit_code == 2
     # one mistake, one message; the hint is a line of its own
     assert len([line for line in str(caught.value).splitlines() if line.startswith("rod.toml")]) == 1

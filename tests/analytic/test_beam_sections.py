@@ -10,7 +10,8 @@ import scipy.linalg
 import scipy.sparse as sp
 import scipy.sparse.linalg
 
-from flexclear.pipeline.structure.fe import beam, mesh, section
+from flexclear.pipeline.structure.fe import beam, section
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE, build
@@ -128,7 +129,7 @@ def test_inertia_given_apart_enters_the_mass_alone() -> None:
 
 def test_euler_bernoulli_rods_spin_but_do_not_rock() -> None:
     """No rotary inertia in bending, in rigid motion either: inertia across the rod is that of a line of mass."""
-    rod = mesh.build(RECIPE | {"theory": "euler-bernoulli"})
+    rod = kind.build(RECIPE | {"theory": "euler-bernoulli"})
     data = bundle.build(rod, solve(rod, "free-free", 7))
     second = data["second_moment"].values
     inertia = np.trace(second) * np.eye(3) - second

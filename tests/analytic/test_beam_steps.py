@@ -10,8 +10,9 @@ import pytest
 import scipy.linalg
 
 from flexclear.pipeline.structure.closed_form import frequencies as closed_form
-from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.fe.slices import slices
+from flexclear.pipeline.structure.kinds import kind
 from tests.analytic.beam_models import RECIPE, build, order
 from tests.analytic.beam_solutions import PAPER_ROD
 from tests.analytic.stepped_rods import Lump, Piece, frequencies
@@ -75,7 +76,7 @@ def pieces(theory: str) -> list[Piece]:
 
 def lowest(rod_recipe: dict[str, Any], held: tuple[str, str], count: int) -> np.ndarray:
     """Elastic frequencies [Hz] of the elements, dofs held by their digits."""
-    found = beam.assemble(mesh.build(rod_recipe))
+    found = beam.assemble(kind.build(rod_recipe))
     last = found.nodal_size - 6
     fixed = [int(d) for d in held[0]] + [last + int(d) for d in held[1]]
     free = np.setdiff1d(np.arange(found.size), fixed)
@@ -115,7 +116,7 @@ def test_stepped_rods_with_masses_converge_at_order_four() -> None:
 
 def test_stepped_cantilever_deflects_as_the_pieces_add_up() -> None:
     """End force in y: int (L - x)^2 / EI + 1 / (kappa G A) over the pieces; one element each is exact."""
-    found = beam.assemble(mesh.build(recipe((1, 1, 1), "timoshenko")))
+    found = beam.assemble(kind.build(recipe((1, 1, 1), "timoshenko")))
     free = np.arange(6, found.size)
     force = np.zeros(found.size)
     force[found.nodal_size - 5] = 1.0
@@ -128,7 +129,7 @@ def test_stepped_cantilever_deflects_as_the_pieces_add_up() -> None:
 
 def test_rigid_inertia_is_that_of_the_parts() -> None:
     """Steiner by hand: pieces as prisms about their centres, the ball about its own."""
-    rod = mesh.build(recipe((2, 3, 2), "rayleigh", masses={"ball": BALL}))
+    rod = kind.build(recipe((2, 3, 2), "rayleigh", masses={"ball": BALL}))
     body = slices(rod, beam.assemble(rod))
     second = np.einsum("p,pk,pl->kl", body.mass, body.position, body.position) + body.spread.sum(axis=0)
     inertia = np.trace(second) * np.eye(3) - second
@@ -153,7 +154,7 @@ def test_segments_of_one_section_are_the_straight_rod() -> None:
     segments = [{"start": a, "end": b, "elements": n, "section": section} for a, b, n in cuts]
     shape = {"type": "segmented-beam", "length": 0.24, "segments": segments}
     kept = {name: RECIPE[name] for name in ("material", "frames", "interfaces")}
-    cut, whole = mesh.build({**kept, "shape": shape}), build()
+    cut, whole = kind.build({**kept, "shape": shape}), build()
     for name in whole.data_vars:
         # places are sums of lengths on two ways, which rounding may set some units of the last place apart
         np.testing.assert_allclose(cut[name].values, whole[name].values, rtol=1e-14, atol=1e-15, err_msg=str(name))

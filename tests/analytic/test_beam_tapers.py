@@ -12,7 +12,8 @@ import xarray as xr
 from scipy.optimize import brentq
 from scipy.special import iv, jv, kv, yv
 
-from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe import beam
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import BENDING, BENDING_Z, EXTENSION, RECIPE, TORSION, frequencies, order
 from tests.analytic.beam_solutions import PAPER_ROD
@@ -31,7 +32,7 @@ WEDGE = (
 
 
 def taper(sections: tuple[dict[str, Any], dict[str, Any]], elements: int, **changes: Any) -> xr.Dataset:
-    return mesh.build(RECIPE | {"elements": elements, "section": sections[0], "end_section": sections[1]} | changes)
+    return kind.build(RECIPE | {"elements": elements, "section": sections[0], "end_section": sections[1]} | changes)
 
 
 def lowest_roots(function: Callable[[float], float], start: float, count: int) -> np.ndarray:

@@ -13,7 +13,7 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
-from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE
@@ -106,7 +106,7 @@ def section_motion(
 
 @pytest.fixture(scope="module", params=list(RECIPES))
 def body(request: pytest.FixtureRequest) -> tuple[xr.Dataset, Cloud]:
-    rod = mesh.build(RECIPES[request.param])
+    rod = kind.build(RECIPES[request.param])
     modes = solve(rod, "craig-bampton", 14)
     return bundle.build(rod, modes), cloud(request.param, modes)
 

@@ -13,8 +13,9 @@ from flexclear.pipeline.core.artifacts import compliance as core
 from flexclear.pipeline.core.artifacts import deficits as words
 from flexclear.pipeline.core.artifacts import modal
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe import mesh
 from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import bundle, deficits
 from flexclear.pipeline.structure.modes.solution import solve
@@ -28,7 +29,7 @@ L, EA, EI = 0.24, 7.17e10 * np.pi * 1e-4, 7.17e10 * np.pi * 1e-8 / 4.0
 
 @pytest.fixture(scope="module")
 def rod() -> xr.Dataset:
-    return mesh.build(mesh.read_recipe(MESHES / "actuated_rod.toml"))
+    return kind.build(read_recipe(MESHES / "actuated_rod.toml"))
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,9 @@ import scipy.sparse as sp
 import xarray as xr
 
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe import mesh
 from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import compliance, eigen
 from flexclear.pipeline.structure.modes.select import ModeRequest
@@ -39,7 +40,7 @@ COMPLETE: dict[str, dict[str, object]] = {
 
 @pytest.fixture(scope="module")
 def rod() -> xr.Dataset:
-    return mesh.build(mesh.read_recipe(MESHES / "actuated_rod.toml"))
+    return kind.build(read_recipe(MESHES / "actuated_rod.toml"))
 
 
 @pytest.fixture(scope="module")
@@ -76,8 +77,8 @@ def test_mean_axes_take_all_momentum_out_of_any_basis(rod: xr.Dataset, body: Fle
 
 def test_pinned_rods_have_the_frequencies_of_theory(rod: xr.Dataset) -> None:
     """Rayleigh beam: omega^2 = E I k^4 / (rho A + rho I k^2); turning is held at one pin: (2n - 1) c / 4 L."""
-    recipe = mesh.read_recipe(MESHES / "actuated_rod.toml") | {"elements": 64}
-    found = solve(mesh.build(recipe), "pinned-pinned", 8)
+    recipe = read_recipe(MESHES / "actuated_rod.toml") | {"elements": 64}
+    found = solve(kind.build(recipe), "pinned-pinned", 8)
     k = np.pi * np.arange(1, 4) / L
     bending = np.sqrt(E * I * k**4 / (RHO * A + RHO * I * k**2)) / (2.0 * np.pi)
     kinds = found["kind"].values

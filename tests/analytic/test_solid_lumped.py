@@ -12,7 +12,7 @@ import scipy.sparse as sp
 import xarray as xr
 
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
@@ -62,7 +62,7 @@ def body(tmp_path_factory: pytest.TempPathFactory) -> xr.Dataset:
 
 
 def write(folder: Path, mass: Any) -> None:
-    rod = mesh.build(RECIPE | {"elements": NODES - 1})
+    rod = kind.build(RECIPE | {"elements": NODES - 1})
     model = of_mesh(rod).assemble(rod)
     scipy.io.mmwrite(folder / "k.mtx", sp.coo_array(model.stiffness), symmetry="symmetric", precision=17)
     scipy.io.mmwrite(folder / "m.mtx", sp.coo_array(mass), symmetry="general", precision=17)
@@ -96,7 +96,7 @@ def test_invariants_are_those_of_the_points(body: xr.Dataset) -> None:
 
 
 def test_a_consistent_mass_of_nodes_that_turn_is_refused(tmp_path: Path) -> None:
-    rod = mesh.build(RECIPE | {"elements": NODES - 1})
+    rod = kind.build(RECIPE | {"elements": NODES - 1})
     write(tmp_path, of_mesh(rod).assemble(rod).mass)
     given = build(TABLE, tmp_path)
     with pytest.raises(InputError, match=r"not lumped at the nodes.*\n.*lump the mass"):

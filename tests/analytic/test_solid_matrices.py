@@ -12,9 +12,10 @@ import scipy.sparse as sp
 import xarray as xr
 
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe import mesh as beams
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
@@ -46,7 +47,7 @@ def same(found: xr.Dataset, expected: xr.Dataset) -> None:
 
 def test_a_beam_comes_back_from_an_npz(tmp_path: Path) -> None:
     """With its integrals, which a beam's mass matrix does not tell."""
-    rod = beams.build(beams.read_recipe(MESHES / "actuated_rod.toml"))
+    rod = kind.build(read_recipe(MESHES / "actuated_rod.toml"))
     files.write_npz(model_of(rod), tmp_path / "rod.npz")
     axes = {"z": [1.0, 0.0, 0.0], "x": [0.0, 1.0, 0.0]}
     frames = {name: {"node": node, "axes": axes} for name, node in (("bottom", 1), ("top", 13))}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 
 from flexclear.papers.wang_wang_2019 import figures
 from flexclear.papers.wang_wang_2019.figures import fig06
-from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.pipeline.core.system.progress import silent
 from tests.paper.material import everything
 
 TREE = Path(__file__).resolve().parents[2]
@@ -20,8 +19,8 @@ ARTIFACTS = {"run", "mesh", "tight", "post", "ensemble", "modes", "fine-modes", 
 
 def made(name):
     """Files of one figure or table from the made-up artifacts, and nothing but those it asks for."""
-    asked = {reference: everything()[reference] for reference in figures.needs(name)}
-    return lookup("flexclear.papers.wang_wang_2019.figures", name, where="test")(asked)
+    asked = {reference: everything()[reference] for reference in figures.figure(name).needs}
+    return figures.draw({"figure": name}, asked, silent)
 
 
 def test_all_figures_and_tables_of_the_paper_are_listed():
@@ -32,10 +31,10 @@ def test_all_figures_and_tables_of_the_paper_are_listed():
 
 @pytest.mark.parametrize("name", figures.NAMES)
 def test_needs_name_scenes_and_artifacts_that_exist(name):
-    module = import_module(f"flexclear.papers.wang_wang_2019.figures.{name}")
-    assert module.NEEDS
-    assert len(set(module.NEEDS)) == len(module.NEEDS)
-    for reference in module.NEEDS:
+    needs = figures.figure(name).needs
+    assert needs
+    assert len(set(needs)) == len(needs)
+    for reference in needs:
         scene, _, artifact = reference.partition(":")
         assert artifact.partition("/")[0] in ARTIFACTS
         assert (TREE / "scenes" / f"{scene}.toml").is_file() or (
@@ -84,4 +83,4 @@ def test_observed_friction_is_read_from_force_and_power():
 
 def test_an_unknown_figure_is_an_error_that_names_the_nearest():
     with pytest.raises(Exception, match="fig16"):
-        figures.needs("fig1666")
+        figures.figure("fig1666")

@@ -10,7 +10,7 @@ import pytest
 
 from flexclear.papers.wang_wang_2019 import figures, report
 from flexclear.papers.wang_wang_2019.discrepancies import DISCREPANCIES
-from flexclear.pipeline.core.scene.registry import lookup
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.post.overview.page import in_folder
 from tests.paper.material import everything
 
@@ -25,9 +25,7 @@ def results(tmp_path_factory):
     for name in ("fig08", "table08", "table10"):
         folder = root / ("tables" if name.startswith("table") else "figures")
         folder.mkdir(exist_ok=True)
-        for file, content in lookup("flexclear.papers.wang_wang_2019.figures", name, where="test")(
-            everything()
-        ).items():
+        for file, content in figures.draw({"figure": name}, everything(), silent).items():
             (folder / file).write_bytes(content)
     headline = root / "runs" / RENDERED
     headline.mkdir(parents=True)
@@ -65,7 +63,7 @@ def test_the_same_page_as_a_folder_has_its_pictures_as_files(content):
 def test_page_shows_figures_tables_film_assumptions_and_discrepancies(content):
     page = report.page(content).decode()
     assert page.count("<video") == 1
-    for text in ("Figure 8", "Table 8", "Table 10", "not printed in the paper", DISCREPANCIES[0].place):
+    for text in ("Figure 8", "Table 8", "Table 10", "not printed in the paper", DISCREPANCIES[0][0]):
         assert text in page
 
 
@@ -95,7 +93,7 @@ def test_assumptions_that_differ_between_scenes_are_all_kept():
 def test_paper_page_lists_every_figure_with_its_command(content):
     text = report.paper_markdown(content)
     for name in figures.NAMES:
-        assert f"| {figures.title(name)} |" in text
+        assert f"| {figures.figure(name).title} |" in text
         assert f"`{report.command(name)}`" in text
     assert "| equal error: integration (ideal = 1) |" in text
 

@@ -9,17 +9,23 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.figures import table04, table05, table07, table08, table09, table10, table_verdicts
-from flexclear.papers.wang_wang_2019.plotting.error_table import number
-from flexclear.papers.wang_wang_2019.plotting.frequency_table import euler_bernoulli_ratio
+from flexclear.papers.wang_wang_2019.figures import figure, table10, table_verdicts
+from flexclear.papers.wang_wang_2019.figures.errors import number
+from flexclear.papers.wang_wang_2019.figures.frequencies import euler_bernoulli_ratio
 from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
 from tests.paper import synthetic
 from tests.paper.material import WOBBLE, everything
 
 
-def rows(module, name, data=None):
-    """Rows of a table's CSV as dictionaries."""
-    return list(csv.DictReader(io.StringIO(module.make(data or everything())[f"{name}.csv"].decode())))
+def rows(name, data=None):
+    """Rows of a table as dictionaries."""
+    table = figure(name).make(data or everything())
+    return [dict(zip(table.columns, row, strict=True)) for row in table.rows]
+
+
+def text(name, data=None):
+    """A table with its notes, as Markdown."""
+    return as_markdown(figure(name).make(data or everything()))
 
 
 def value(cell: str) -> float:
@@ -51,22 +57,22 @@ def test_html_escapes_what_is_in_the_cells():
     assert "&lt;b&gt;" in as_html(Table("t", ("a",), (("<b>",),)))
 
 
-@pytest.mark.parametrize("module, name", [(table04, "table04"), (table05, "table05")])
-def test_frequencies_that_agree_as_printed_say_so(module, name):
-    assert {row["agrees as printed"] for row in rows(module, name)} == {"yes"}
+@pytest.mark.parametrize("name", ["table04", "table05"])
+def test_frequencies_that_agree_as_printed_say_so(name):
+    assert {row["agrees as printed"] for row in rows(name)} == {"yes"}
 
 
 def test_a_frequency_off_by_one_printed_digit_is_found():
-    square = table04.NEEDS[0]
+    square = figure("table04").needs[0]
     data = dict(everything())
     # 1576.805 reads 1576.8; 0.1 Hz more reads 1576.9
     data[square] = data[square].assign(frequency=data[square].frequency + 0.1 * (np.arange(7) == 0))
-    assert [row["agrees as printed"] for row in rows(table04, "table04", data)] == ["no"] + ["yes"] * 5
-    assert "5 of 6" in table04.make(data)["table04.md"].decode()
+    assert [row["agrees as printed"] for row in rows("table04", data)] == ["no"] + ["yes"] * 5
+    assert "5 of 6" in text("table04", data)
 
 
 def test_free_free_table_starts_with_six_rigid_modes():
-    assert [row["kind"] for row in rows(table05, "table05")] == ["rigid"] * 6 + ["bending"] * 4 + ["torsion", "bending"]
+    assert [row["kind"] for row in rows("table05")] == ["rigid"] * 6 + ["bending"] * 4 + ["torsion", "bending"]
 
 
 def test_ratio_of_beam_frequencies():
@@ -75,7 +81,7 @@ def test_ratio_of_beam_frequencies():
 
 
 def test_table_7_gives_the_wobble_that_the_runs_were_made_with():
-    found = {row["largest error"]: row for row in rows(table07, "table07")}
+    found = {row["largest error"]: row for row in rows("table07")}
     for name, head in (("far_free", "ours, free-free"), ("far_fixed", "ours, fixed-fixed")):
         # outputs every 0.1 ms of a 300 Hz wobble miss its top by up to 0.1 %; four digits are printed
         assert value(found["displacement z0 (mm)"][head]) == pytest.approx(1e3 * WOBBLE[name], rel=2e-3)
@@ -90,30 +96,30 @@ def test_rounding_noise_is_not_printed():
 
 def test_table_7_says_when_fixed_modes_do_nothing():
     data = dict(everything())
-    assert "vanish at both ends" not in table07.make(data)["table07.md"].decode()
+    assert "vanish at both ends" not in text("table07", data)
     data["sps4/far_fixed:run"] = data["sps4/ideal:run"]
-    assert "vanish at both ends" in table07.make(data)["table07.md"].decode()
+    assert "vanish at both ends" in text("table07", data)
 
 
 def test_table_8_compares_the_clearance_run_with_the_paper():
-    found = {row["largest error"]: row for row in rows(table08, "table08")}
+    found = {row["largest error"]: row for row in rows("table08")}
     assert found["velocity z0 (mm/s)"]["paper"] == "13.570"
     assert value(found["displacement z0 (mm)"]["ours"]) == pytest.approx(0.1, rel=2e-3)  # made with 1e-4 m, see above
 
 
 def test_table_8_says_what_is_fitted_and_what_contradicts():
     """The made-up wobble has 1e-4 m and 0.2 m/s, 14 times the printed velocity; the first layout's is a fifth of it."""
-    text = table08.make(everything())["table08.md"].decode()
-    assert "Angle and displacement are fitted, not predicted" in text
-    assert "The velocity is a prediction, and the paper contradicts it: it is 14 times the printed one." in text
-    assert "has 2.8 times the printed velocity and 0.1 times the printed displacement" in text
+    said = text("table08")
+    assert "Angle and displacement are fitted, not predicted" in said
+    assert "The velocity is a prediction, and the paper contradicts it: it is 14 times the printed one." in said
+    assert "has 2.8 times the printed velocity and 0.1 times the printed displacement" in said
     agreeing = everything() | {"sps4/csj:run": synthetic.run("sps4/csj", clearance=True, noise=7e-6)}
-    assert "contradicts" not in table08.make(agreeing)["table08.md"].decode()
+    assert "contradicts" not in text("table08", agreeing)
 
 
 def test_verdicts_on_clearance_have_the_first_layouts_numbers_in_brackets():
     """The made-up wobble of the first layout is a fifth of the other's."""
-    found = {row["statement"]: row for row in rows(table_verdicts, "table_verdicts")}
+    found = {row["statement"]: row for row in rows("table_verdicts")}
     row = found["The velocity does not suffer from clearance"]
     own, first = (float(text.split(" %")[0]) for text in row["numbers"].rstrip(")").split("("))
     assert own == pytest.approx(5.0 * first, rel=0.05)  # one decimal is printed
@@ -123,7 +129,7 @@ def test_verdicts_on_clearance_have_the_first_layouts_numbers_in_brackets():
 def test_table_9_says_how_far_single_runs_count():
     data = everything()
     horizon = 1e3 * float(data["sps4/far_csj_free:post"].ensemble_horizon)
-    heads = rows(table09, "table09")[0].keys()
+    heads = rows("table09")[0].keys()
     assert f"ours, free-free, to {horizon:.1f} ms" in heads
     assert 20.0 < horizon < 180.0  # the made-up ensemble parts inside the stroke
 
@@ -135,16 +141,14 @@ def test_table_9_spread_is_that_of_the_members():
         ensemble.velocity.sel(body="platform", axis="z").values - ideal.velocity.sel(body="platform", axis="z").values
     )
     expected = 1e3 * np.abs(velocity).max(axis=1)
-    cell = {row["largest error"]: row for row in rows(table09, "table09")}["velocity z0 (mm/s)"][
-        "ours, free-free, whole stroke"
-    ]
+    cell = {row["largest error"]: row for row in rows("table09")}["velocity z0 (mm/s)"]["ours, free-free, whole stroke"]
     mean, _, std = cell.partition(" ± ")
     assert float(mean) == pytest.approx(expected.mean(), abs=5e-4)  # three decimals are printed
     assert float(std) == pytest.approx(expected.std(ddof=1), rel=0.05)  # two digits are printed
 
 
 def test_table_10_divides_medians_by_the_ideal_one():
-    found = {row["model"]: row for row in rows(table10, "table10")}
+    found = {row["model"]: row for row in rows("table10")}
     # half of 44/3.6 - 36/4.4
     assert found["sps4/csj"]["equal error: integration (ideal = 1)"] == "10 ± 2"
     assert found["sps4/csj"]["CPU time, paper (ideal = 1)"] == "19.95"
@@ -158,7 +162,7 @@ def test_table_10_keeps_recording_out_of_its_ratios():
     data["sps4:timing"] = data["sps4:timing"].assign(
         equal_recording_seconds=data["sps4:timing"].equal_recording_seconds * 50
     )
-    slow, plain = rows(table10, "table10", data), rows(table10, "table10")
+    slow, plain = rows("table10", data), rows("table10")
     assert {k for a, b in zip(slow, plain, strict=True) for k in a if a[k] != b[k]} == {"recording (ms)"}
 
 
@@ -166,34 +170,34 @@ def test_table_10_takes_the_repeats_that_were_made():
     data = dict(everything())
     timing = data["sps4:timing"].copy(deep=True)
     timing.equal_integration_seconds[:, 2] = np.nan
-    found = {row["model"]: row for row in rows(table10, "table10", data | {"sps4:timing": timing})}
+    found = {row["model"]: row for row in rows("table10", data | {"sps4:timing": timing})}
     assert found["sps4/csj"]["equal error: integration (ms)"] == "42 ± 2"  # 40 and 44
     assert found["sps4/ideal"]["equal error: integration (ideal = 1)"] == "1 ± 0"
 
 
 def test_table_10_says_what_the_fixed_step_cannot_do():
-    found = {row["model"]: row for row in rows(table10, "table10")}
+    found = {row["model"]: row for row in rows("table10")}
     assert found["sps4/far_fixed"]["paper's step: integration (ms)"] == "–"
-    assert "far_fixed: unstable" in table10.make(everything())["table10.md"].decode()
+    assert "far_fixed: unstable" in text("table10")
 
 
 def test_table_10_names_the_ratios_of_the_paper_that_its_tolerance_gives():
-    text = table10.make(everything())["table10.md"].decode()
-    assert "Within a factor of 1.5 of the paper's ratio: sps4/far_fixed, sps4/csj." in text  # 21/20 and 400/20
+    said = text("table10")
+    assert "Within a factor of 1.5 of the paper's ratio: sps4/far_fixed, sps4/csj." in said  # 21/20 and 400/20
 
 
 def test_frequencies_carry_the_error_of_their_mesh():
-    first = rows(table04, "table04")[0]
+    first = rows("table04")[0]
     assert first["ours, circle (Hz)"] == "1577.003 ± 0.250"  # the made-up finer mesh differs by 0.25 Hz
 
 
 def test_deviations_carry_the_error_of_their_time_integration():
     """Both runs of the made-up pair are moved alike by the tighter tolerance, so that the difference is not."""
-    found = {row["largest error"]: row for row in rows(table08, "table08")}
+    found = {row["largest error"]: row for row in rows("table08")}
     assert found["velocity z0 (mm/s)"]["ours"].endswith("± 1e-10")
     data = dict(everything())
     data["sps4/ideal:tight"] = data["sps4/ideal:run"]
-    moved = {row["largest error"]: row for row in rows(table08, "table08", data)}["velocity z0 (mm/s)"]["ours"]
+    moved = {row["largest error"]: row for row in rows("table08", data)}["velocity z0 (mm/s)"]["ours"]
     assert moved.endswith("± 3e-03")  # 3e-6 m/s in the printed unit
 
 
@@ -211,15 +215,15 @@ def test_the_claim_of_chaos_is_judged_by_the_sections_that_were_made(tmp_path, m
     recorded = tmp_path / "verdicts.csv"
     recorded.write_text("\n".join(["scene,verdict,periods,exponent,exponent_low,exponent_high", *lines]))
     monkeypatch.setattr(table_verdicts, "SECTIONS", recorded)
-    last = rows(table_verdicts, "table_verdicts")[-1]
+    last = rows("table_verdicts")[-1]
     assert last["verdict"] == verdict
     assert f"CSJ {motions[0]}" in last["numbers"]
     recorded.unlink()
-    assert rows(table_verdicts, "table_verdicts")[-1]["verdict"] == "cannot be determined from one stroke"
+    assert rows("table_verdicts")[-1]["verdict"] == "cannot be determined from one stroke"
 
 
 def judged(data: dict[str, xr.Dataset]) -> dict[str, dict[str, str]]:
-    return {row["statement"]: row for row in rows(table_verdicts, "table_verdicts", data)}
+    return {row["statement"]: row for row in rows("table_verdicts", data)}
 
 
 def of_scene(name: str, **changed: xr.DataArray) -> dict[str, xr.Dataset]:

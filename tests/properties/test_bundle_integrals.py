@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 
@@ -84,7 +85,7 @@ def element_motion(data: xr.Dataset, start: int, stop: int, s: float, h: float) 
 @pytest.fixture(scope="module", params=CASES, ids=lambda case: "-".join(map(str, case)))
 def body(request: pytest.FixtureRequest) -> tuple[xr.Dataset, Cloud]:
     recipe, reference, count = request.param
-    rod = mesh.build(mesh.read_recipe(MESHES / f"{recipe}.toml"))
+    rod = kind.build(read_recipe(MESHES / f"{recipe}.toml"))
     data = bundle.build(rod, solve(rod, reference, count))
     return data, cloud(rod, data)
 
@@ -174,7 +175,7 @@ def test_frames_ride_on_their_nodes(body: tuple[xr.Dataset, Cloud]) -> None:
 @pytest.mark.parametrize("count", [7, 8, 13, None])
 def test_free_free_modes_carry_no_momentum(count: int | None) -> None:
     """Mean axes: no linear momentum, and no angular momentum about any point."""
-    rod = mesh.build(mesh.read_recipe(MESHES / "actuated_rod.toml"))
+    rod = kind.build(read_recipe(MESHES / "actuated_rod.toml"))
     data = bundle.build(rod, solve(rod, "free-free", count))
     scale = np.sqrt(float(data["mass"]))
     assert np.abs(data["modal_first_moment"].values).max() < 1e-13 * scale

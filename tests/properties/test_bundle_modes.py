@@ -14,8 +14,10 @@ import xarray as xr
 
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.structure.fe import beam, mesh
+from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import eigen, normal, reference, select
 from flexclear.pipeline.structure.modes.solution import solve
@@ -40,7 +42,7 @@ MANY = 4 * (eigen.DENSE_LIMIT // (4 * beam.N_DOFS) + 1)
 
 
 def rod(elements: int = 12) -> xr.Dataset:
-    return mesh.build(mesh.read_recipe(ROOT / "meshes" / "actuated_rod.toml") | {"elements": elements})
+    return kind.build(read_recipe(ROOT / "meshes" / "actuated_rod.toml") | {"elements": elements})
 
 
 @pytest.fixture(scope="module")
@@ -107,10 +109,10 @@ def test_interfaces_must_be_frames_on_different_nodes(paper_rod: xr.Dataset) -> 
 
 
 def test_fixed_fixed_needs_something_between_the_ends() -> None:
-    recipe = mesh.read_recipe(ROOT / "meshes" / "actuated_rod.toml")
+    recipe = read_recipe(ROOT / "meshes" / "actuated_rod.toml")
     recipe |= {"elements": 1, "frames": {"top": {"x": 0.24}}, "interfaces": []}
     with pytest.raises(InputError, match="no coordinate between two clamped ends"):
-        solve(mesh.build(recipe), "fixed-fixed", None)
+        solve(kind.build(recipe), "fixed-fixed", None)
 
 
 @pytest.mark.parametrize("condition, count", WHOLE)
@@ -131,8 +133,8 @@ def test_equal_pairs_bend_in_y_then_z(paper_rod: xr.Dataset, condition: str, cou
 @pytest.mark.parametrize("condition, count", WHOLE)
 def test_largest_component_is_positive(paper_rod: xr.Dataset, condition: str, count: int) -> None:
     modes = solve(paper_rod, condition, count)
-    for j, kind in enumerate(modes["kind"].values):
-        part = modes["shape"].values[:, 3 if kind == "torsion" else slice(0, 3), j].ravel()
+    for j, word in enumerate(modes["kind"].values):
+        part = modes["shape"].values[:, 3 if word == "torsion" else slice(0, 3), j].ravel()
         # ends of an antisymmetric shape are equal up to rounding; then the first of them is positive
         large = part[np.abs(part) >= (1.0 - 1e-6) * np.abs(part).max()]
         assert large[0] > 0.0
@@ -206,9 +208,9 @@ def test_rigid_modes_are_told_by_a_gap() -> None:
 
 def test_a_body_a_million_times_softer_keeps_its_modes() -> None:
     """No frequency in Hz is built in: the rod of jelly has the same shapes, a thousand times slower."""
-    recipe = mesh.read_recipe(ROOT / "meshes" / "actuated_rod.toml")
+    recipe = read_recipe(ROOT / "meshes" / "actuated_rod.toml")
     soft = recipe | {"material": recipe["material"] | {"youngs_modulus": 7.17e4}}
-    stiff, slow = (solve(mesh.build(r), "free-free", 8) for r in (recipe, soft))
+    stiff, slow = (solve(kind.build(r), "free-free", 8) for r in (recipe, soft))
     np.testing.assert_allclose(slow["frequency"] * 1e3, stiff["frequency"], rtol=1e-9)
     np.testing.assert_allclose(slow["shape"], stiff["shape"], atol=1e-7)
 

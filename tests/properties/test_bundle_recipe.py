@@ -11,7 +11,9 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.structure.fe import mesh, section
+from flexclear.pipeline.structure.fe import section
+from flexclear.pipeline.structure.fe.recipe import read_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 from flexclear.stages import meshing
@@ -21,12 +23,12 @@ MESHES = Path(__file__).parents[2] / "meshes"
 
 @pytest.fixture
 def recipe() -> dict[str, Any]:
-    return mesh.read_recipe(MESHES / "actuated_rod.toml")
+    return read_recipe(MESHES / "actuated_rod.toml")
 
 
 @pytest.mark.parametrize("path", sorted(MESHES.glob("*.toml")), ids=lambda path: path.stem)
 def test_every_recipe_builds_and_says_where_its_values_come_from(path: Path) -> None:
-    rod = mesh.build(mesh.read_recipe(path))
+    rod = kind.build(read_recipe(path))
     assert rod.sizes["node"] == rod.sizes["cell"] + 1
     for part in ("shape", "material", "section", "elements"):
         assert meshing.sources(path)[part] == "Table 2"
@@ -34,8 +36,7 @@ def test_every_recipe_builds_and_says_where_its_values_come_from(path: Path) -> 
 
 def test_the_equal_area_square_changes_only_the_mass() -> None:
     circle, square = (
-        mesh.build(mesh.read_recipe(MESHES / f"{name}.toml"))
-        for name in ("actuated_rod", "actuated_rod_square_inertia")
+        kind.build(read_recipe(MESHES / f"{name}.toml")) for name in ("actuated_rod", "actuated_rod_square_inertia")
     )
     changed = [name for name in circle.data_vars if not circle[name].equals(square[name])]
     assert changed == ["inertia_moment"]
@@ -53,7 +54,7 @@ def test_section_constants() -> None:
 def test_a_frame_between_nodes_is_refused_with_the_nearest_nodes(recipe: dict[str, Any]) -> None:
     recipe["frames"]["at_60mm"]["x"] = "67 mm"
     with pytest.raises(InputError, match=r"rod\.toml \[frames\.at_60mm\.x\]: 67 mm lies on no node.*60 mm and 80 mm"):
-        mesh.build(recipe, where="rod.toml")
+        kind.build(recipe, where="rod.toml")
 
 
 @pytest.mark.parametrize(
@@ -71,30 +72,30 @@ def test_a_frame_between_nodes_is_refused_with_the_nearest_nodes(recipe: dict[st
 )
 def test_mistakes_are_named(recipe: dict[str, Any], change: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message) as caught:
-        mesh.build(recipe | change)
+        kind.build(recipe | change)
     assert caught.value.exit_code == 2
 
 
 def test_all_mistakes_are_named_at_once(recipe: dict[str, Any]) -> None:
     del recipe["material"]["density"]
     with pytest.raises(InputError, match=r"(?s)\[elements\].*\[material\.density\]: is missing"):
-        mesh.build(recipe | {"elements": -3})
+        kind.build(recipe | {"elements": -3})
 
 
 def test_a_file_that_is_not_there_is_an_input_error() -> None:
     with pytest.raises(InputError, match="no such file"):
-        mesh.read_recipe(MESHES / "actuated_rot.toml")
+        read_recipe(MESHES / "actuated_rot.toml")
 
 
 def test_raw_and_read_recipes_give_the_same_mesh(recipe: dict[str, Any]) -> None:
     """Text with units and SI numbers are the same recipe."""
     text = {**recipe, "shape": {"type": "straight-beam", "length": "24 cm", "source": "Table 2"}}
-    xr.testing.assert_identical(mesh.build(text), mesh.build(recipe))
+    xr.testing.assert_identical(kind.build(text), kind.build(recipe))
 
 
 def test_other_programs_read_the_mesh(recipe: dict[str, Any], tmp_path: Path) -> None:
-    rod = mesh.build(recipe)
-    mesh.write_vtu(rod, tmp_path / "rod.vtu")
+    rod = kind.build(recipe)
+    (tmp_path / "rod.vtu").write_bytes(kind.of_mesh(rod).vtu(rod))
     read = meshio.read(tmp_path / "rod.vtu")
     np.testing.assert_array_equal(read.points, rod["node_position"])
     np.testing.assert_array_equal(read.cells_dict["line"], rod["cell_node"])
@@ -102,7 +103,7 @@ def test_other_programs_read_the_mesh(recipe: dict[str, Any], tmp_path: Path) ->
 
 
 def test_artifacts_survive_a_file(recipe: dict[str, Any], tmp_path: Path) -> None:
-    rod = mesh.build(recipe)
+    rod = kind.build(recipe)
     modes = solve(rod, "free-free", 7)
     for name, data in {"mesh": rod, "modes": modes, "bundle": bundle.build(rod, modes)}.items():
         path = tmp_path / f"{name}.nc"

@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene, read_toml
-from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.geometric_stiffness import variables
 from flexclear.pipeline.structure.modes.solution import solve
@@ -35,7 +35,7 @@ def stroke(
     for name, body in loaded.flexible().items():
         recipe = read_toml(Path(body.mesh))
         recipe["material"]["youngs_modulus"] *= stiffer
-        grid = mesh.build({**recipe, "elements": elements})
+        grid = kind.build({**recipe, "elements": elements})
         shapes = solve(grid, body.modes.reference, body.modes.count, interfaces=body.modes.interfaces)
         bundles[name] = bundle.build(grid, shapes, variables(grid, shapes))
     return dynamics.simulate(loaded, bundles, lambda fraction, text: None)

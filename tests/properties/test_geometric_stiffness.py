@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene, read_toml
-from flexclear.pipeline.structure.fe import mesh
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.geometric_stiffness import variables
 from flexclear.pipeline.structure.modes.solution import solve
@@ -29,7 +29,7 @@ class Reduced:
 
 def reduce(reference: str, count: int | None, interfaces: tuple[str, ...] | None = None, **recipe: object) -> Reduced:
     """A beam's bundle; `recipe` replaces whole parts of the recipe."""
-    grid = mesh.build({**read_toml(Path(RECIPE)), **recipe})
+    grid = kind.build({**read_toml(Path(RECIPE)), **recipe})
     modes = solve(grid, reference, count, interfaces=interfaces)
     return Reduced(grid, modes, bundle.build(grid, modes, variables(grid, modes)))
 

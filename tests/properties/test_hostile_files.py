@@ -25,7 +25,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.journal import Journal, State, sealed
-from flexclear.pipeline.post.render import shape_files
+from flexclear.pipeline.post.render import forms
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.solid import imported
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile
@@ -149,14 +149,14 @@ def test_a_mesh_that_would_never_end_is_refused(name: str, tmp_path: Path) -> No
     with refused(words):
         imported.read(MeshFile(type="mesh-file", file=name, length_unit="mm"), tmp_path, "recipe")
     with refused(words):
-        shape_files.read(tmp_path / name, 1.0)
+        forms.read(tmp_path / name, 1.0)
 
 
 @pytest.mark.parametrize("faces", ["f 1 2 1000000000000", "f -7 1 2", "f 1 2 3\nv nan 1 1"])
 def test_a_surface_with_faces_or_points_nowhere_is_refused(faces: str, tmp_path: Path) -> None:
     (tmp_path / "a.obj").write_text(f"v 0 0 0\nv 1 1 1\nv 0 0 1\n{faces}\n")
     with refused("points"):
-        shape_files.read(tmp_path / "a.obj", 1.0)
+        forms.read(tmp_path / "a.obj", 1.0)
 
 
 SIX = np.arange(6)

@@ -32,7 +32,7 @@ def read_recipe(path: Path) -> None:
     """As far as stage 1 gets."""
     meshing.check_size(path, Limits(cells=1000))
     table = meshing.params(path)["recipe"]
-    kind.of_recipe(table).build(table, path.parent)
+    kind.build(table, path.parent)
 
 
 def judged(read: Callable[[Path], None], texts: list[str], path: Path, seeds: range) -> list[str]:

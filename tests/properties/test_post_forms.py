@@ -16,16 +16,15 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, shape_files, surfaces, vibrations
-from flexclear.pipeline.post.render.forms import Seat
+from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, surfaces, vibrations
+from flexclear.pipeline.post.render.forms import Seat, equivalent
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
 from flexclear.pipeline.post.render.pictures import Shown, make
-from flexclear.pipeline.post.render.solids import equivalent
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.wheels import wheels
 from flexclear.pipeline.post.shapes.body_shape import surface
 from flexclear.pipeline.post.shapes.rod_shape import AROUND, PER_CELL
-from flexclear.pipeline.structure.kinds.kind import of_recipe
+from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes.rigid import drawn
 from flexclear.stages import rendering, simulation
 from tests.paper import synthetic
@@ -129,7 +128,7 @@ def test_a_scene_says_what_a_body_looks_like_and_no_run_depends_on_it():
 def test_shapes_come_from_files_of_other_programs(suffix: str, tmp_path: Path):
     box = surfaces.box((100.0, 20.0, 10.0))
     meshio.Mesh(box.points, [("triangle", box.triangles)]).write(tmp_path / f"part{suffix}")
-    read = shape_files.read(tmp_path / f"part{suffix}", 1e-3)
+    read = forms.read(tmp_path / f"part{suffix}", 1e-3)
     np.testing.assert_allclose(spans(read), [0.1, 0.02, 0.01], rtol=SINGLE)
     assert volume(read) == pytest.approx(2e-5, rel=SINGLE)
 
@@ -137,7 +136,7 @@ def test_shapes_come_from_files_of_other_programs(suffix: str, tmp_path: Path):
 def test_of_a_volume_mesh_the_boundary_is_drawn(tmp_path: Path):
     x = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1]])
     meshio.Mesh(x, [("tetra", np.array([[0, 1, 2, 3], [1, 2, 3, 4]]))]).write(tmp_path / "two.vtk")
-    read = shape_files.read(tmp_path / "two.vtk", 1.0)
+    read = forms.read(tmp_path / "two.vtk", 1.0)
     assert len(read.triangles) == 6  # of eight faces two are inside
     # the corner's sixth of a cube, and what lies beyond it: a third
     assert volume(read) == pytest.approx(1 / 6 + 1 / 3, rel=1e-12)
@@ -147,7 +146,7 @@ def test_of_a_volume_mesh_the_boundary_is_drawn(tmp_path: Path):
 def test_a_file_that_is_no_surface_is_refused_in_words(content: bytes, tmp_path: Path):
     (tmp_path / "part.stl").write_bytes(content)
     with pytest.raises(InputError, match=r"part\.stl"):
-        shape_files.read(tmp_path / "part.stl", 1.0)
+        forms.read(tmp_path / "part.stl", 1.0)
 
 
 def test_a_shape_file_that_is_not_there_is_told_with_its_place():
@@ -180,7 +179,7 @@ def test_the_viewer_bends_a_rod_as_the_run_does():
     step = run.sizes["time"] // 2
     rest = surfaces_of(bundle)
     q = run.modal_coordinate.values[step, rod.columns]
-    fields = player.linear_fields(rod, rest)
+    fields = player.linear_fields(rod.bundle)
     points = rest - bundle.first_moment.values / float(bundle.mass) + np.tensordot(q, fields, axes=1)
     true, _ = placed(run, rod, step)
     own = true - run.position.values[step, rod.index]
@@ -349,10 +348,10 @@ def test_a_rectangular_rod_is_drawn_with_its_sides(root: Path):
     shape = {"type": "straight-beam", "length": 0.2}
     plain = {"elements": 2, "shape": shape, "material": recipe["material"], "frames": {"a": {"x": 0.0}}}
     rectangle = {"section": {"type": "rectangle", "width": 0.012, "height": 0.008}}
-    flat = drawn(of_recipe(plain).build(plain | rectangle, root))
+    flat = drawn(kind.build(plain | rectangle, root))
     points, _ = surface(flat, np.zeros(1))
     assert np.ptp(points, axis=0) == pytest.approx([0.2, 0.012, 0.008], abs=1e-15)
     corners = np.abs(np.abs(points[:, 1:]) - [0.006, 0.004]).max(axis=1) < 1e-12
     assert corners.sum() == 5 * (2 * PER_CELL + 1)  # the first one is there twice
     round_one = plain | {"section": {"type": "tube", "radius": 0.01, "inner_radius": 0.008}}
-    assert drawn(of_recipe(plain).build(round_one, root))["radius"].values == pytest.approx(0.01, rel=1e-12)
+    assert drawn(kind.build(round_one, root))["radius"].values == pytest.approx(0.01, rel=1e-12)

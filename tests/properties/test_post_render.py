@@ -11,10 +11,10 @@ import xarray as xr
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.render import gl
+from flexclear.pipeline.post.render.forms import equivalent
 from flexclear.pipeline.post.render.mechanism import Looks, mechanism, part_pose, placed
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.pictures import Shown, make
-from flexclear.pipeline.post.render.solids import equivalent
 from flexclear.pipeline.post.shapes import body_shape
 from flexclear.pipeline.post.shapes.rod_shape import AROUND, PER_CELL, centre_line, scale_to, surface
 from tests.paper import synthetic

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation, velocity_at_events
-from flexclear.papers.wang_wang_2019.plotting.phase import at_times
+from flexclear.papers.wang_wang_2019.figures.phase import at_times
 from flexclear.pipeline.core.artifacts.quantities import common_times
 from flexclear.pipeline.core.numerics.rotations import (
     angle_about_y,

@@ -49,8 +49,10 @@ def condition(p: Parameters) -> float:
     Length scale 0.1 m; the central chain leaves rotation and lift.
     """
     rows = []
-    for a, b in zip(*scenes.circles(p.nearness), strict=True):
-        leg = (a + scenes.START - b) / np.linalg.norm(a + scenes.START - b)
+    layout = scenes.layout(p.nearness)
+    for a, b in zip(layout.A, layout.B, strict=True):
+        leg = a - b + np.array([0.0, 0.0, layout.height])
+        leg /= np.linalg.norm(leg)
         rows.append([*(np.cross(a, leg) / 0.1), leg[2]])
     return float(np.linalg.cond(np.array(rows)))
 

@@ -1,58 +1,87 @@
-"""The paper's figures and tables. To add one: a module here with NEEDS and make, and a line below.
-
-``NEEDS``: references of the artifacts it reads, ``<scene>:<artifact>[/<body>]``.
-They are listed in an index (`papers.wang_wang_2019.figure_stage`), since asking the modules takes the import of the
-plotting libraries. ``make(data)``: artifacts by reference -> file contents by file name.
-"""
+"""The paper's figures and tables. To add one: a `Figure` in a module here, and a line below."""
 
 from __future__ import annotations
 
-from importlib import import_module
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.scene.citations import docstring
-from flexclear.pipeline.core.scene.registry import lookup, module_of
+from flexclear.pipeline.core.scene.registry import lookup
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure as Drawing
+
+    from flexclear.pipeline.core.system.progress import Progress
+    from flexclear.pipeline.post.plotting.table import Table
 
 KIND = "figure or table"
 NAMES = {
-    "fig01": "fig01:make",
-    "fig03": "fig03:make",
-    "fig04": "fig04:make",
-    "fig05": "fig05:make",
-    "fig06": "fig06:make",
-    "fig08": "fig08:make",
-    "fig09": "fig09:make",
-    "fig10": "fig10:make",
-    "fig11": "fig11:make",
-    "fig12": "fig12:make",
-    "fig13": "fig13:make",
-    "fig14": "fig14:make",
-    "fig15": "fig15:make",
-    "fig16": "fig16:make",
-    "fig17": "fig17:make",
-    "table01": "table01:make",
-    "table02": "table02:make",
-    "table03": "table03:make",
-    "table04": "table04:make",
-    "table05": "table05:make",
-    "table06": "table06:make",
-    "table07": "table07:make",
-    "table08": "table08:make",
-    "table09": "table09:make",
-    "table10": "table10:make",
-    "table_verdicts": "table_verdicts:make",
+    "fig01": "fig01:FIGURE",
+    "fig03": "mode_shapes:FIG03",
+    "fig04": "mode_shapes:FIG04",
+    "fig05": "fig05:FIGURE",
+    "fig06": "fig06:FIGURE",
+    "fig08": "ideal:FIG08",
+    "fig09": "ideal:FIG09",
+    "fig10": "fig10:FIGURE",
+    "fig11": "panels:FIG11",
+    "fig12": "panels:FIG12",
+    "fig13": "panels:FIG13",
+    "fig14": "phase:FIG14",
+    "fig15": "phase:FIG15",
+    "fig16": "phase:FIG16",
+    "fig17": "fig17:FIGURE",
+    "table01": "given:TABLE01",
+    "table02": "given:TABLE02",
+    "table03": "given:TABLE03",
+    "table04": "frequencies:TABLE04",
+    "table05": "frequencies:TABLE05",
+    "table06": "given:TABLE06",
+    "table07": "errors:TABLE07",
+    "table08": "errors:TABLE08",
+    "table09": "errors:TABLE09",
+    "table10": "table10:TABLE",
+    "table_verdicts": "table_verdicts:TABLE",
 }
+#: artifacts by reference, such as ``sps4/csj:run``
+Data = dict[str, "xr.Dataset"]
 
 
-def needs(name: str) -> tuple[str, ...]:
-    """References of the artifacts that `name` cannot be made without."""
-    return tuple(import_module(_module(name)).NEEDS)
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One figure or table.
+
+    title: what it shows.  needs: references of the artifacts that it cannot be made without,
+    ``<scene>:<artifact>[/<body>]``.  make: from these artifacts; a drawing is made in the style of all.
+    """
+
+    title: str
+    needs: tuple[str, ...]
+    make: Callable[[Data], Drawing | Table]
 
 
-def title(name: str) -> str:
-    """First line of the module's docstring: what the figure or table shows."""
-    return (docstring(import_module(_module(name))) or name).strip().splitlines()[0].rstrip(".")
+def figure(name: str) -> Figure:
+    """The figure or table of a name, its module imported now, and with it the plotting libraries."""
+    found: Figure = lookup(__name__, name, where="figures")
+    return found
 
 
-def _module(name: str) -> str:
-    lookup(__name__, name, where="figures")
-    return module_of(__name__, name)
+def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Stage: ``<name>.png`` and ``.svg`` of a figure, ``.csv`` and ``.md`` of a table; inputs by reference."""
+    from flexclear.pipeline.post.plotting import style, table
+
+    name = params["figure"]
+    with style.style():
+        made = figure(name).make(dict(inputs))
+        return dict(table.files(name, made) if isinstance(made, table.Table) else style.files(name, made))
+
+
+def index(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Stage: ``index.json``, for each name what it needs.
+
+    An artifact of its own, because asking the modules themselves takes the import of matplotlib.
+    """
+    entries = {name: {"needs": list(figure(name).needs)} for name in params["names"]}
+    return {"index.json": json.dumps(entries, indent=1).encode()}

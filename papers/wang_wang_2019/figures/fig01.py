@@ -1,17 +1,17 @@
-"""Figure 1: structure of the 4-SPS/PS mechanism, with the names of its parts and the joint coordinates in use."""
+"""Figure 1."""
 
 from __future__ import annotations
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
+from flexclear.papers.wang_wang_2019.figures import Data, Figure
 from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CB, IDEAL, JOINT
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.drawing import View, shell, triad, tube, view
 from flexclear.pipeline.post.single_run.series import parameters
-
-NEEDS = ("sps4/ideal:run",)
 
 LEGS = (1, 2, 3, 4)
 TOWARDS, UP = np.array([0.75, -1.35, 0.55]), np.array([0.0, 0.0, 1.0])
@@ -22,24 +22,22 @@ LABELS = {1: (0.07, 0.0), 2: (-0.065, 0.0), 3: (-0.055, 0.04), 4: (-0.07, 0.0)}
 STEEL, ALUMINIUM, PLATE, BASE = "#5b7fa6", "#b9c2cc", "#c9a66b", "#dfe5ec"
 
 
-def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
-    """fig01.png and fig01.svg: the mechanism at its start, drawn to scale, and its joints seen from above."""
+def make(data: Data) -> Drawing:
+    """The mechanism at its start, drawn to scale, and its joints seen from above."""
     run = data[f"{IDEAL.scene}:run"]
     points = {str(name): run.frame_position.values[0, k] for k, name in enumerate(run.frame.values)}
-    with style.style():
-        figure, axes = style.grid(1, 2, (12.4, 7.4), width_ratios=[1.25, 1])
-        _mechanism(axes[0, 0], view(TOWARDS, UP), points, plate(run))
-        axes[0, 0].set_title("(a) parts and joints at the start, to scale")
-        _from_above(axes[0, 1], points, plate(run))
-        axes[0, 1].set_title("(b) joint centres from above (mm)")
-        style.heading(
-            figure,
-            "Figure 1: four SPS legs and a central PS chain carry the platform; "
-            "rod 1 is flexible, joint A1 has clearance",
-            "the paper prints neither the joint coordinates nor the start height: those shown are fitted to Table 8, "
-            "or assumed",
-        )
-        return style.files("fig01", figure)
+    figure, axes = style.grid(1, 2, (12.4, 7.4), width_ratios=[1.25, 1])
+    _mechanism(axes[0, 0], view(TOWARDS, UP), points, plate(run))
+    axes[0, 0].set_title("(a) parts and joints at the start, to scale")
+    _from_above(axes[0, 1], points, plate(run))
+    axes[0, 1].set_title("(b) joint centres from above (mm)")
+    style.heading(
+        figure,
+        "Figure 1: four SPS legs and a central PS chain carry the platform; rod 1 is flexible, joint A1 has clearance",
+        "the paper prints neither the joint coordinates nor the start height: those shown are fitted to Table 8, "
+        "or assumed",
+    )
+    return figure
 
 
 def plate(run: xr.Dataset) -> np.ndarray:
@@ -144,3 +142,10 @@ def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> N
     reach = 1e3 * np.abs([at[f"ground.B{k}"][:2] for k in LEGS]).max(axis=0)
     axes.set(xlim=(-1.25 * reach[0] - 40.0, 1.25 * reach[0] + 40.0), ylim=(-1.2 * reach[1], 1.2 * reach[1]))
     axes.set_aspect("equal")
+
+
+FIGURE = Figure(
+    "Figure 1: structure of the 4-SPS/PS mechanism, with the names of its parts and the joint coordinates in use",
+    ("sps4/ideal:run",),
+    make,
+)

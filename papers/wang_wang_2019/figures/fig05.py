@@ -1,44 +1,42 @@
-"""Figure 5: kinematics of the spherical joint with clearance, as named here and in the paper."""
+"""Figure 5."""
 
 from __future__ import annotations
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 
+from flexclear.papers.wang_wang_2019.figures import Data, Figure
 from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT, references
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import parameters
-
-NEEDS = references([CSJ], "run", "post")
 
 #: drawn radii of socket and ball, and the angle at which the ball lies off the centre
 SOCKET, DRAWN_BALL, ANGLE = 1.0, 0.74, np.radians(-38.0)
 
 
-def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
-    """fig05.png and fig05.svg: before and during contact; the clearance is drawn larger than it is."""
+def make(data: Data) -> Drawing:
+    """Before and during contact; the clearance is drawn larger than it is."""
     post = data[f"{CSJ.scene}:post"]
     joint = parameters(data[f"{CSJ.scene}:run"])["joint"][JOINT]
     clearance, ball = 1e3 * joint["clearance"], 1e3 * joint["ball_radius"]
     deepest = 1e6 * float(data[f"{CSJ.scene}:run"].contact_penetration.max())
     peak = float(post.peak_force.sel(contact=JOINT))
     exaggerated = (SOCKET - DRAWN_BALL) / SOCKET * (ball + clearance) / clearance
-    with style.style():
-        figure, axes = style.grid(1, 2, (10.4, 5.1))
-        _joint(axes[0, 0], 0.6 * (SOCKET - DRAWN_BALL))
-        axes[0, 0].set_title("(a) free: gap = c − |p_SB| > 0")
-        _joint(axes[0, 1], 1.28 * (SOCKET - DRAWN_BALL), touching=True)
-        axes[0, 1].set_title("(b) contact: penetration δ = |p_SB| − c > 0")
-        style.heading(
-            figure,
-            f"Figure 5: a ball of {ball:g} mm moves by {clearance:g} mm in its socket and enters the wall by "
-            f"{deepest:.1f} µm at most",
-            f"clearance drawn {exaggerated:.0f} times larger; S: centre of the socket (paper: A1), "
-            "B: of the ball (b1), "
-            f"p_SB: eccentricity (d); largest force of the {CSJ.label} run {peak:.0f} N",
-        )
-        return style.files("fig05", figure)
+    figure, axes = style.grid(1, 2, (10.4, 5.1))
+    _joint(axes[0, 0], 0.6 * (SOCKET - DRAWN_BALL))
+    axes[0, 0].set_title("(a) free: gap = c − |p_SB| > 0")
+    _joint(axes[0, 1], 1.28 * (SOCKET - DRAWN_BALL), touching=True)
+    axes[0, 1].set_title("(b) contact: penetration δ = |p_SB| − c > 0")
+    style.heading(
+        figure,
+        f"Figure 5: a ball of {ball:g} mm moves by {clearance:g} mm in its socket and enters the wall by "
+        f"{deepest:.1f} µm at most",
+        f"clearance drawn {exaggerated:.0f} times larger; S: centre of the socket (paper: A1), "
+        "B: of the ball (b1), "
+        f"p_SB: eccentricity (d); largest force of the {CSJ.label} run {peak:.0f} N",
+    )
+    return figure
 
 
 def _joint(axes: Axes, eccentricity: float, *, touching: bool = False) -> None:
@@ -78,3 +76,10 @@ def _arrow(
         zorder=6,
     )
     axes.annotate(name, 0.5 * (start + end) + shift, ha="center", va="center", fontsize=9.5, color=color, zorder=6)
+
+
+FIGURE = Figure(
+    "Figure 5: kinematics of the spherical joint with clearance, as named here and in the paper",
+    references([CSJ], "run", "post"),
+    make,
+)

@@ -1,44 +1,43 @@
-"""Figure 6: modified Coulomb friction, coefficient over sliding velocity, and what a run did."""
+"""Figure 6."""
 
 from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure as Drawing
 
+from flexclear.papers.wang_wang_2019.figures import Data, Figure
 from flexclear.papers.wang_wang_2019.models import CSJ, JOINT
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import parameters
 
-NEEDS = ("sps4/csj:run",)
 
-
-def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
-    """fig06.png and fig06.svg: eqs. (28), (29) with the scene's parameters; dots from the run."""
+def make(data: Data) -> Drawing:
+    """Eqs. (28), (29) with the scene's parameters; dots from the run."""
     run = data[f"{CSJ.scene}:run"]
     friction = parameters(run)["joint"][JOINT]["friction"]
     limits = (friction["v_static"], friction["v_dynamic"], friction["static"], friction["dynamic"])
     v, mu = observed(run.sel(contact=JOINT))
-    with style.style():
-        figure, axes = style.grid(1, 2, (9.6, 3.7), width_ratios=[1.25, 1])
-        _curve(axes[0, 0], limits, 1.5 * limits[1])
-        axes[0, 0].set_title("(a) the law")
-        _label(axes[0, 0], limits)
-        _curve(axes[0, 1], limits, 3.0 * limits[0], marks=False)
-        for panel in axes.flat:
-            panel.scatter(1e3 * v, mu, s=7, color=CSJ.color, lw=0, zorder=3, label=f"run {CSJ.scene}, in contact")
-            panel.set_xlabel("tangential velocity (mm/s)")
-        axes[0, 0].set_xlim(-1.5e3 * limits[1], 1.5e3 * limits[1])
-        axes[0, 1].set_xlim(-3e3 * limits[0], 3e3 * limits[0])
-        axes[0, 1].set_title("(b) around zero")
-        axes[0, 0].set_ylabel("friction coefficient")
-        axes[0, 0].legend(loc="upper left", fontsize=8)
-        style.heading(
-            figure,
-            f"Figure 6: friction rises to {limits[2]:g} at {1e3 * limits[0]:g} mm/s and falls to {limits[3]:g} at "
-            f"{1e3 * limits[1]:g} mm/s",
-            "modified Coulomb law, force against the sliding velocity; negative velocities mirror the law",
-        )
-        return style.files("fig06", figure)
+    figure, axes = style.grid(1, 2, (9.6, 3.7), width_ratios=[1.25, 1])
+    _curve(axes[0, 0], limits, 1.5 * limits[1])
+    axes[0, 0].set_title("(a) the law")
+    _label(axes[0, 0], limits)
+    _curve(axes[0, 1], limits, 3.0 * limits[0], marks=False)
+    for panel in axes.flat:
+        panel.scatter(1e3 * v, mu, s=7, color=CSJ.color, lw=0, zorder=3, label=f"run {CSJ.scene}, in contact")
+        panel.set_xlabel("tangential velocity (mm/s)")
+    axes[0, 0].set_xlim(-1.5e3 * limits[1], 1.5e3 * limits[1])
+    axes[0, 1].set_xlim(-3e3 * limits[0], 3e3 * limits[0])
+    axes[0, 1].set_title("(b) around zero")
+    axes[0, 0].set_ylabel("friction coefficient")
+    axes[0, 0].legend(loc="upper left", fontsize=8)
+    style.heading(
+        figure,
+        f"Figure 6: friction rises to {limits[2]:g} at {1e3 * limits[0]:g} mm/s and falls to {limits[3]:g} at "
+        f"{1e3 * limits[1]:g} mm/s",
+        "modified Coulomb law, force against the sliding velocity; negative velocities mirror the law",
+    )
+    return figure
 
 
 def coefficient(v: np.ndarray, v_static: float, v_dynamic: float, static: float, dynamic: float) -> np.ndarray:
@@ -82,3 +81,10 @@ def _label(axes: style.Axes, limits: tuple[float, ...]) -> None:
     v_static, v_dynamic, static, dynamic = limits
     text = f"μs = {static:g} at vs = {1e3 * v_static:g} mm/s\nμd = {dynamic:g} from vd = {1e3 * v_dynamic:g} mm/s"
     axes.text(0.97, 0.30, text, transform=axes.transAxes, ha="right", va="center", color=style.SOFT, linespacing=1.6)
+
+
+FIGURE = Figure(
+    "Figure 6: modified Coulomb friction, coefficient over sliding velocity, and what a run did",
+    ("sps4/csj:run",),
+    make,
+)

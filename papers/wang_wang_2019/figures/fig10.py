@@ -1,17 +1,16 @@
-"""Figure 10: how the dynamics are computed, next to the paper's steps 1 to 9."""
+"""Figure 10."""
 
 from __future__ import annotations
 
 from itertools import pairwise
 
-import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Drawing
 from matplotlib.text import Text
 
+from flexclear.papers.wang_wang_2019.figures import Data, Figure
 from flexclear.papers.wang_wang_2019.models import FAR_CSJ_CB
 from flexclear.pipeline.post.plotting import style
-
-NEEDS = ("sps4/far_csj_cb:run",)
 
 #: boxes of the three columns: text, and the paper's step that it is
 STRUCTURE = (
@@ -35,30 +34,26 @@ BLUE, GREEN, ORANGE = "#0072B2", "#009E73", "#E69F00"
 ROWS = ((0.92, 0.72, 0.52), (0.28, 0.08), (0.92, 0.71, 0.49, 0.27, 0.08))
 
 
-def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
-    """fig10.png and fig10.svg, with the counts of the paper's full model."""
+def make(data: Data) -> Drawing:
+    """The boxes, with the counts of the paper's full model."""
     attributes = data[f"{FAR_CSJ_CB.scene}:run"].attrs
-    with style.style():
-        figure, axes = style.grid(1, 2, (9.0, 5.2))
-        left, right = axes.flat
-        for panel, boxes, rows, color in zip(
-            (left, left, right), (STRUCTURE, START, LOOP), ROWS, (BLUE, GREEN, ORANGE), strict=True
-        ):
-            drawn = _column(panel, boxes, rows, color)
-        _arrow(right, drawn[-1], drawn[0], "bar,fraction=0.6")
-        left.set_title("(a) once per flexible body")
-        right.set_title("(c) step after step")
-        left.text(
-            0.0, 0.385, "(b) once per run", fontsize=left.title.get_fontsize(), fontweight="bold", color=style.INK
-        )
-        style.heading(
-            figure,
-            "Figure 10: contacts end steps where they begin and end; "
-            "the paper looks at them at the ends of steps of 10 µs",
-            f"next to the boxes: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {attributes['steps']} steps, "
-            f"{attributes['evaluations']} evaluations, {attributes['projections']} projections",
-        )
-        return style.files("fig10", figure)
+    figure, axes = style.grid(1, 2, (9.0, 5.2))
+    left, right = axes.flat
+    for panel, boxes, rows, color in zip(
+        (left, left, right), (STRUCTURE, START, LOOP), ROWS, (BLUE, GREEN, ORANGE), strict=True
+    ):
+        drawn = _column(panel, boxes, rows, color)
+    _arrow(right, drawn[-1], drawn[0], "bar,fraction=0.6")
+    left.set_title("(a) once per flexible body")
+    right.set_title("(c) step after step")
+    left.text(0.0, 0.385, "(b) once per run", fontsize=left.title.get_fontsize(), fontweight="bold", color=style.INK)
+    style.heading(
+        figure,
+        "Figure 10: contacts end steps where they begin and end; the paper looks at them at the ends of steps of 10 µs",
+        f"next to the boxes: steps of the paper's section 6.1. {FAR_CSJ_CB.label}: {attributes['steps']} steps, "
+        f"{attributes['evaluations']} evaluations, {attributes['projections']} projections",
+    )
+    return figure
 
 
 def _column(axes: Axes, boxes: tuple[tuple[str, str], ...], rows: tuple[float, ...], color: str) -> list[Text]:
@@ -82,3 +77,10 @@ def _arrow(axes: Axes, first: Text, second: Text, way: str) -> None:
     look = {"arrowstyle": "-|>", "color": style.SOFT, "lw": 1.3, "connectionstyle": way, "shrinkA": 2, "shrinkB": 2}
     patches = {"patchA": first.get_bbox_patch(), "patchB": second.get_bbox_patch()}
     axes.annotate("", second.get_position(), first.get_position(), arrowprops=look | patches)
+
+
+FIGURE = Figure(
+    "Figure 10: how the dynamics are computed, next to the paper's steps 1 to 9",
+    ("sps4/far_csj_cb:run",),
+    make,
+)

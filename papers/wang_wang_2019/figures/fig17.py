@@ -1,38 +1,37 @@
-"""Figure 17: trajectory of the ball's centre in the socket, CSJ and FAR-CSJ models."""
+"""Figure 17."""
 
 from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure as Drawing
 
+from flexclear.papers.wang_wang_2019.figures import Data, Figure
 from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, JOINT, Model, believed_until, references
 from flexclear.pipeline.post.plotting import style
-
-NEEDS = references((CSJ, *FAR_CSJ), "run", "post")
 
 PLANES = (("x", "y"), ("x", "z"))
 
 
-def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
-    """fig17.png and fig17.svg: two projections per model, socket axes, with the clearance circle."""
+def make(data: Data) -> Drawing:
+    """Two projections per model, socket axes, with the clearance circle."""
     models = (CSJ, *FAR_CSJ)
-    with style.style():
-        figure, axes = style.grid(len(PLANES), len(models), (11.6, 6.5), sharex=True, sharey=True)
-        for column, model in enumerate(models):
-            axes[0, column].set_title(model.label.replace(" modes", ""), fontsize=8.6)
-            for row, plane in enumerate(PLANES):
-                _projection(axes[row, column], plane, model, data)
+    figure, axes = style.grid(len(PLANES), len(models), (11.6, 6.5), sharex=True, sharey=True)
+    for column, model in enumerate(models):
+        axes[0, column].set_title(model.label.replace(" modes", ""), fontsize=8.6)
         for row, plane in enumerate(PLANES):
-            axes[row, 0].set_ylabel(f"{plane[1]} in the socket (mm)")
-        for column in range(len(models)):
-            axes[-1, column].set_xlabel("x in the socket (mm)")
-        style.heading(
-            figure,
-            "Figure 17: the ball flies from wall to wall; with a flexible rod its ways part from run to run",
-            "centre of the ball in the socket; grey: clearance sphere; pale: beyond the horizon; dots: where impacts "
-            "begin before it",
-        )
-        return style.files("fig17", figure)
+            _projection(axes[row, column], plane, model, data)
+    for row, plane in enumerate(PLANES):
+        axes[row, 0].set_ylabel(f"{plane[1]} in the socket (mm)")
+    for column in range(len(models)):
+        axes[-1, column].set_xlabel("x in the socket (mm)")
+    style.heading(
+        figure,
+        "Figure 17: the ball flies from wall to wall; with a flexible rod its ways part from run to run",
+        "centre of the ball in the socket; grey: clearance sphere; pale: beyond the horizon; dots: where impacts "
+        "begin before it",
+    )
+    return figure
 
 
 def _projection(axes: style.Axes, plane: tuple[str, str], model: Model, data: dict[str, xr.Dataset]) -> None:
@@ -52,3 +51,10 @@ def _projection(axes: style.Axes, plane: tuple[str, str], model: Model, data: di
     index = index[time[index] <= horizon]
     axes.plot(x[index], y[index], "o", ms=2.6, color=style.INK)
     axes.set_aspect("equal")
+
+
+FIGURE = Figure(
+    "Figure 17: trajectory of the ball's centre in the socket, CSJ and FAR-CSJ models",
+    references((CSJ, *FAR_CSJ), "run", "post"),
+    make,
+)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
 
 from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
+from flexclear.papers.wang_wang_2019.figures import Data
 from flexclear.papers.wang_wang_2019.models import BALL_FRAME, IDEAL, JOINT, PLATFORM, Model
 from flexclear.pipeline.core.artifacts.quantities import common_times
 
 #: two answers differ by more than this fraction, and those of two ensembles also by this many standard deviations of
 #: the members
 SLIGHT, SEPARATION = 0.1, 2.0
-#: artifacts by reference, such as ``sps4/csj:run``
-Data = Mapping[str, xr.Dataset]
 
 
 def moved(data: Data, model: Model, ideal_model: Model = IDEAL) -> Deviation:

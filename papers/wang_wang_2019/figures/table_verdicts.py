@@ -1,4 +1,4 @@
-"""Verdicts (added): what the paper states in section 6, and whether it holds here."""
+"""What the paper states in section 6, and whether it holds here."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 
-from flexclear.papers.wang_wang_2019.figures import measured
-from flexclear.papers.wang_wang_2019.figures.measured import SEPARATION, SLIGHT, Data, difference, mode_set
+from flexclear.papers.wang_wang_2019.figures import Data, Figure, measured
+from flexclear.papers.wang_wang_2019.figures.errors import NOISE
+from flexclear.papers.wang_wang_2019.figures.measured import SEPARATION, SLIGHT, difference, mode_set
 from flexclear.papers.wang_wang_2019.figures.table10 import ratios
 from flexclear.papers.wang_wang_2019.models import (
     CSJ,
@@ -31,17 +31,10 @@ from flexclear.papers.wang_wang_2019.models import (
     Model,
     references,
 )
-from flexclear.papers.wang_wang_2019.plotting.error_table import NOISE
 from flexclear.papers.wang_wang_2019.published import TABLE10
 from flexclear.pipeline.core.artifacts.paths import TREE
 from flexclear.pipeline.core.system.file_dependencies import note
-from flexclear.pipeline.post.plotting.table import Table, files
-
-NEEDS = (
-    *references((IDEAL, *FAR, CSJ, *FIRST), "run", "post"),
-    *references(FAR_CSJ, "post", "ensemble"),
-    "sps4:timing",
-)
+from flexclear.pipeline.post.plotting.table import Table
 
 #: verdicts on the repeated stroke, which take two hours and stand in the repository (`make chaos`)
 SECTIONS = TREE / "docs/chaos/verdicts.csv"
@@ -64,8 +57,7 @@ class Statement:
     test: Callable[[Data], Outcome]
 
 
-def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
-    """table_verdicts.csv and table_verdicts.md."""
+def _verdicts(data: Data) -> Table:
     rows = tuple((s.place, s.text, *s.test(data)) for s in STATEMENTS)
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
@@ -77,10 +69,8 @@ def make(data: dict[str, xr.Dataset]) -> dict[str, bytes]:
         "repeated stroke, [geometry.md](geometry.md) what Table 8 says of the joint coordinates. Tables 4 "
         "and 5 have verdicts of their own below them.",
     )
-    return files("table_verdicts", Table("Verdicts on the paper's statements (added)", HEADS, rows, notes))
-
-
-HEADS = ("place", "statement", "verdict", "numbers")
+    heads = ("place", "statement", "verdict", "numbers")
+    return Table("Verdicts on the paper's statements (added)", heads, rows, notes)
 
 
 def _verdict(*tests: bool) -> str:
@@ -405,4 +395,14 @@ STATEMENTS = (
         _costs(FAR_CSJ_FREE, FAR_CSJ_FIXED),
     ),
     Statement("Fig. 16", "The motion changes from periodic to quasi-periodic and chaotic", _becomes_chaotic),
+)
+
+TABLE = Figure(
+    "Verdicts (added): what the paper states in section 6, and whether it holds here",
+    (
+        *references((IDEAL, *FAR, CSJ, *FIRST), "run", "post"),
+        *references(FAR_CSJ, "post", "ensemble"),
+        "sps4:timing",
+    ),
+    _verdicts,
 )

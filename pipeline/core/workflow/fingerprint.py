@@ -30,8 +30,6 @@ _SCENE = "flexclear.pipeline.core.scene"
 WORDING = {f"{_SCENE}.{name}" for name in ("citations", "validation_errors", "plausibility")}
 #: the functions that `import flexclear` offers stand above the stages: no result reaches them
 ABOVE = {"flexclear.public"}
-#: packages whose modules' docstrings are titles on pages
-TITLED = ("flexclear.papers.wang_wang_2019.figures.",)
 #: how often a source is parsed at most, where threads of libraries come between
 ATTEMPTS = 10
 _PARSING = Lock()
@@ -143,7 +141,7 @@ class Sources:
 def _examined(source: bytes, name: str, package: bool) -> Module:
     tree = _parsed(source)
     own, libraries = (tuple(sorted(names)) for names in _imported(tree, name, package, deep=True))
-    code = code_digest(tree, docstring=name.startswith(TITLED))
+    code = code_digest(tree)
     return Module(hashlib.sha256(source).hexdigest(), code, own, libraries, package)
 
 
@@ -193,12 +191,8 @@ def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[s
     return own, libraries
 
 
-def code_digest(tree: ast.Module, *, docstring: bool = False) -> str:
-    """Digest of what a module does: its syntax tree without docstrings and the words of raised errors, taken out of it.
-
-    docstring: whether that of the module counts.
-    """
-    title = ast.get_docstring(tree) if docstring else ""
+def code_digest(tree: ast.Module) -> str:
+    """Digest of what a module does: its syntax tree, from which docstrings and words of raised errors are taken."""
     for node in ast.walk(tree):
         if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
             del node.body[0]
@@ -208,7 +202,7 @@ def code_digest(tree: ast.Module, *, docstring: bool = False) -> str:
                     part.values = []
                 elif isinstance(part, ast.Constant) and isinstance(part.value, str):
                     part.value = ""
-    return hashlib.sha256(f"{title}\0{ast.dump(tree)}".encode()).hexdigest()
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
 
 
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)

@@ -16,6 +16,7 @@ mpl.use("Agg")
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -78,6 +79,16 @@ def files(name: str, figure: Figure) -> dict[str, bytes]:
         result[f"{name}.{kind}"] = buffer.getvalue()
     plt.close(figure)
     return result
+
+
+def canvas(size: tuple[int, int], **options: Any) -> FigureCanvasAgg:
+    """What draws a figure of so many pixels (width, height), and gives them back (`pixels`)."""
+    return FigureCanvasAgg(Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, **options))
+
+
+def pixels(drawn: FigureCanvasAgg) -> np.ndarray:
+    """What was drawn, as bytes of shape (height, width, 3)."""
+    return np.asarray(drawn.buffer_rgba())[:, :, :3].copy()
 
 
 def grid(rows: int, columns: int, size: tuple[float, float], **options: Any) -> tuple[Figure, Any]:

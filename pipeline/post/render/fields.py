@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post.render.mechanism import Flexible
 from flexclear.pipeline.post.shapes.body_shape import surface
 
 #: a small step of a coordinate, in which a skin moves linearly
@@ -17,19 +16,15 @@ def hertz(frequency: float) -> str:
     return "static" if not frequency > 0.0 else f"{frequency:.5g} Hz"
 
 
-def linear_fields(body: Flexible, rest: np.ndarray) -> np.ndarray:
-    """How each point of a flexible body's skin moves per unit of each coordinate, about its centre of mass.
+def fields_of(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a body's skin at rest (point, 3), and how each moves per unit of each coordinate, (mode, point, 3)."""
+    count = bundle.sizes["mode"]
+    rest = surface(bundle, np.zeros(count))[0]
+    return rest, np.array([(surface(bundle, SMALL * unit)[0] - rest) / SMALL for unit in np.eye(count)])
 
-    Shape (mode, point, 3); body axes.
-    """
-    bundle = body.bundle
+
+def linear_fields(bundle: xr.Dataset) -> np.ndarray:
+    """How each point of a body's skin moves per unit of each coordinate, about its centre of mass; body axes."""
     centre = bundle["modal_first_moment"].values / float(bundle["mass"])
-    return np.array([field(bundle, k, rest) - centre[:, k] for k in range(bundle.sizes["mode"])])
-
-
-def field(bundle: xr.Dataset, mode: int, rest: np.ndarray) -> np.ndarray:
-    """How each point of a body's skin moves per unit of a modal coordinate, (point, 3); `rest`: the points at zero."""
-    q = np.zeros(bundle.sizes["mode"])
-    q[mode] = SMALL
-    moved: np.ndarray = (surface(bundle, q)[0] - rest) / SMALL
-    return moved
+    fields: np.ndarray = fields_of(bundle)[1] - centre.T[:, None, :]
+    return fields

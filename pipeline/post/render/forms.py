@@ -16,8 +16,9 @@ import numpy as np
 
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.fields import Pose
-from flexclear.pipeline.post.render import shape_files, surfaces
-from flexclear.pipeline.post.render.solids import Solid
+from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.core.system.external_files import read_mesh
+from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.surfaces import Surface
 
 #: half width of a link as a fraction of the mechanism's size, and of the distance of its joints at most
@@ -34,6 +35,17 @@ LARGEST = 0.1
 TURNING = ("revolute", "clearance-revolute", "clearance-slot", "planar")
 SLIDING = ("prismatic", "cylindrical")
 BALLS = ("spherical", "clearance-spherical", "ball-on-plane")
+#: two principal moments closer than this fraction are called equal: a cylinder, not a box; tables print four digits
+ROUND = 0.01
+#: thinnest drawn thickness as a fraction of the body's largest extent, so that plates are seen
+THINNEST = 0.03
+#: bytes of a surface: more is no picture that anybody waits for; and how far its points may be [m]
+LARGEST_FILE, FARTHEST = 200_000_000, 1e15
+#: faces of cells, by their corners, seen from outside
+_SIDES = {
+    "tetra": ((0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)),
+    "hexahedron": ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +57,44 @@ class Seat:
     axes: np.ndarray
     joint: str
     first: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Solid:
+    """Equivalent solid about the centre of mass: `axes` columns are its directions in the body frame.
+
+    round: half extents are (radius, radius, half length), else those of a box.
+    """
+
+    axes: np.ndarray
+    half: np.ndarray  #: [m]
+    round: bool
+
+
+def equivalent(mass: float, inertia: np.ndarray) -> Solid:
+    """The uniform cylinder or box of this mass [kg] and inertia about its centre of mass [kg m^2]."""
+    moments, axes = np.linalg.eigh(inertia)
+    low, middle, high = moments / mass
+    if high - low <= ROUND * high:  # alike about every axis: a cube shows how it turns
+        return Solid(_right(axes), _visible(np.full(3, np.sqrt(1.5 * low))), round=False)
+    if middle - low <= ROUND * high:
+        across, along = 0.5 * (low + middle), high
+    elif high - middle <= ROUND * high:
+        across, along, axes = 0.5 * (middle + high), low, axes[:, [1, 2, 0]]
+    else:
+        squares = 1.5 * np.array([middle + high - low, low + high - middle, low + middle - high])
+        return Solid(_right(axes), _visible(np.sqrt(np.clip(squares, 0.0, None))), round=False)
+    radius = np.sqrt(2.0 * along)
+    half_length = np.sqrt(3.0 * max(across - 0.25 * radius**2, 0.0))
+    return Solid(_right(axes), _visible(np.array([radius, radius, half_length])), round=True)
+
+
+def _visible(half: np.ndarray) -> np.ndarray:
+    return np.maximum(half, THINNEST * half.max())
+
+
+def _right(axes: np.ndarray) -> np.ndarray:
+    return axes if np.linalg.det(axes) > 0 else axes * np.array([-1.0, 1.0, 1.0])
 
 
 def link(seats: Sequence[Seat], com: np.ndarray, solid: Solid | None, size: float, layer: int = 0) -> Surface:
@@ -89,7 +139,7 @@ def shapes(declared: Sequence[Mapping[str, Any]], folder: Path) -> Surface:
         elif kind == "sphere":
             part = surfaces.sphere(shape["radius"])
         else:
-            part = shape_files.read(folder / shape["file"], float(shape.get("unit", 1.0)))
+            part = read(folder / shape["file"], float(shape.get("unit", 1.0)))
         pose = Pose.model_validate(shape.get("pose", {}))
         drawn.append(surfaces.moved(part, np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())))
     return surfaces.merged(drawn)
@@ -216,3 +266,32 @@ def _apart(places: Sequence[np.ndarray], same: float) -> np.ndarray:
         if all(np.linalg.norm(point - other) > same for other in offsets):
             offsets.append(point)
     return np.array(offsets).reshape(-1, 3)
+
+
+def read(path: Path, unit: float) -> Surface:
+    """A surface from a file that meshio reads; tetrahedra and hexahedra give their boundary."""
+    remedy = "give an STL, VTK, PLY or OBJ file"
+    mesh = read_mesh(path, f"{path}", "is no surface that can be drawn", remedy, LARGEST_FILE)
+    faces = []
+    for block in mesh.cells:
+        if block.type in ("triangle", "quad"):
+            faces.append(surfaces.triangulated(block.data.astype(int)))
+        elif block.type in _SIDES:
+            faces.append(_boundary(block.data.astype(int), _SIDES[block.type]))
+    if not faces:
+        raise InputError(f"{path}", "has no triangles, quadrangles, tetrahedra or hexahedra", "export a surface")
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = unit * mesh.points
+    triangles = np.concatenate(faces)
+    if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(points)):
+        raise InputError(f"{path}", f"its faces name points beyond the {len(points)} that it has", "export it again")
+    if not np.abs(points).max(initial=0.0) < FARTHEST:
+        raise InputError(f"{path}", "its points are no finite numbers, or too large to be drawn", "export it again")
+    return surfaces.shaded(points, triangles, sharp=True)
+
+
+def _boundary(cells: np.ndarray, sides: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    """Triangles of the faces that belong to one cell only."""
+    faces = cells[:, list(sides)].reshape(-1, len(sides[0]))
+    _, first, count = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return surfaces.triangulated(faces[first[count == 1]])

@@ -1,5 +1,7 @@
 """A run as a glTF 2.0 file: bodies on their tracks, flexible ones with a morph target for each mode.
 
+VTK's own export has neither animations nor morph targets, so that of a motion nothing would be left.
+
 Source: Khronos Group (2021), glTF 2.0 Specification, sec. 3.7.2 (meshes), 3.11 (animations), 5.
 """
 
@@ -13,11 +15,9 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
-from flexclear.pipeline.post.render import surfaces
-from flexclear.pipeline.post.render.fields import field, hertz, linear_fields
-from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose
+from flexclear.pipeline.post.render.fields import fields_of, hertz, linear_fields
+from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose, rest, skin
 from flexclear.pipeline.post.render.surfaces import Surface
-from flexclear.pipeline.post.shapes.body_shape import faces, surface
 
 FLOAT, WHOLE, ARRAY, INDICES = 5126, 5125, 34962, 34963
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
@@ -109,11 +109,9 @@ class _File:
 def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> bytes:
     """A GLB file with a body and an animation of each of its modes, drawn so many times larger, shape (mode,)."""
     file = _File()
-    rest, _ = surface(bundle, np.zeros(bundle.sizes["mode"]))
-    count = bundle.sizes["mode"]
-    fields = np.array([field(bundle, k, rest) * scale[k] for k in range(count)])
-    shape = surfaces.shaded(rest, surfaces.triangulated(faces(bundle)))
-    node = file.node(name, shape, COLORS[0], 1.0, fields)
+    points, own = fields_of(bundle)
+    count, fields = len(own), own * scale[:, None, None]
+    node = file.node(name, skin(bundle, points), COLORS[0], 1.0, fields)
     phase = np.linspace(0.0, 2.0 * np.pi, 25)
     times = file.array(phase / (2.0 * np.pi))
     for k, frequency in enumerate(bundle["frequency"].values):
@@ -142,14 +140,10 @@ def motion(drawn: Mechanism, steps: np.ndarray, slower: float) -> bytes:
 
 
 def _bent(file: _File, body: Flexible, name: str, q: np.ndarray) -> tuple[int, np.ndarray]:
-    bundle = body.bundle
-    rest, _ = surface(bundle, np.zeros(bundle.sizes["mode"]))
-    fields = linear_fields(body, rest)
     # targets as large as the run makes them, weights within one: what viewers expect
     largest = np.maximum(np.abs(q).max(axis=0), 1e-30)
-    centre = bundle["first_moment"].values / float(bundle["mass"])
-    shape = surfaces.shaded(rest - centre, surfaces.triangulated(faces(bundle)))
-    node = file.node(name, shape, body.color or COLORS[0], 1.0, body.scale * largest[:, None, None] * fields)
+    fields = body.scale * largest[:, None, None] * linear_fields(body.bundle)
+    node = file.node(name, skin(body.bundle, rest(body.bundle)), body.color or COLORS[0], 1.0, fields)
     return node, q / largest
 
 

@@ -6,8 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from flexclear.pipeline.post.overview.figures import centre, orbit
@@ -15,8 +13,8 @@ from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import pace
 from flexclear.pipeline.post.single_run.series import derive
 
-#: size of a picture in hundreds of pixels, and length of the trail as a fraction of the run
-SIZE, TRAIL = (9.6, 5.4), 0.02
+#: size of a picture, and length of the trail as a fraction of the run
+SIZE, TRAIL = (960, 540), 0.02
 
 
 def frames(
@@ -24,7 +22,7 @@ def frames(
 ) -> Iterator[np.ndarray]:
     """Pictures of shape (540, 960, 3)."""
     with style.style():
-        canvas = FigureCanvasAgg(Figure(figsize=SIZE, dpi=100, layout=ConstrainedLayoutEngine(h_pad=0.12, w_pad=0.12)))
+        canvas = style.canvas(SIZE, layout=ConstrainedLayoutEngine(h_pad=0.12, w_pad=0.12))
         figure = canvas.figure
         left, right = figure.subplots(1, 2, width_ratios=[1.1, 1.0])
         name = str(run["contact"].values[contact])
@@ -42,7 +40,7 @@ def frames(
         canvas.draw()
         still = canvas.copy_from_bbox(figure.bbox)
         shown = pace.pace(run, seconds, slower, rate)
-        steps = np.clip(np.searchsorted(run["time"].values, shown.times - 1e-12), 0, time.size - 1)
+        steps = shown.steps(run)
         first = np.searchsorted(time, time[steps] - TRAIL * (time[-1] - time[0]))
         for k, step in enumerate(steps):
             canvas.restore_region(still)
@@ -53,4 +51,4 @@ def frames(
             for artist in (trail, dot, mark):
                 artist.axes.draw_artist(artist)
             figure.draw_artist(clock)
-            yield np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+            yield style.pixels(canvas)

@@ -14,13 +14,12 @@ from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.render import forms, surfaces
-from flexclear.pipeline.post.render.forms import Seat
-from flexclear.pipeline.post.render.solids import Solid, equivalent
+from flexclear.pipeline.post.render.forms import Seat, Solid, equivalent
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View, view
 from flexclear.pipeline.post.render.wheels import Wheel, wheels
 from flexclear.pipeline.post.shapes import body_stress
-from flexclear.pipeline.post.shapes.body_shape import faces, has_edges, scale_to, surface
+from flexclear.pipeline.post.shapes.body_shape import faces, scale_to, surface
 from flexclear.pipeline.post.single_run.series import parameters
 
 #: one colour per kind of body: bodies of equal mass and inertia look alike
@@ -102,6 +101,66 @@ class Mechanism:
     stress: float | None = None  #: the stress at the upper end of the colours [Pa], where they show stress
 
 
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Where the bodies and frames of a run are. given: parameters of its scene.  bundles: by name of the body."""
+
+    run: xr.Dataset
+    given: Mapping[str, Any]
+    bundles: Mapping[str, xr.Dataset]
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the moving bodies."""
+        return _names(self.run, "body")
+
+    @property
+    def frames(self) -> list[str]:
+        """Names of the frames whose positions are recorded."""
+        return _names(self.run, "frame")
+
+    def owner(self, frame: str) -> int | None:
+        """Index of the body that has a frame; None for the ground."""
+        body = frame.partition(".")[0]
+        return self.bodies.index(body) if body in self.bodies else None
+
+    def local(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """Origin [m] and axes (columns) of a frame in those of its body."""
+        body, _, name = frame.partition(".")
+        if body in self.bundles:
+            data = self.bundles[body].sel(frame=name)
+            return data["frame_position"].values, data["frame_rotation"].values
+        pose = Pose.model_validate(self.given.get("body", {}).get(body, {}).get("frames", {}).get(name, {}))
+        return np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())
+
+    def at_start(self, frame: str) -> tuple[np.ndarray, np.ndarray]:
+        """Origin [m] and axes of a frame, in the world, at the first output."""
+        (origin, axes), owner = self.local(frame), self.owner(frame)
+        if owner is None:
+            return origin, axes
+        matrix = pose(self.run, owner, 0)
+        recorded = frame in self.frames
+        where = self.run.frame_position.values[0, self.frames.index(frame)] if recorded else matrix[:3, 3]
+        return where, matrix[:3, :3] @ axes
+
+    def centre(self, body: str) -> np.ndarray:
+        """Centre of mass of a moving body at rest, in its axes [m]."""
+        if body in self.bundles:
+            return centre_at_rest(self.bundles[body])
+        return np.array(self.given["body"][body].get("com", (0.0, 0.0, 0.0)))
+
+    def seated(self, frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0) -> Part:
+        """A part at a frame, given in its axes."""
+        (origin, axes), owner = self.local(frame), self.owner(frame)
+        if owner is None:
+            return Part(None, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
+        if frame in self.frames:
+            number = self.frames.index(frame)
+            return Part(owner, surfaces.moved(part, np.zeros(3), axes), color, opacity, number, contact)
+        origin = origin - self.centre(frame.partition(".")[0])
+        return Part(owner, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
+
+
 def mechanism(
     run: xr.Dataset, bundles: Mapping[str, xr.Dataset], looks: Looks | None = None, *, stressed: bool = False
 ) -> Mechanism:
@@ -109,24 +168,20 @@ def mechanism(
 
     stressed: whether the colours of flexible bodies show von Mises stress.  InputError for a run that has none.
     """
-    looks, given = looks or Looks(), parameters(run)
+    looks, at = looks or Looks(), Layout(run, parameters(run), bundles)
     if stressed and not body_stress.recorded(run):
         problem = "the run records no von Mises stress"
         raise InputError(
             "--what stress", problem, 'ask for it: [output] stress = ["BODY"], a rod of known section or a solid'
         )
     flexible = tuple(
-        _flexible(run, name, bundle, looks, stressed=stressed)
-        for name, bundle in bundles.items()
-        if name in run.body.values
+        _flexible(run, name, bundle, looks, stressed=stressed) for name, bundle in bundles.items() if name in at.bodies
     )
-    places = run.frame_position.values if run.sizes.get("frame", 0) else run.position.values
+    places = run.frame_position.values if at.frames else run.position.values
     shown = np.concatenate([places.reshape(-1, 3), *(placed(run, body, 0)[0] for body in flexible)])
-    low, high = shown.min(axis=0), shown.max(axis=0)
-    size = float(np.linalg.norm(high - low)) or LONE
-    seats = _seats(given, bundles)
-    parts = (*_bodies(run, given, bundles, seats, looks, size), *_joints(run, given, bundles, size))
-    seen = view(run, given, looks.direction, looks.up)
+    size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
+    parts = (*_bodies(at, looks, size), *_joints(at, size))
+    seen = view(run, at.given, looks.direction, looks.up)
     top = max(body_stress.largest(run), 1e-9) if stressed else None
     return Mechanism(run, parts, flexible, seen, size, _cloud(run, parts, flexible), looks, top)
 
@@ -165,7 +220,8 @@ def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.n
     q = run.modal_coordinate.values[step, body.columns]
     points, size = surface(body.bundle, q, body.scale)
     matrix = pose(run, body.index, step)
-    return (points - _centre(body.bundle, q)) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
+    moment = body.bundle.first_moment.values + body.bundle.modal_first_moment.values @ q
+    return (points - moment / float(body.bundle.mass)) @ matrix[:3, :3].T + matrix[:3, 3], size / body.scale
 
 
 def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
@@ -175,15 +231,23 @@ def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
     return placed(run, body, step)[1]
 
 
-def skin(body: Flexible, points: np.ndarray) -> Surface:
-    """The surface of a flexible body through points as of `placed`; empty for bare nodes."""
-    return surfaces.shaded(points, surfaces.triangulated(faces(body.bundle)), sharp=has_edges(body.bundle))
+def skin(bundle: xr.Dataset, points: np.ndarray, *, sharp: bool = False) -> Surface:
+    """The surface of a flexible body through points as of `placed` or `rest`; empty for bare nodes.
+
+    Unless `sharp`, points keep their number, so that fields fit; edges of solids are then shaded softly.
+    """
+    return surfaces.shaded(points, surfaces.triangulated(faces(bundle)), sharp=sharp)
 
 
-def _centre(bundle: xr.Dataset, q: np.ndarray) -> np.ndarray:
-    """Centre of mass in the bundle's axes: the run's position is that, the bundle's origin is elsewhere."""
-    moment: np.ndarray = bundle.first_moment.values + bundle.modal_first_moment.values @ q
+def centre_at_rest(bundle: xr.Dataset) -> np.ndarray:
+    """Centre of mass in the bundle's axes [m]: the run's position is that, the bundle's origin is elsewhere."""
+    moment: np.ndarray = bundle.first_moment.values
     return moment / float(bundle.mass)
+
+
+def rest(bundle: xr.Dataset) -> np.ndarray:
+    """Points of the skin of a body that is not deformed, its centre of mass at the origin [m], shape (point, 3)."""
+    return surface(bundle, np.zeros(bundle.sizes["mode"]))[0] - centre_at_rest(bundle)
 
 
 def _names(run: xr.Dataset, dim: str) -> list[str]:
@@ -191,66 +255,38 @@ def _names(run: xr.Dataset, dim: str) -> list[str]:
     return [str(name) for name in run[dim].values] if dim in run.coords else []
 
 
-def frame_pose(
-    given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], frame: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Origin [m] and axes (columns) of a named frame in those of its body."""
-    body, _, name = frame.partition(".")
-    if body in bundles:
-        data = bundles[body].sel(frame=name)
-        return data["frame_position"].values, data["frame_rotation"].values
-    pose = Pose.model_validate(given.get("body", {}).get(body, {}).get("frames", {}).get(name, {}))
-    return np.array(pose.position), quaternion_to_matrix(pose.as_quaternion())
-
-
-def _seats(given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset]) -> dict[str, list[Seat]]:
+def _seats(at: Layout) -> dict[str, list[Seat]]:
     """Where joints sit on each body."""
     by_body: dict[str, list[Seat]] = {}
-    for joint in given.get("joint", {}).values():
+    for joint in at.given.get("joint", {}).values():
         for k, frame in enumerate(joint["between"]):
-            origin, axes = frame_pose(given, bundles, frame)
-            by_body.setdefault(frame.partition(".")[0], []).append(Seat(frame, origin, axes, joint["type"], k == 0))
+            seat = Seat(frame, *at.local(frame), joint["type"], k == 0)
+            by_body.setdefault(frame.partition(".")[0], []).append(seat)
     return by_body
 
 
-def _bodies(
-    run: xr.Dataset,
-    given: Mapping[str, Any],
-    bundles: Mapping[str, xr.Dataset],
-    seats: Mapping[str, list[Seat]],
-    looks: Looks,
-    size: float,
-) -> Iterator[Part]:
+def _bodies(at: Layout, looks: Looks, size: float) -> Iterator[Part]:
     """Rigid bodies and the ground, as their scene draws them or as links between their joints."""
-    names, kinds = _names(run, "body"), dict[tuple[Any, ...], str]()
-    geared = wheels(given, lambda frame: _at_start(run, given, bundles, frame))
-    for name, body in given.get("body", {}).items():
+    kinds: dict[tuple[Any, ...], str] = {}
+    seats, geared = _seats(at), wheels(at.given, at.at_start)
+    for name, body in at.given.get("body", {}).items():
         look = looks.bodies.get(name, {})
         own = None if "geometry" not in look else forms.shapes(look["geometry"], looks.folder)
-        if name not in names:
+        owner = at.owner(name)
+        if owner is None:
             if own is not None:
                 yield Part(None, own, look.get("color", GROUND_COLOR))
-            continue
-        if name in bundles:
+        elif name in at.bundles:
             if own is not None:  # next to the deformed mesh: what is fixed to it
-                yield Part(
-                    names.index(name),
-                    surfaces.moved(own, -_centre_at_rest(bundles[name])),
-                    look.get("color", COLORS[0]),
-                )
-            continue
-        if "inertia" not in body:
-            continue
-        com = np.array(body.get("com", (0.0, 0.0, 0.0)))
-        inertia = np.array(body["inertia"])
-        key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
-        color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
-        solid = equivalent(body["mass"], inertia) if np.any(inertia) else None
-        drawn = own
-        if drawn is None:
-            drawn = _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, names.index(name))
-        if len(drawn.points):
-            yield Part(names.index(name), surfaces.moved(drawn, -com), color)
+                yield Part(owner, surfaces.moved(own, -at.centre(name)), look.get("color", COLORS[0]))
+        elif "inertia" in body:
+            com, inertia = at.centre(name), np.array(body["inertia"])
+            key = tuple(f"{value:.3g}" for value in (body["mass"], *np.linalg.eigvalsh(inertia)))
+            color = look.get("color") or kinds.setdefault(key, COLORS[len(kinds) % len(COLORS)])
+            solid = equivalent(body["mass"], inertia) if np.any(inertia) else None
+            drawn = own or _with_wheels(geared.get(name, ()), seats.get(name, []), com, solid, size, owner)
+            if len(drawn.points):
+                yield Part(owner, surfaces.moved(drawn, -com), color)
 
 
 def _with_wheels(
@@ -268,86 +304,54 @@ def _with_wheels(
     return surfaces.merged([*discs, forms.link(seats, com, solid, size, layer)])
 
 
-def _at_start(
-    run: xr.Dataset, given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], frame: str
-) -> tuple[np.ndarray, np.ndarray]:
-    """Origin [m] and axes of a named frame, in the world, at the first output."""
-    origin, axes = frame_pose(given, bundles, frame)
-    names, frames, body = _names(run, "body"), _names(run, "frame"), frame.partition(".")[0]
-    if body not in names:
-        return origin, axes
-    matrix = pose(run, names.index(body), 0)
-    where = run.frame_position.values[0, frames.index(frame)] if frame in frames else matrix[:3, 3]
-    return where, matrix[:3, :3] @ axes
-
-
-def _centre_at_rest(bundle: xr.Dataset) -> np.ndarray:
-    return _centre(bundle, np.zeros(bundle.sizes["mode"]))
-
-
-def _joints(
-    run: xr.Dataset, given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], size: float
-) -> Iterator[Part]:
+def _joints(at: Layout, size: float) -> Iterator[Part]:
     """Balls, pins, rails, crosses and planes of the joints."""
-    contacts = _names(run, "contact")
-    for name, joint in given.get("joint", {}).items():
+    contacts = _names(at.run, "contact")
+    for name, joint in at.given.get("joint", {}).items():
         kind, (first, second) = joint["type"], joint["between"]
         contact = contacts.index(name) if name in contacts else None
         color = JOINT_COLOR if contact is None else CLEARANCE_COLOR
-
-        def at(frame: str, part: Surface, color: str, contact: int | None = None, opacity: float = 1.0) -> Part:
-            return _seated(run, given, bundles, frame, part, color, contact, opacity)
-
+        grounded = at.owner(first) is None
         if kind in forms.BALLS:
             radius = float(joint.get("ball_radius", BALL * size))
-            yield at(second, surfaces.sphere(radius), color, contact)
+            yield at.seated(second, surfaces.sphere(radius), color, contact)
             if kind == "ball-on-plane":
-                yield at(first, _floor(run, given, bundles, joint, size), GROUND_COLOR)
+                yield at.seated(first, _floor(at, joint, size), GROUND_COLOR)
             else:
-                yield at(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, None, 0.35)
+                yield at.seated(first, surfaces.sphere(SOCKET * radius), SOCKET_COLOR, opacity=0.35)
         elif "revolute" in kind or kind == "clearance-slot":
             radius = float(joint.get("pin_radius", PIN * size))
             long = max(3.4 * PIN * size, float(joint.get("length", 0.0)))  # what is shorter, the links would hide
-            yield at(second, surfaces.cylinder(radius, long), color, contact)
+            yield at.seated(second, surfaces.cylinder(radius, long), color, contact)
             if kind == "clearance-slot":
                 half = np.array([[-0.5 * joint["travel"], 0.0], [0.5 * joint["travel"], 0.0]])
                 rim = surfaces.prism(surfaces.hull(half, SOCKET * radius), 0.5 * long)
-                yield at(first, rim, SOCKET_COLOR, None, 0.5)
+                yield at.seated(first, rim, SOCKET_COLOR, opacity=0.5)
             elif kind == "clearance-revolute":
-                yield at(first, surfaces.cylinder(SOCKET * radius, 0.8 * long), SOCKET_COLOR, None, 0.35)
-            elif first.partition(".")[0] not in _names(run, "body"):
-                yield at(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)
+                yield at.seated(first, surfaces.cylinder(SOCKET * radius, 0.8 * long), SOCKET_COLOR, opacity=0.35)
+            elif grounded:
+                yield at.seated(first, surfaces.cylinder(1.9 * radius, 2.2 * PIN * size), GROUND_COLOR)
         elif kind in forms.SLIDING:
-            low, high = _travel(run, name)
-            rail = surfaces.moved(
-                surfaces.cylinder(RAIL * size, high - low + 2.0 * PIN * size), np.array([0.0, 0.0, 0.5 * (low + high)])
-            )
-            grounded = first.partition(".")[0] not in _names(run, "body")
-            yield at(first, rail, GROUND_COLOR if grounded else JOINT_COLOR)
+            low, high = _travel(at.run, name)
+            rail = surfaces.cylinder(RAIL * size, high - low + 2.0 * PIN * size)
+            middle = np.array([0.0, 0.0, 0.5 * (low + high)])
+            yield at.seated(first, surfaces.moved(rail, middle), GROUND_COLOR if grounded else JOINT_COLOR)
         elif kind == "universal":
-            yield at(
-                first, surfaces.moved(surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size), np.zeros(3), _X), color
-            )
-            yield at(
-                second, surfaces.moved(surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size), np.zeros(3), _Y), color
-            )
+            for frame, axis in ((first, np.eye(3)[0]), (second, np.eye(3)[1])):
+                arm = surfaces.cylinder(0.6 * PIN * size, 4.0 * PIN * size)
+                yield at.seated(frame, surfaces.moved(arm, np.zeros(3), surfaces.along(axis)), color)
         elif kind == "planar":
-            yield at(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
+            yield at.seated(second, surfaces.box((4.0 * PIN * size, 4.0 * PIN * size, 0.8 * PIN * size)), color)
 
 
-_X, _Y = surfaces.along(np.array([1.0, 0.0, 0.0])), surfaces.along(np.array([0.0, 1.0, 0.0]))
-
-
-def _floor(
-    run: xr.Dataset, given: Mapping[str, Any], bundles: Mapping[str, xr.Dataset], joint: Mapping[str, Any], size: float
-) -> Surface:
+def _floor(at: Layout, joint: Mapping[str, Any], size: float) -> Surface:
     """A plane without end, as far as a ball goes on it; around the frame's origin where the plane itself moves."""
-    (first, second), names = joint["between"], _names(run, "frame")
+    first, second = joint["between"]
     low = high = np.zeros(2)
     reach = 0.25 * size
-    if first.partition(".")[0] not in _names(run, "body") and second in names:
-        origin, axes = frame_pose(given, bundles, first)
-        path = (run.frame_position.values[:, names.index(second)] - origin) @ axes
+    if at.owner(first) is None and second in at.frames:
+        origin, axes = at.local(first)
+        path = (at.run.frame_position.values[:, at.frames.index(second)] - origin) @ axes
         low, high = path.min(axis=0)[:2], path.max(axis=0)[:2]
         reach = 2.5 * float(joint["ball_radius"])
     plane = surfaces.box((*(high - low + 2.0 * reach), 0.004 * size))
@@ -361,31 +365,6 @@ def _travel(run: xr.Dataset, joint: str) -> tuple[float, float]:
             values = run.joint_position.sel(coordinate=name).values
             return min(0.0, float(values.min())), max(0.0, float(values.max()))
     return 0.0, 0.0
-
-
-def _seated(
-    run: xr.Dataset,
-    given: Mapping[str, Any],
-    bundles: Mapping[str, xr.Dataset],
-    frame: str,
-    part: Surface,
-    color: str,
-    contact: int | None,
-    opacity: float,
-) -> Part:
-    """A part at a named frame, given in its axes."""
-    origin, axes = frame_pose(given, bundles, frame)
-    bodies, frames, body = _names(run, "body"), _names(run, "frame"), frame.partition(".")[0]
-    if body not in bodies:
-        return Part(None, surfaces.moved(part, origin, axes), color, opacity, contact=contact)
-    if frame in frames:
-        return Part(
-            bodies.index(body), surfaces.moved(part, np.zeros(3), axes), color, opacity, frames.index(frame), contact
-        )
-    com = (
-        _centre_at_rest(bundles[body]) if body in bundles else np.array(given["body"][body].get("com", (0.0, 0.0, 0.0)))
-    )
-    return Part(bodies.index(body), surfaces.moved(part, origin - com, axes), color, opacity, contact=contact)
 
 
 def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, stressed: bool) -> Flexible:

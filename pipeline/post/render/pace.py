@@ -7,9 +7,8 @@ from functools import lru_cache
 
 import numpy as np
 import xarray as xr
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
+from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.impacts import impacts
 
 #: length of a film [s], and how much slower it runs around impacts
@@ -24,6 +23,13 @@ class Pace:
 
     times: np.ndarray
     slower: np.ndarray
+
+    def steps(self, run: xr.Dataset, most: int | None = None) -> np.ndarray:
+        """The outputs of the run at these times, or at `most` of them, evenly spread."""
+        time, times = run["time"].values, self.times
+        if most is not None:
+            times = times[np.unique(np.linspace(0, times.size - 1, most).astype(int))]
+        return np.clip(np.searchsorted(time, times - 1e-12 * (time[-1] - time[0])), 0, time.size - 1)
 
 
 def pace(run: xr.Dataset, seconds: float | None = None, slower: float | None = None, rate: int = 24) -> Pace:
@@ -87,8 +93,8 @@ class Caption:
     def _drawn(self, text: str) -> np.ndarray:
         """How dark each pixel is, in [0, 1]."""
         width, height = self.size
-        canvas = FigureCanvasAgg(Figure(figsize=(width / 100, height / 100), dpi=100))
+        canvas = style.canvas((width, height))
         canvas.figure.text(14 / width, 0.45, text, fontsize=9.5, va="center", color="black", parse_math=False)
         canvas.draw()
-        shade: np.ndarray = 1.0 - np.asarray(canvas.buffer_rgba())[..., 0] / 255.0
+        shade: np.ndarray = 1.0 - style.pixels(canvas)[..., 0] / 255.0
         return shade

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from flexclear.pipeline.core.artifacts import quantities
@@ -44,7 +43,7 @@ class Panel:
             dot.axes.draw_artist(dot)
         self.clock.set_text(f"t = {1e3 * self.time[step]:.1f} ms")
         self.canvas.figure.draw_artist(self.clock)
-        return np.asarray(self.canvas.buffer_rgba())[:, :, :3].copy()
+        return style.pixels(self.canvas)
 
 
 def panel(
@@ -62,9 +61,7 @@ def panel(
     """
     loose = [str(run["contact"].values[k]) for k in joint_view.with_clearance(run)]
     contact = bool(loose)
-    canvas = FigureCanvasAgg(
-        Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.1))
-    )
+    canvas = style.canvas(size, layout=ConstrainedLayoutEngine(h_pad=0.1, w_pad=0.1))
     figure = canvas.figure
     axes = figure.subplots(3 if contact else 2, 1, height_ratios=[1, 1, 1.7] if contact else [1, 1])
     lines = {line.title: line for quantity in curves for line in watched_curves([run], quantity) if line is not None}

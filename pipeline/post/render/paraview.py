@@ -1,7 +1,8 @@
 """A run as a series for ParaView: skins of all bodies, and the forces of joints, contacts and loads as arrows.
 
-Two files for each output, as VTK XML written here: with that, no GL library is needed. Surfaces carry the number of
-their body and the computed displacement; arrows are surfaces, too, with the force as `force` [N].
+Two files for each output, as VTK XML written here: pyvista's writer takes a second and a half longer, and GL libraries.
+Surfaces carry the number of their body and the computed displacement; arrows are surfaces, too, with the force as
+`force` [N].
 """
 
 from __future__ import annotations
@@ -14,9 +15,9 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.post.render import surfaces
-from flexclear.pipeline.post.render.mechanism import Mechanism, part_pose, placed
+from flexclear.pipeline.post.render.mechanism import Mechanism, part_pose, placed, skin
 from flexclear.pipeline.post.render.surfaces import Surface
-from flexclear.pipeline.post.shapes.body_shape import faces, surface
+from flexclear.pipeline.post.shapes.body_shape import surface
 from flexclear.pipeline.post.single_run.series import parameters
 
 #: longest arrow, and thickness of arrows, as fractions of the mechanism's size
@@ -49,13 +50,12 @@ def modes(name: str, bundle: xr.Dataset, scale: np.ndarray) -> dict[str, bytes]:
     """``<name>.pvd``, a series with the number of the mode for time, and the files that it names."""
     files, lines = {}, []
     rest, _ = surface(bundle, np.zeros(bundle.sizes["mode"]))
-    triangles = surfaces.triangulated(faces(bundle))
     for k, frequency in enumerate(bundle["frequency"].values):
         q = scale[k] * np.eye(bundle.sizes["mode"])[k]
         points, _ = surface(bundle, q)
         file = f"{name}_{k + 1:03d}.vtp"
         data = {"displacement": points - rest, "frequency_Hz": np.full(len(points), float(frequency))}
-        files[file] = vtp(surfaces.shaded(points, triangles), data)
+        files[file] = vtp(skin(bundle, points), data)
         lines.append(f'<DataSet timestep="{k + 1}" part="0" name="mode" file={quoteattr(file)}/>')
     return files | {f"{name}.pvd": collection(lines)}
 
@@ -75,7 +75,7 @@ def _bodies(drawn: Mechanism, step: int) -> bytes:
         moved.append(np.zeros(len(part.surface.points)))
     for body in drawn.flexible:
         points, size = placed(drawn.run, body, step)
-        shapes.append(surfaces.shaded(points, surfaces.triangulated(faces(body.bundle))))
+        shapes.append(skin(body.bundle, points))
         numbers.append(np.full(len(points), body.index))
         moved.append(size)
     return vtp(surfaces.merged(shapes), {"body": np.concatenate(numbers), "displacement": np.concatenate(moved)})
@@ -96,16 +96,8 @@ def arrow(point: np.ndarray, way: np.ndarray, thick: float) -> Surface:
     """An arrow that begins at a point, as long and directed as `way`."""
     length = float(np.linalg.norm(way))
     head = min(6.0 * thick, 0.4 * length)
-    shaft = surfaces.moved(surfaces.cylinder(thick, length - head), np.array([0.0, 0.0, 0.5 * (length - head)]))
-    rim = surfaces.hull(np.zeros((1, 2)), 2.4 * thick)
-    base = np.column_stack([rim, np.full(len(rim), length - head)])
-    points = np.vstack([base, [0.0, 0.0, length], [0.0, 0.0, length - head]])
-    ring, n = np.arange(len(rim)), len(rim)
-    after = np.roll(ring, -1)
-    cone = np.concatenate(
-        [np.column_stack([ring, after, np.full(n, n)]), np.column_stack([after, ring, np.full(n, n + 1)])]
-    )
-    return surfaces.moved(surfaces.merged([shaft, surfaces.shaded(points, cone)]), point, surfaces.along(way))
+    neck = point + (1.0 - head / length) * way
+    return surfaces.merged([surfaces.bar(point, neck, thick), surfaces.cone(neck, point + way, 2.4 * thick)])
 
 
 def _forces(run: xr.Dataset) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -43,17 +44,25 @@ class Shown:
 
     def mechanism(self, *, stressed: bool = False) -> Mechanism:
         """The run as moving solids; stressed: coloured by von Mises stress."""
-        assert self.run is not None
-        return mechanism(self.run, self.bundles, self.looks, stressed=stressed)
+        return mechanism(self.of_run, self.bundles, self.looks, stressed=stressed)
 
-    def name(self, what: str) -> str:
-        """A title of a page."""
-        return f"{self.title}: {what}" if self.title else what
+    @property
+    def of_run(self) -> xr.Dataset:
+        """The run, which there is."""
+        assert self.run is not None
+        return self.run
+
+    def page(self, what: str, views: Sequence[str], below: str = "") -> bytes:
+        """A page of views, its title that of the scene and what it shows."""
+        return viewer_page(f"{self.title}: {what}" if self.title else what, views, below)
+
+
+Maker = Callable[[Shown, str], dict[str, bytes]]
 
 
 def make(what: str, kind: str, shown: Shown) -> dict[str, bytes]:
     """File contents by name.  Raises InputError where `what` cannot be shown so, or the scene has no such thing."""
-    return MAKERS[what][kind](shown)
+    return MAKERS[what][kind](shown, kind)
 
 
 def formats(what: str) -> tuple[str, ...]:
@@ -75,16 +84,18 @@ def png(pixels: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-def _still(shown: Shown) -> dict[str, bytes]:
+def _still(shown: Shown, kind: str) -> dict[str, bytes]:
+    """When the bodies are farthest from where they started."""
     _must_draw()
     from flexclear.pipeline.post.render import film, ruler
 
     drawn = shown.mechanism()
-    picture = ruler.annotated(film.still(drawn, _farthest(drawn.run)), drawn)
-    return {"mechanism.png": png(picture)}
+    moved = np.abs(drawn.run.position.values - drawn.run.position.values[:1])
+    picture = film.still(drawn, int(np.argmax(moved.sum(axis=(1, 2)))))
+    return {"mechanism.png": png(ruler.annotated(picture, drawn))}
 
 
-def _stress_still(shown: Shown) -> dict[str, bytes]:
+def _stress_still(shown: Shown, kind: str) -> dict[str, bytes]:
     """When the largest stress of the run is largest."""
     _must_draw()
     from flexclear.pipeline.post.render import film, ruler
@@ -94,16 +105,13 @@ def _stress_still(shown: Shown) -> dict[str, bytes]:
     return {"stress.png": png(ruler.annotated(film.still(drawn, step, margin=ruler.BAR), drawn, ruler.BAR))}
 
 
-def _film(kind: str, *, stressed: bool = False) -> Callable[[Shown], dict[str, bytes]]:
-    def make_film(shown: Shown) -> dict[str, bytes]:
-        _must_draw()
-        from flexclear.pipeline.post.render import film
+def _film(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes]:
+    _must_draw()
+    from flexclear.pipeline.post.render import film
 
-        drawn = shown.mechanism(stressed=stressed)
-        suffix, content = film.film(drawn, derive(drawn.run), shown.watched, shown.progress, kind, shown.curves)
-        return {f"{'stress' if stressed else 'film'}.{suffix}": content}
-
-    return make_film
+    drawn = shown.mechanism(stressed=stressed)
+    suffix, content = film.film(drawn, derive(drawn.run), shown.watched, shown.progress, kind, shown.curves)
+    return {f"{'stress' if stressed else 'film'}.{suffix}": content}
 
 
 def _must_draw() -> None:
@@ -112,30 +120,27 @@ def _must_draw() -> None:
         raise SolverError(f"no pictures of solids: {gl.remedy()}")
 
 
-def _motion_page(shown: Shown) -> dict[str, bytes]:
-    return {"motion.html": viewer_page(shown.name("motion"), [viewer(player.motion(shown.mechanism()), "Motion")])}
+def _motion_page(shown: Shown, kind: str) -> dict[str, bytes]:
+    return {"motion.html": shown.page("motion", [viewer(player.motion(shown.mechanism()), "Motion")])}
 
 
-def _stress_page(shown: Shown) -> dict[str, bytes]:
+def _stress_page(shown: Shown, kind: str) -> dict[str, bytes]:
     view = viewer(player.motion(shown.mechanism(stressed=True)), "Von Mises stress")
-    return {"stress.html": viewer_page(shown.name("stress"), [view])}
+    return {"stress.html": shown.page("stress", [view])}
 
 
-def _motion_gltf(shown: Shown) -> dict[str, bytes]:
+def _motion_gltf(shown: Shown, kind: str) -> dict[str, bytes]:
     drawn = shown.mechanism()
-    count = drawn.run.sizes["time"]
-    steps = np.unique(np.linspace(0, count - 1, KEYS).astype(int))
     time = drawn.run["time"].values
+    steps = np.unique(np.linspace(0, time.size - 1, KEYS).astype(int))
     slower = (shown.looks.duration or pace.SECONDS) / float(time[-1] - time[0])
     return {"motion.glb": gltf.motion(drawn, steps, slower)}
 
 
-def _motion_series(shown: Shown) -> dict[str, bytes]:
+def _motion_series(shown: Shown, kind: str) -> dict[str, bytes]:
     drawn = shown.mechanism()
-    times = pace.pace(drawn.run, None, shown.looks.impact_slowdown).times
-    times = times[np.unique(np.linspace(0, times.size - 1, SERIES).astype(int))]
-    steps = np.unique(np.searchsorted(drawn.run["time"].values, times - 1e-12))
-    return paraview.series(drawn, steps)
+    steps = pace.pace(drawn.run, None, shown.looks.impact_slowdown).steps(drawn.run, SERIES)
+    return paraview.series(drawn, np.unique(steps))
 
 
 def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
@@ -144,7 +149,7 @@ def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
     return shown.bundles
 
 
-def _mode_sheets(shown: Shown) -> dict[str, bytes]:
+def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:
     files: dict[str, bytes] = {}
     for body, bundle in _bodies(shown).items():
         seen = player.side(bundle)
@@ -152,92 +157,76 @@ def _mode_sheets(shown: Shown) -> dict[str, bytes]:
     return files
 
 
-def _mode_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
-    def make_films(shown: Shown) -> dict[str, bytes]:
-        from flexclear.pipeline.post.render import writing
+def _mode_films(shown: Shown, kind: str) -> dict[str, bytes]:
+    from flexclear.pipeline.post.render import writing
 
-        files = {}
-        for body, bundle in _bodies(shown).items():
-            seen = player.side(bundle)
-            suffix, content = writing.write(mode_sheet.frames(body, bundle, seen.direction, seen.up), 12, kind)
-            files[f"modes_{body}.{suffix}"] = content
-        return files
-
-    return make_films
+    files = {}
+    for body, bundle in _bodies(shown).items():
+        seen = player.side(bundle)
+        suffix, content = writing.write(mode_sheet.frames(body, bundle, seen.direction, seen.up), 12, kind)
+        files[f"modes_{body}.{suffix}"] = content
+    return files
 
 
-def _mode_page(shown: Shown) -> dict[str, bytes]:
+def _mode_page(shown: Shown, kind: str) -> dict[str, bytes]:
     """The mode sets of all bodies next to each other."""
     views = [
         viewer(player.modes(bundle), f"{body}: {mode_sheet.range_text(bundle)}", play=True)
         for body, bundle in _bodies(shown).items()
     ]
-    return {"modes.html": viewer_page(shown.name("modes"), views)}
+    return {"modes.html": shown.page("modes", views)}
 
 
-def _mode_gltf(shown: Shown) -> dict[str, bytes]:
+def _mode_gltf(shown: Shown, kind: str) -> dict[str, bytes]:
     return {
         f"modes_{body}.glb": gltf.modes(body, bundle, player.scales(bundle)) for body, bundle in _bodies(shown).items()
     }
 
 
-def _mode_series(shown: Shown) -> dict[str, bytes]:
+def _mode_series(shown: Shown, kind: str) -> dict[str, bytes]:
     files: dict[str, bytes] = {}
     for body, bundle in _bodies(shown).items():
         files |= paraview.modes(f"modes_{body}", bundle, player.scales(bundle))
     return files
 
 
-def _contacts(shown: Shown) -> list[str]:
-    assert shown.run is not None
-    if not joint_view.with_clearance(shown.run):
+def _joints(shown: Shown) -> dict[int, str]:
+    """Joints with clearance by their columns among the contacts."""
+    joints = joint_view.with_clearance(shown.of_run)
+    if not joints:
         raise InputError("--what joint", "the scene has no joint with clearance", "show its motion")
-    return [str(name) for name in shown.run["contact"].values]
+    return {k: str(shown.of_run["contact"].values[k]) for k in joints}
 
 
-def _joint_figures(shown: Shown) -> dict[str, bytes]:
+def _joint_figures(shown: Shown, kind: str) -> dict[str, bytes]:
     from flexclear.pipeline.post.overview import figures
     from flexclear.pipeline.post.plotting import style
 
-    _contacts(shown)
-    assert shown.run is not None
+    _joints(shown)
     with style.style():
-        return figures.contacts(shown.run, derive(shown.run), shown.watched)
+        return figures.contacts(shown.of_run, derive(shown.of_run), shown.watched)
 
 
-def _joint_page(shown: Shown) -> dict[str, bytes]:
+def _joint_page(shown: Shown, kind: str) -> dict[str, bytes]:
     """Each joint's ball or pin in its socket, and their curves below."""
-    _contacts(shown)
-    assert shown.run is not None
     views = [
-        viewer(player.joint(shown.run, k, shown.looks), f"{shown.run['contact'].values[k]}: path of the centre")
-        for k in joint_view.with_clearance(shown.run)
+        viewer(player.joint(shown.of_run, k, shown.looks), f"{name}: path of the centre")
+        for k, name in _joints(shown).items()
     ]
-    curves = media(
-        "contacts.png",
-        _joint_figures(shown)["contacts.png"],
-        "Over time",
-        "Path of the ball or pin in its socket, the gap, and the normal force over time",
-    )
-    return {"joint.html": viewer_page(shown.name("joints with clearance"), views, curves)}
+    words = "Path of the ball or pin in its socket, the gap, and the normal force over time"
+    curves = media("contacts.png", _joint_figures(shown, kind)["contacts.png"], "Over time", words)
+    return {"joint.html": shown.page("joints with clearance", views, curves)}
 
 
-def _joint_films(kind: str) -> Callable[[Shown], dict[str, bytes]]:
-    def make_films(shown: Shown) -> dict[str, bytes]:
-        from flexclear.pipeline.post.render import joint_film, writing
+def _joint_films(shown: Shown, kind: str) -> dict[str, bytes]:
+    from flexclear.pipeline.post.render import joint_film, writing
 
-        files = {}
-        rate = writing.RATE if kind == "mp4" else writing.RATE // 2
-        names = _contacts(shown)
-        assert shown.run is not None
-        for k in joint_view.with_clearance(shown.run):
-            name = names[k]
-            pictures = joint_film.frames(shown.run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
-            suffix, content = writing.write(pictures, rate, kind)
-            files[f"joint_{name}.{suffix}"] = content
-        return files
-
-    return make_films
+    files, rate = {}, writing.rate(kind)
+    for k, name in _joints(shown).items():
+        pictures = joint_film.frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
+        suffix, content = writing.write(pictures, rate, kind)
+        files[f"joint_{name}.{suffix}"] = content
+    return files
 
 
 def _vibrating(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
@@ -249,73 +238,53 @@ def _vibrating(shown: Shown) -> tuple[Mechanism, vibrations.Vibrations]:
     return drawn, vibrations.vibrations(drawn, shown.linear)
 
 
-def _vibration_page(shown: Shown) -> dict[str, bytes]:
+def _vibration_page(shown: Shown, kind: str) -> dict[str, bytes]:
     drawn, vibrating = _vibrating(shown)
     view = viewer(player.vibrations(drawn, vibrating), f"{len(vibrating.labels)} natural vibrations", play=True)
-    return {"vibrations.html": viewer_page(shown.name("natural vibrations"), [view])}
+    return {"vibrations.html": shown.page("natural vibrations", [view])}
 
 
-def _vibration_sheet(shown: Shown) -> dict[str, bytes]:
+def _vibration_sheet(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
     from flexclear.pipeline.post.render import vibration_film as film
 
     return {"vibrations.png": png(film.sheet(*_vibrating(shown)))}
 
 
-def _vibration_film(kind: str) -> Callable[[Shown], dict[str, bytes]]:
-    def make_film(shown: Shown) -> dict[str, bytes]:
-        from flexclear.pipeline.post.render import writing
+def _vibration_film(shown: Shown, kind: str) -> dict[str, bytes]:
+    _must_draw()
+    from flexclear.pipeline.post.render import vibration_film as film
+    from flexclear.pipeline.post.render import writing
 
-        _must_draw()
-        from flexclear.pipeline.post.render import vibration_film as film
-
-        rate = writing.RATE if kind == "mp4" else writing.RATE // 2
-        pictures = film.frames(*_vibrating(shown), rate, shown.progress)
-        suffix, content = writing.write(pictures, rate, kind)
-        return {f"vibrations.{suffix}": content}
-
-    return make_film
-
-
-def _farthest(run: xr.Dataset) -> int:
-    """The output at which the bodies are farthest from where they started."""
-    return int(np.argmax(np.abs(run.position.values - run.position.values[:1]).sum(axis=(1, 2))))
+    rate = writing.rate(kind)
+    suffix, content = writing.write(film.frames(*_vibrating(shown), rate, shown.progress), rate, kind)
+    return {f"vibrations.{suffix}": content}
 
 
 #: what is shown, and as what
-MAKERS: dict[str, dict[str, Callable[[Shown], dict[str, bytes]]]] = {
+MAKERS: dict[str, dict[str, Maker]] = {
     "motion": {
         "png": _still,
-        "gif": _film("gif"),
-        "mp4": _film("mp4"),
+        "gif": _film,
+        "mp4": _film,
         "html": _motion_page,
         "gltf": _motion_gltf,
         "pvd": _motion_series,
     },
     "stress": {
         "png": _stress_still,
-        "gif": _film("gif", stressed=True),
-        "mp4": _film("mp4", stressed=True),
+        "gif": partial(_film, stressed=True),
+        "mp4": partial(_film, stressed=True),
         "html": _stress_page,
     },
     "modes": {
         "png": _mode_sheets,
-        "gif": _mode_films("gif"),
-        "mp4": _mode_films("mp4"),
+        "gif": _mode_films,
+        "mp4": _mode_films,
         "html": _mode_page,
         "gltf": _mode_gltf,
         "pvd": _mode_series,
     },
-    "joint": {
-        "png": _joint_figures,
-        "gif": _joint_films("gif"),
-        "mp4": _joint_films("mp4"),
-        "html": _joint_page,
-    },
-    "vibrations": {
-        "png": _vibration_sheet,
-        "gif": _vibration_film("gif"),
-        "mp4": _vibration_film("mp4"),
-        "html": _vibration_page,
-    },
+    "joint": {"png": _joint_figures, "gif": _joint_films, "mp4": _joint_films, "html": _joint_page},
+    "vibrations": {"png": _vibration_sheet, "gif": _vibration_film, "mp4": _vibration_film, "html": _vibration_page},
 }

@@ -15,7 +15,7 @@ import xarray as xr
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.post.overview.curves import scaled
 from flexclear.pipeline.post.render import joint_view, pace, surfaces
-from flexclear.pipeline.post.render.fields import field, hertz, linear_fields
+from flexclear.pipeline.post.render.fields import fields_of, hertz, linear_fields
 from flexclear.pipeline.post.render.mechanism import (
     CLEARANCE_COLOR,
     COLORS,
@@ -25,11 +25,12 @@ from flexclear.pipeline.post.render.mechanism import (
     Mechanism,
     Part,
     part_pose,
+    rest,
 )
 from flexclear.pipeline.post.render.vibrations import Vibrations
-from flexclear.pipeline.post.render.view import View, eye
+from flexclear.pipeline.post.render.view import View, axes_of, eye
 from flexclear.pipeline.post.shapes import body_stress
-from flexclear.pipeline.post.shapes.body_shape import box, faces, scale_to, surface
+from flexclear.pipeline.post.shapes.body_shape import box, faces, scale_to
 
 #: frames of a motion, and width over height of a picture that is neither wide nor narrow
 FRAMES, ASPECT = 240, 1.2
@@ -99,8 +100,7 @@ def joint(run: xr.Dataset, contact: int, looks: Looks, frames: int = FRAMES) -> 
 
 def modes(bundle: xr.Dataset) -> dict[str, Any]:
     """All modes of a reduced body, for the viewer."""
-    rest, _ = surface(bundle, np.zeros(bundle.sizes["mode"]))
-    fields = np.array([field(bundle, k, rest) for k in range(bundle.sizes["mode"])])
+    points, fields = fields_of(bundle)
     largest = np.linalg.norm(fields, axis=2).max(axis=1)
     names = [f"mode {k + 1}: {hertz(f)}" for k, f in enumerate(bundle["frequency"].values)]
     scale = scales(bundle)
@@ -108,9 +108,9 @@ def modes(bundle: xr.Dataset) -> dict[str, Any]:
         {"label": name, "fields": [k, None], "scale": float(scale[k]), "largest": float(largest[k]) or 1.0}
         for k, name in enumerate(names)
     ]
-    mesh = _skin(bundle, rest) | {"fields": [_scaled(values) for values in fields], "track": -1}
-    ghost = _skin(bundle, rest) | {"track": -1, "opacity": 0.18, "color": "#7c8894"}
-    return {"meshes": [mesh, ghost], "shapes": shapes, "unit": 1.0, **_camera(side(bundle), rest)}
+    mesh = _skin(bundle, points) | {"fields": [_scaled(values) for values in fields], "track": -1}
+    ghost = _skin(bundle, points) | {"track": -1, "opacity": 0.18, "color": "#7c8894"}
+    return {"meshes": [mesh, ghost], "shapes": shapes, "unit": 1.0, **_camera(side(bundle), points)}
 
 
 def scales(bundle: xr.Dataset) -> np.ndarray:
@@ -154,10 +154,7 @@ def _steps(run: xr.Dataset, looks: Looks, frames: int) -> np.ndarray:
     """The outputs that are shown."""
     if run.sizes["time"] == 1:
         return np.zeros(1, dtype=int)
-    times = pace.pace(run, looks.duration, looks.impact_slowdown).times
-    times = times[np.unique(np.linspace(0, times.size - 1, frames).astype(int))]
-    steps: np.ndarray = np.clip(np.searchsorted(run["time"].values, times - 1e-12), 0, run.sizes["time"] - 1)
-    return steps
+    return pace.pace(run, looks.duration, looks.impact_slowdown).steps(run, frames)
 
 
 def _rounded(run: xr.Dataset, steps: np.ndarray) -> list[float]:
@@ -166,12 +163,10 @@ def _rounded(run: xr.Dataset, steps: np.ndarray) -> list[float]:
 
 def _bent(run: xr.Dataset, body: Flexible, steps: np.ndarray) -> dict[str, Any]:
     bundle, q = body.bundle, run["modal_coordinate"].values[:, body.columns]
-    rest, _ = surface(bundle, np.zeros(bundle.sizes["mode"]))
-    fields = linear_fields(body, rest)
+    fields = linear_fields(bundle)
     some = np.unique(np.linspace(0, len(q) - 1, 60).astype(int))
     largest = max(float(np.linalg.norm(np.tensordot(q[k], fields, axes=1), axis=1).max()) for k in some)
-    rest_centre = bundle["first_moment"].values / float(bundle["mass"])
-    content = _skin(bundle, rest - rest_centre) | {
+    content = _skin(bundle, rest(bundle)) | {
         "fields": [_scaled(values) for values in fields],
         "weights": _floats(q[steps]),
         "largest": largest,
@@ -215,9 +210,7 @@ def _skin(bundle: xr.Dataset, points: np.ndarray) -> dict[str, Any]:
 def _camera(seen: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:
     """Where the eye is, and how far what it sees reaches across and upright, over the distance."""
     position, focus = eye(seen, cloud, ASPECT)
-    back = (position - focus) / np.linalg.norm(position - focus)
-    right = np.cross(seen.up, back) / np.linalg.norm(np.cross(seen.up, back))
-    local = (cloud - position) @ np.array([right, np.cross(back, right), -back]).T
+    local = (cloud - position) @ axes_of(seen, position, focus)
     reach = np.abs(local[:, :2] / local[:, 2:]).max(axis=0) / zoom
     return {"eye": position.tolist(), "focus": focus.tolist(), "up": seen.up.tolist(), "reach": reach.tolist()}
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from flexclear.pipeline.post.overview.curves import rounded, scaled
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render.mechanism import SOCKET, Mechanism
-from flexclear.pipeline.post.render.view import ANGLE, eye
+from flexclear.pipeline.post.render.view import ANGLE, axes_of, eye
 from flexclear.pipeline.post.single_run.series import parameters
 
 #: longest bar [pixels]
@@ -22,11 +20,8 @@ def project(drawn: Mechanism, points: np.ndarray, size: tuple[int, int], margin:
     """Pixels (across, down) of points of the world (n, 3) in a picture as of `film.still`, shape (n, 2)."""
     width, height = size
     where, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
-    close = (where - focus) / np.linalg.norm(where - focus)
-    right = np.cross(drawn.view.up, close)
-    right /= np.linalg.norm(right)
-    local = (points - where) @ np.column_stack([right, np.cross(close, right), -close])
-    scale = 0.5 * height / np.tan(0.5 * np.radians(ANGLE)) / local[:, 2]
+    local = (points - where) @ axes_of(drawn.view, where, focus)
+    scale = -0.5 * height / np.tan(0.5 * np.radians(ANGLE)) / local[:, 2]
     result: np.ndarray = np.column_stack([0.5 * width + scale * local[:, 0], 0.5 * height - scale * local[:, 1]])
     return result
 
@@ -67,7 +62,7 @@ def annotated(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarr
     height, width = pixels.shape[:2]
     if drawn.stress is not None:
         pixels = with_color_bar(pixels.copy(), color_bar(drawn.stress, height))
-    canvas = FigureCanvasAgg(Figure(figsize=(width / 100, height / 100), dpi=100))
+    canvas = style.canvas((width, height))
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.imshow(pixels, extent=(0, width, height, 0), aspect="auto", interpolation="nearest")
@@ -78,13 +73,13 @@ def annotated(pixels: np.ndarray, drawn: Mechanism, margin: int = 0) -> np.ndarr
     ruler(axes, drawn, (width, height), margin)
     axes.set(xlim=(0, width), ylim=(height, 0))
     canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+    return style.pixels(canvas)
 
 
 def color_bar(largest: float, height: int) -> np.ndarray:
     """The colours of stress from zero to the largest [Pa], with numbers: pixels (height, BAR, 3), black on white."""
     factor, unit = scaled(largest, "Pa")
-    canvas = FigureCanvasAgg(Figure(figsize=(BAR / 100, height / 100), dpi=100))
+    canvas = style.canvas((BAR, height))
     axes = canvas.figure.add_axes((0.16, 0.25, 0.16, 0.5))
     axes.imshow(np.linspace(1.0, 0.0, 256)[:, None], aspect="auto", cmap=STRESS_COLORS, extent=(0.0, 1.0, 0.0, 1.0))
     ticks = np.linspace(0.0, 1.0, 5)
@@ -93,7 +88,7 @@ def color_bar(largest: float, height: int) -> np.ndarray:
     axes.tick_params(labelsize=9, length=2)
     canvas.figure.text(0.16, 0.77, f"von Mises\nstress ({unit})", fontsize=9, va="bottom")
     canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+    return style.pixels(canvas)
 
 
 def with_color_bar(pixels: np.ndarray, bar: np.ndarray) -> np.ndarray:

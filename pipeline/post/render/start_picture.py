@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.render import film
@@ -24,7 +22,7 @@ LETTERS = 56
 def picture(seen: StartView, title: str) -> np.ndarray:
     """Pixels, shape (height, width, 3)."""
     width, height = SIZE
-    canvas = FigureCanvasAgg(Figure(figsize=(width / 100, height / 100), dpi=100))
+    canvas = style.canvas(SIZE)
     axes = canvas.figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set_axis_off()
     axes.imshow(film.still(seen.drawn, 0, SIZE, MARGIN), extent=(0, width, height, 0), aspect="auto")
@@ -39,7 +37,7 @@ def picture(seen: StartView, title: str) -> np.ndarray:
         ruler(axes, seen.drawn, SIZE, MARGIN)
     axes.set(xlim=(0, width), ylim=(height, 0))
     canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[:, :, :3].copy()
+    return style.pixels(canvas)
 
 
 def columns(points: np.ndarray, room: int) -> tuple[list[int], list[int]]:

@@ -12,22 +12,23 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.post.render import forms, player, surfaces
 from flexclear.pipeline.post.render.mechanism import (
     COLORS,
     Flexible,
+    Layout,
     Looks,
     Mechanism,
     Part,
-    frame_pose,
     mechanism,
     pose,
+    rest,
+    skin,
 )
 from flexclear.pipeline.post.render.ruler import exaggeration, words
 from flexclear.pipeline.post.render.surfaces import Surface
-from flexclear.pipeline.post.render.view import flat
-from flexclear.pipeline.post.shapes.body_shape import faces, has_edges, surface
+from flexclear.pipeline.post.render.view import flat, gravity
+from flexclear.pipeline.post.shapes.body_shape import has_edges
 from flexclear.pipeline.post.single_run.series import parameters
 
 BODY, JOINT, FRAME, DRIVE, LOAD = "#1f2937", "#3b4754", "#6b7280", "#0072B2", "#7a4a00"
@@ -81,7 +82,12 @@ def start_view(
 ) -> StartView:
     """The view of a start; gaps: of joints that do not fit."""
     text, drawn = parameters(run), mechanism(run, bundles, looks)
-    joints = dict(_joints(run, text, bundles))
+    at = Layout(run, text, bundles)
+    # where each joint's second frame is in the world, and the axes of its first one
+    joints = {
+        name: (at.at_start(second)[0], at.at_start(first)[1])
+        for name, (first, second) in ((name, joint["between"]) for name, joint in text.get("joint", {}).items())
+    }
     normal = _normal(text, joints)
     if normal is not None and drawn.looks.direction is None:
         drawn = replace(drawn, view=flat(normal, text, drawn.looks.up))
@@ -96,16 +102,12 @@ def start_view(
     marked = list(_marks(run, drawn, text, joints, gaps))
     cloud = np.concatenate([drawn.cloud, *(part.surface.points for part in extra), *([m.point] for m in marked)])
     drawn = replace(drawn, parts=(*drawn.parts, *extra), cloud=cloud)
-    return StartView(drawn, tuple(marked), tuple(_notes(drawn, text, gaps)), tuple(gaps), _gravity(text))
+    return StartView(drawn, tuple(marked), tuple(_notes(drawn, text, gaps)), tuple(gaps), gravity(text))
 
 
 def _still(body: Flexible, opacity: float) -> Part:
     """A meshed body as it is where nothing is deformed."""
-    bundle = body.bundle
-    points, _ = surface(bundle, np.zeros(1))
-    shown = surfaces.shaded(
-        points - bundle["com"].values, surfaces.triangulated(faces(bundle)), sharp=has_edges(bundle)
-    )
+    shown = skin(body.bundle, rest(body.bundle), sharp=has_edges(body.bundle))
     return Part(body.index, shown, body.color or COLORS[body.index % len(COLORS)], opacity)
 
 
@@ -116,19 +118,6 @@ def page_view(seen: StartView) -> dict[str, Any]:
         for mark in seen.marks
     ]
     return player.motion(seen.drawn) | {"labels": labels, "state": " · ".join(seen.notes)}
-
-
-def _joints(
-    run: xr.Dataset, text: Mapping[str, Any], bundles: Mapping[str, xr.Dataset]
-) -> Iterator[tuple[str, tuple[np.ndarray, np.ndarray]]]:
-    """Where each joint's second frame is in the world, and the axes of its first one."""
-    frames, bodies = list(run["frame"].values), [str(name) for name in run["body"].values]
-    for name, joint in text.get("joint", {}).items():
-        first, second = joint["between"]
-        body, (_, axes) = first.partition(".")[0], frame_pose(text, bundles, first)
-        if body in bodies:
-            axes = quaternion_to_matrix(run["quaternion"].values[0, bodies.index(body)]) @ axes
-        yield name, (run["frame_position"].values[0, frames.index(second)], axes)
 
 
 def _normal(text: Mapping[str, Any], joints: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray | None:
@@ -170,24 +159,19 @@ def _turning(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     ring = where + ARC * size * (np.cos(angle) * axes[:, 0] + np.sin(angle) * axes[:, 1])
     way = ring[-1] - ring[-2]
     tube = surfaces.tube(ring, 1.8 * THIN * size)
-    return surfaces.merged([replace(tube, triangles=tube.triangles[:, ::-1]), _cone(ring[-1], way, size)])
+    return surfaces.merged([replace(tube, triangles=tube.triangles[:, ::-1]), _head(ring[-1], way, size)])
 
 
 def _sliding(where: np.ndarray, axes: np.ndarray, size: float) -> Surface:
     """An arrow along the axis, next to it."""
     side = where + 0.5 * ARC * size * axes[:, 0]
     end = side + 1.5 * AXIS * size * axes[:, 2]
-    return surfaces.merged([surfaces.bar(side, end, 1.8 * THIN * size), _cone(end, axes[:, 2], size)])
+    return surfaces.merged([surfaces.bar(side, end, 1.8 * THIN * size), _head(end, axes[:, 2], size)])
 
 
-def _cone(base: np.ndarray, way: np.ndarray, size: float) -> Surface:
-    axes, turn = surfaces.along(way / np.linalg.norm(way)), np.linspace(0.0, 2.0 * np.pi, 25)[:-1, None]
-    ring = base + 5.0 * THIN * size * (np.cos(turn) * axes[:, 0] + np.sin(turn) * axes[:, 1])
-    points = np.vstack([ring, base + 12.0 * THIN * size * axes[:, 2], base])
-    k = np.arange(24)
-    after = (k + 1) % 24
-    sides, below = np.column_stack([k, after, np.full(24, 24)]), np.column_stack([after, k, np.full(24, 25)])
-    return surfaces.shaded(points, np.vstack([sides, below]), sharp=True)
+def _head(base: np.ndarray, way: np.ndarray, size: float) -> Surface:
+    """Of an arrow."""
+    return surfaces.cone(base, base + 12.0 * THIN * size * way / np.linalg.norm(way), 5.0 * THIN * size)
 
 
 def _marks(
@@ -248,13 +232,7 @@ def _notes(drawn: Mechanism, parameters: Mapping[str, Any], gaps: Sequence[Missi
     """What the names do not say."""
     yield f"start at t = {parameters.get('time', {}).get('start', 0.0):g} s"
     yield from exaggeration(drawn)
-    if not np.any(_gravity(parameters)):
+    if not np.any(gravity(parameters)):
         yield "no gravity"
     if gaps:
         yield "red: joints that do not fit"
-
-
-def _gravity(parameters: Mapping[str, Any]) -> np.ndarray:
-    fields = [load["acceleration"] for load in parameters.get("load", {}).values() if load["type"] == "gravity"]
-    total: np.ndarray = np.sum(np.array(fields, dtype=float).reshape(-1, 3), axis=0)
-    return total

@@ -112,6 +112,19 @@ def bar(start: np.ndarray, end: np.ndarray, radius: float) -> Surface:
     return moved(cylinder(radius, float(np.linalg.norm(way))), 0.5 * (start + end), along(way))
 
 
+def cone(base: np.ndarray, tip: np.ndarray, radius: float) -> Surface:
+    """A round cone, closed below."""
+    rim = hull(np.zeros((1, 2)), radius)
+    n = len(rim)
+    ring = np.arange(n)
+    after = np.roll(ring, -1)
+    points = np.vstack([_at(rim, 0.0), np.array([[0.0, 0.0, np.linalg.norm(tip - base)], np.zeros(3)])])
+    triangles = np.vstack(
+        [np.column_stack([ring, after, np.full(n, n)]), np.column_stack([after, ring, np.full(n, n + 1)])]
+    )
+    return moved(shaded(points, triangles, sharp=True), base, along(tip - base))
+
+
 def tube(places: np.ndarray, radius: float, corners: int = 6) -> Surface:
     """A thin round tube through points, shape (n, 3), open at its ends; points that repeat are left out."""
     distinct = np.concatenate([[True], np.linalg.norm(np.diff(places, axis=0), axis=1) > 1e-3 * radius])

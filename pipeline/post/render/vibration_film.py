@@ -9,10 +9,9 @@ import numpy as np
 import pyvista as pv
 
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.post.render.film import look, solid
+from flexclear.pipeline.post.render.film import SOFT, image, look, plotter, polydata, solid
 from flexclear.pipeline.post.render.mechanism import Mechanism
 from flexclear.pipeline.post.render.pace import Caption
-from flexclear.pipeline.post.render.stage import SOFT, image, plotter, polydata
 from flexclear.pipeline.post.render.vibrations import Vibrations
 
 #: size of a film's pictures and of those on a sheet, and how many are next to each other there

@@ -10,8 +10,7 @@ import xarray as xr
 
 from flexclear.pipeline.post.render import surfaces
 from flexclear.pipeline.post.render.fields import hertz, linear_fields
-from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose
-from flexclear.pipeline.post.shapes.body_shape import faces, surface
+from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose, rest, skin
 
 #: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size
 FRACTION = 0.12
@@ -66,11 +65,11 @@ def vibrations(drawn: Mechanism, linear: xr.Dataset) -> Vibrations:
     pieces = []
     for part in drawn.parts:
         matrix = part_pose(run, part, 0)
-        skin = surfaces.moved(part.surface, matrix[:3, 3], matrix[:3, :3])
-        moved = np.zeros((count, 2, *skin.points.shape))
+        drawn_part = surfaces.moved(part.surface, matrix[:3, 3], matrix[:3, :3])
+        moved = np.zeros((count, 2, *drawn_part.points.shape))
         if part.owner is not None:
-            moved = _rigid(motions, part.owner, skin.points, run["position"].values[0, part.owner])
-        pieces.append(Piece(skin, moved, part.color, part.opacity, True))
+            moved = _rigid(motions, part.owner, drawn_part.points, run["position"].values[0, part.owner])
+        pieces.append(Piece(drawn_part, moved, part.color, part.opacity, True))
     pieces += [_bending(run, body, linear, motions) for body in drawn.flexible]
     sizes = [
         np.linalg.norm(piece.moved, axis=-1).reshape(count, -1).max(axis=1) for piece in pieces if piece.moved.size
@@ -130,12 +129,8 @@ def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray)
 
 def _bending(run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motions) -> Piece:
     matrix = pose(run, body.index, 0)
-    rest, _ = surface(body.bundle, np.zeros(body.bundle.sizes["mode"]))
-    fields = linear_fields(body, rest) @ matrix[:3, :3].T
-    centre = body.bundle["first_moment"].values / float(body.bundle["mass"])
-    points = (rest - centre) @ matrix[:3, :3].T + matrix[:3, 3]
+    fields = linear_fields(body.bundle) @ matrix[:3, :3].T
+    points = rest(body.bundle) @ matrix[:3, :3].T + matrix[:3, 3]
     shape = linear["modal_shape"].values[:, :, body.columns]
     moved = _rigid(motions, body.index, points, matrix[:3, 3]) + np.tensordot(shape, fields, axes=1)
-    # points keep their number, so that displacements fit; sharp edges of solids are shaded softly
-    skin = surfaces.shaded(points, surfaces.triangulated(faces(body.bundle)))
-    return Piece(skin, moved, COLORS[0], 1.0, False)
+    return Piece(skin(body.bundle, points), moved, COLORS[0], 1.0, False)

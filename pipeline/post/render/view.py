@@ -74,6 +74,13 @@ def eye(seen: View, cloud: np.ndarray, aspect: float, zoom: float = 1.0) -> tupl
     return focus + MARGIN * distance / zoom * towards_eye, focus
 
 
+def axes_of(seen: View, position: np.ndarray, focus: np.ndarray) -> np.ndarray:
+    """Right, up and back of an eye (`eye`), columns of shape (3, 3)."""
+    back = (position - focus) / np.linalg.norm(position - focus)
+    right = np.cross(seen.up, back) / np.linalg.norm(np.cross(seen.up, back))
+    return np.column_stack([right, np.cross(back, right), back])
+
+
 def _spatial(up: np.ndarray) -> View:
     """From above and in front, whatever is up."""
     side = np.eye(3)[int(np.argmin(np.abs(up) + np.array([0.0, 1e-9, 2e-9])))]
@@ -101,10 +108,16 @@ def plane(run: xr.Dataset) -> np.ndarray | None:
     return normal if float(np.abs(moving @ normal).max()) <= PLANAR * max(speed, 1e-300) or speed == 0.0 else None
 
 
+def gravity(given: Mapping[str, Any]) -> np.ndarray:
+    """Sum of the gravity loads among a scene's parameters [m/s^2], shape (3,)."""
+    fields = [load["acceleration"] for load in given.get("load", {}).values() if load["type"] == "gravity"]
+    total: np.ndarray = np.sum(np.array(fields, dtype=float).reshape(-1, 3), axis=0)
+    return total
+
+
 def _up(given: Mapping[str, Any]) -> np.ndarray:
     """Against gravity, where there is some; else z."""
-    fields = [load["acceleration"] for load in given.get("load", {}).values() if load.get("type") == "gravity"]
-    total = np.sum(np.array(fields, dtype=float), axis=0) if fields else np.zeros(3)
+    total = gravity(given)
     size = float(np.linalg.norm(total))
     return -total / size if size > 0.0 else np.array([0.0, 0.0, 1.0])
 

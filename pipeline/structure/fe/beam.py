@@ -27,7 +27,7 @@ from skfem import Basis, BilinearForm, ElementComposite, MeshLine
 from flexclear.pipeline.core.numerics.rotations import skew
 from flexclear.pipeline.structure.fe.kinematics import NODE_COMPONENT, NODE_SIGN, THEORIES, Kinematics
 from flexclear.pipeline.structure.fe.model import rigid_motions, symmetric
-from flexclear.pipeline.structure.fe.quadrature import POINTS, WEIGHTS
+from flexclear.pipeline.structure.fe.section import POINTS, WEIGHTS
 
 #: degrees of freedom of a node, in the order of every vector
 DOFS = ("ux", "uy", "uz", "rx", "ry", "rz")

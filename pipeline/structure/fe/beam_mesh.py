@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,14 +19,18 @@ from flexclear.pipeline.structure.fe.beam_recipe import (
     StraightBeamRecipe,
     segments,
 )
-from flexclear.pipeline.structure.fe.quadrature import POINTS
+from flexclear.pipeline.structure.fe.section import POINTS
+from flexclear.pipeline.structure.fe.vtu import vtu
 
 #: constants that a taper changes, each with a profile
 TAPERED = ("area", "second_moment", "inertia_moment", "shear_coefficient")
 
 
-def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, where: str) -> xr.Dataset:
-    """The mesh dataset (schema MESH); InputError for a frame or mass that lies on no node (with the nearest)."""
+def build(recipe: StraightBeamRecipe | SegmentedBeamRecipe, folder: Path, where: str) -> xr.Dataset:
+    """The mesh dataset (schema MESH); InputError for a frame or mass that lies on no node (with the nearest).
+
+    folder: not needed, nothing of a beam is in files.  where: name of the recipe in messages.
+    """
     parts = segments(recipe)
     x = _nodes(parts)
     R_MR = quaternion_to_matrix(recipe.pose.as_quaternion())
@@ -157,3 +162,10 @@ def _node_at(x: np.ndarray, position: float, where: str) -> int:
         f"have nodes at {shown}",
         f"move the {'mass' if '[masses.' in where else 'frame'} to a node, or choose another number of elements",
     )
+
+
+def as_vtu(mesh: xr.Dataset) -> bytes:
+    """Lines with section data in the cells, for ParaView."""
+    names = ("area", "youngs_modulus", "shear_modulus", "density", "second_moment", "inertia_moment")
+    data = {name: mesh[name].values for name in names}
+    return vtu(mesh["node_position"].values, "line", mesh["cell_node"].values, of_cells=data)

@@ -21,8 +21,7 @@ from typing import Any
 
 from skfem import Element
 
-from flexclear.pipeline.structure.fe.hermite import LocalHermite
-from flexclear.pipeline.structure.fe.hierarchical import Hierarchical
+from flexclear.pipeline.structure.fe.line_elements import Hierarchical, LocalHermite
 
 #: unknowns of a node in scikit-fem's order, as indices of ux uy uz rx ry rz, with sign: ry = -slope of w
 NODE_COMPONENT = (0, 3, 1, 5, 2, 4)

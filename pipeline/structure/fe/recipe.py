@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from flexclear.pipeline.core.scene.file_kinds import RECIPE, require_kind
+from flexclear.pipeline.core.scene.json_schema import identified
 from flexclear.pipeline.core.scene.load import read_toml
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.validation_errors import input_errors
@@ -37,8 +38,8 @@ def read_recipe(path: str | Path) -> dict[str, Any]:
     return parse(table, str(path)).model_dump(mode="json", exclude_none=True)
 
 
-def parse(table: Mapping[str, Any], where: str) -> Recipe:
-    """The recipe that a table holds; `where` opens every message of an InputError."""
+def parse(table: Mapping[str, Any], where: str) -> Any:
+    """The recipe that a table holds, one of MODELS; `where` opens every message of an InputError."""
     model = _model(table, where)
     try:
         return model.model_validate(dict(table))
@@ -54,3 +55,24 @@ def _model(table: Mapping[str, Any], where: str) -> type[Recipe]:
     if not isinstance(name, str) or name not in MODELS:
         raise InputError(f"{where} [shape.type]", f"no shape is called {name!r}", suggestion(str(name), MODELS))
     return MODELS[name]
+
+
+def recipe_schema() -> dict[str, Any]:
+    """The schema of a recipe file: which keys there are depends on `shape.type`."""
+    adapter: TypeAdapter[Any] = TypeAdapter(Recipe)
+    schema = adapter.json_schema(mode="validation")
+    branches = schema.pop("anyOf")
+    shapes = {
+        kind: next(b for b in branches if b["$ref"].endswith(f"/{model.__name__}")) for kind, model in MODELS.items()
+    }
+    # a choice by the shape, so that an editor reports what is wrong with this kind and not with all others
+    chosen = [
+        {
+            "if": {"properties": {"shape": {"properties": {"type": {"const": kind}}, "required": ["type"]}}},
+            "then": branch,
+        }
+        for kind, branch in shapes.items()
+    ]
+    shape = {"type": "object", "required": ["type"], "properties": {"type": {"enum": list(MODELS)}}}
+    whole = {"title": "Recipe", "type": "object", "required": ["shape"], "properties": {"shape": shape}}
+    return identified({**whole, "allOf": chosen, **schema}, "recipe")

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 import scipy.sparse as sp
 import xarray as xr
 
 from flexclear.pipeline.structure.closed_form import comparison
 from flexclear.pipeline.structure.fe import beam as beams
-from flexclear.pipeline.structure.fe import mesh as meshes
+from flexclear.pipeline.structure.fe import beam_mesh
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
 from flexclear.pipeline.structure.fe.inertia_integrals import integrate
 from flexclear.pipeline.structure.fe.model import Drawn, Families, Interface, Model
@@ -121,12 +117,8 @@ def _sections(mesh: xr.Dataset, beam: Beam) -> tuple[np.ndarray, np.ndarray | No
     return radius, flat @ beam.axes[:, 1:].T
 
 
-def _build(recipe: Mapping[str, Any], folder: Path) -> xr.Dataset:
-    return meshes.build(recipe)
-
-
 def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
     return [name.partition("_")[0] for name in families]
 
 
-KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words, exact=comparison.columns)
+KIND = Kind(build=beam_mesh.build, vtu=beam_mesh.as_vtu, assemble=assemble, words=_words, exact=comparison.columns)

@@ -12,9 +12,12 @@ import xarray as xr
 
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.structure.fe.model import Model
+from flexclear.pipeline.structure.fe.recipe import parse
 from flexclear.pipeline.structure.kinds import SHAPES
 
 FAMILY = "flexclear.pipeline.structure.kinds"
+#: name of a recipe in messages, for callers that have no better one
+PLACE = "mesh recipe"
 
 
 def no_closed_form(
@@ -28,16 +31,16 @@ def no_closed_form(
 class Kind:
     """Functions of one kind of body.
 
-    build: a recipe's table, and the folder that files in it are relative to, to the mesh dataset.
-    write_vtu: the mesh dataset to a file that ParaView opens.
+    build: the recipe, the folder that files in it are relative to, and its name in messages, to the mesh dataset.
+    vtu: the mesh dataset as a file that ParaView opens.
     assemble: the mesh dataset to matrices.
     words: what each mode does, in a word, from its family and vectors of shape (ndof, n).
     exact: closed-form frequencies [Hz] next to those of a reference condition, by variable, from the modes'
         families and the interfaces' names.
     """
 
-    build: Callable[[Mapping[str, Any], Path], xr.Dataset]
-    write_vtu: Callable[[xr.Dataset, Path], None]
+    build: Callable[[Any, Path, str], xr.Dataset]
+    vtu: Callable[[xr.Dataset], bytes]
     assemble: Callable[[xr.Dataset], Model]
     words: Callable[[Model, list[str], np.ndarray], list[str]]
     exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]] = no_closed_form
@@ -49,10 +52,13 @@ def name_of(recipe: Mapping[str, Any]) -> str:
     return SHAPES.get(str(shape.get("type")), "beam") if isinstance(shape, Mapping) else "beam"
 
 
-def of_recipe(recipe: Mapping[str, Any]) -> Kind:
-    """The kind of body that a recipe's table describes."""
+def build(recipe: Mapping[str, Any], folder: str | Path = ".", where: str = PLACE) -> xr.Dataset:
+    """The mesh dataset of a recipe's table; InputError for a wrong one, and for frames that lie nowhere on the body.
+
+    folder: what files in the recipe are relative to.  where: name of the recipe in messages.
+    """
     kind: Kind = lookup(FAMILY, name_of(recipe), where="shape.type")
-    return kind
+    return kind.build(parse(recipe, where), Path(folder), where)
 
 
 def of_mesh(mesh: xr.Dataset) -> Kind:

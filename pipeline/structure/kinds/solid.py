@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
 import numpy as np
-import xarray as xr
 
 from flexclear.pipeline.structure.fe.model import Model
-from flexclear.pipeline.structure.fe.recipe import parse
 from flexclear.pipeline.structure.fe.solid import mesh as meshes
 from flexclear.pipeline.structure.fe.solid.model import assemble
-from flexclear.pipeline.structure.fe.solid.recipe import SolidRecipe
 from flexclear.pipeline.structure.kinds.kind import Kind
 
-PLACE = "mesh recipe"
 #: a body is a rod where its second largest extent is below this fraction of the largest
 SLENDER = 0.5
 #: a mode is torsion where the swirl about the axis has this many times the energy of all else
 SWIRL = 4.0
-
-
-def _build(recipe: Mapping[str, Any], folder: Path) -> xr.Dataset:
-    checked = parse(recipe, PLACE)
-    assert isinstance(checked, SolidRecipe)
-    return meshes.build(checked, folder, PLACE)
 
 
 def _words(model: Model, families: list[str], vectors: np.ndarray) -> list[str]:
@@ -52,4 +38,4 @@ def _word(along: float, out: float, turn: float) -> str:
     return "axial" if along > out + turn else "bending"
 
 
-KIND = Kind(build=_build, write_vtu=meshes.write_vtu, assemble=assemble, words=_words)
+KIND = Kind(build=meshes.build, vtu=meshes.as_vtu, assemble=assemble, words=_words)

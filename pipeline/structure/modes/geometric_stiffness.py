@@ -23,7 +23,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import beam as beams
-from flexclear.pipeline.structure.fe.quadrature import POINTS
+from flexclear.pipeline.structure.fe.section import POINTS
 
 
 def variables(mesh: xr.Dataset, modes: xr.Dataset) -> dict[str, Any]:

@@ -20,8 +20,7 @@ import xarray as xr
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe import beam as beams
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
-from flexclear.pipeline.structure.fe.quadrature import POINTS
-from flexclear.pipeline.structure.fe.section import Section
+from flexclear.pipeline.structure.fe.section import POINTS, Section
 from flexclear.pipeline.structure.fe.slices import Maps, slices
 from flexclear.pipeline.structure.stress.outline import Outline, outline
 

@@ -16,6 +16,7 @@ from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS, Contents, Table
 from flexclear.pipeline.structure.fe.exchange.recipe import Matrices, MatricesRecipe
 from flexclear.pipeline.structure.fe.model import symmetric
+from flexclear.pipeline.structure.fe.vtu import vtu
 
 #: length [m], mass [kg] and time [s] of each consistent system
 SYSTEMS = {"m-kg-s": (1.0, 1.0, 1.0), "mm-t-s": (1e-3, 1e3, 1.0), "mm-kg-ms": (1e-3, 1.0, 1e-3)}
@@ -112,12 +113,8 @@ def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, path: st
     }
 
 
-def write_vtu(mesh: xr.Dataset, path: Path) -> None:
-    """Write the nodes as points of a VTU file."""
-    import meshio  # slow to import and needed by this function alone
-
-    _, first = np.unique(mesh["unknown_node"].values, return_index=True)
+def as_vtu(mesh: xr.Dataset) -> bytes:
+    """The nodes as points, for ParaView."""
+    node, first = np.unique(mesh["unknown_node"].values, return_index=True)
     points = mesh["unknown_position"].values[first]
-    cells = [("vertex", np.arange(len(points))[:, None])]
-    node = {"node": mesh["unknown_node"].values[first]}
-    meshio.Mesh(points, cells, point_data=node).write(path, file_format="vtu")
+    return vtu(points, "vertex", np.arange(len(points))[:, None], of_points={"node": node})

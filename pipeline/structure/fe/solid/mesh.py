@@ -16,6 +16,7 @@ from flexclear.pipeline.structure.fe.solid import imported, ties
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.geometry import Geometry
 from flexclear.pipeline.structure.fe.solid.recipe import MeshFile, SolidRecipe
+from flexclear.pipeline.structure.fe.vtu import vtu
 
 
 def build(recipe: SolidRecipe, folder: Path, path: str) -> xr.Dataset:
@@ -118,14 +119,9 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, path: str) -> dict[str, Any
     }
 
 
-def write_vtu(mesh: xr.Dataset, path: Path) -> None:
-    """Write the solid as a VTU file that ParaView and meshio open."""
-    import meshio  # slow to import and needed by this function alone
-
-    cell = ELEMENTS[mesh.attrs["element"]].cell
+def as_vtu(mesh: xr.Dataset) -> bytes:
+    """The solid with its material in the cells, for ParaView."""
     region = mesh["cell_region"].values
-    data = {name: [mesh[name].values[region]] for name in ("youngs_modulus", "poisson", "density")}
-    cells = [(cell, mesh["cell_node"].values)]
-    meshio.Mesh(mesh["node_position"].values, cells, cell_data=data | {"region": [region]}).write(
-        path, file_format="vtu"
-    )
+    data = {name: mesh[name].values[region] for name in ("youngs_modulus", "poisson", "density")}
+    cell = ELEMENTS[mesh.attrs["element"]].cell
+    return vtu(mesh["node_position"].values, cell, mesh["cell_node"].values, of_cells=data | {"region": region})

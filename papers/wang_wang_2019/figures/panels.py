@@ -1,4 +1,4 @@
-"""The six panels of figures 11-13: angle, z, vz, az, reaction at A1, deviation of the ball's centre."""
+"""Figures 11-13: six panels with angle, z, vz, az, reaction at A1 and deviation of the ball's centre."""
 
 from __future__ import annotations
 
@@ -9,9 +9,26 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Drawing
 
-from flexclear.papers.wang_wang_2019.models import PLATFORM, Motion
+from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.models import (
+    CSJ,
+    FAR,
+    FAR_CB,
+    FAR_CSJ,
+    FAR_FIXED,
+    FAR_FREE,
+    IDEAL,
+    JOINT,
+    PLATFORM,
+    Model,
+    Motion,
+    references,
+)
+from flexclear.papers.wang_wang_2019.models import (
+    motion as motion_of,
+)
 from flexclear.pipeline.core.artifacts.quantities import common_times
 from flexclear.pipeline.post.plotting import style
 
@@ -46,43 +63,42 @@ ACCELERATION = Quantity(
 REACTION = Quantity("reaction force at A1", "N", lambda m: m.reaction, True, ensemble=("normal_force", 1.0))
 QUANTITIES = (ANGLE, DISPLACEMENT, VELOCITY, ACCELERATION, REACTION)
 LETTERS = "abcdef"
+#: title and text below it, out of the ideal motion, the others and their post artifacts
+Heading = Callable[[Motion, Sequence[Motion], Sequence[xr.Dataset]], tuple[str, str]]
 
 
-def six_panels(
-    reference: Motion,
-    others: Sequence[Motion],
-    posts: Sequence[xr.Dataset] = (),
-    *,
-    impacts: bool,
-    clearance: float = 0.0,
-) -> tuple[Figure, Axes]:
-    """Figure with the paper's six panels, each with a slim one below; returns it and the axes that hold labels.
+def _six_panels(heading: Heading, data: Data, models: Sequence[Model], columns: int, ensembles: bool) -> Drawing:
+    """The paper's six panels, each with a slim one below.
 
-    reference: the ideal model.  others: the models compared with it, drawn in this order.
-    posts: post artifacts whose ensemble's quantiles are drawn as a band, one per model of `others`.
-    impacts: with them the slim panels of acceleration and reaction zoom to the ideal model's range;
-    all others show the difference from the ideal model.
-    clearance: of joint A1 [mm], drawn as a circle where there is one.
+    models: those compared with the ideal one, drawn in this order.  ensembles: draw the quantiles of theirs as bands.
+    Where they have impacts, the slim panels of acceleration and reaction zoom to the ideal model's range; all others
+    show the difference from the ideal model.  columns: of the legend.
     """
+    reference, others = motion_of(IDEAL, data), [motion_of(model, data) for model in models]
+    posts = [data[f"{model.scene}:post"] for model in models]
+    bands, loose = posts if ensembles else [], "contact" in posts[0].sizes
+    clearance = 1e3 * float(posts[0].clearance.sel(contact=JOINT)) if loose else 0.0
     figure, axes = style.grid(6, 2, (11.0, 12.2), height_ratios=[3, 1.15] * 3, sharex=False)
     for k, quantity in enumerate(QUANTITIES):
         main, strip = axes[2 * (k // 2), k % 2], axes[2 * (k // 2) + 1, k % 2]
-        over_time(main, quantity, reference, others, posts)
+        over_time(main, quantity, reference, others, bands)
         main.set_title(f"({LETTERS[k]}) {quantity.title}")
         main.tick_params(labelbottom=False)
-        if impacts and quantity.jumps:
+        if loose and quantity.jumps:
             zoomed(strip, quantity, reference, others)
         else:
-            difference(strip, quantity, reference, others, posts)
-    for motion in others:
-        _peaks(axes[4, 0], motion)
+            difference(strip, quantity, reference, others, bands)
+    for other in others:
+        _peaks(axes[4, 0], other)
     ball_deviation(axes[4, 1], reference, others, clearance)
     axes[4, 1].set_title("(f) centre of ball A1, minus ideal, global frame")
     ball_distance(axes[5, 1], reference, others)
     for panel in axes.flat:
         # the same position in every panel; aligning by the tick labels' sizes takes seconds
         panel.yaxis.set_label_coords(-0.105, 0.5)
-    return figure, axes[0, 0]
+    style.heading(figure, *heading(reference, others, posts))
+    style.shared_legend(figure, axes[0, 0], columns)
+    return figure
 
 
 def over_time(
@@ -271,3 +287,58 @@ def _range(values: np.ndarray) -> tuple[float, float]:
     low, high = float(values.min()), float(values.max())
     margin = 0.35 * (high - low)
     return (low - margin, high + margin) if low < 0.0 else (-0.05 * (high - low), high + margin)
+
+
+def _of_rods(ideal: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
+    moved = {m.model.scene: 1e3 * np.abs(deviation(DISPLACEMENT, m, ideal)[1]).max() for m in others}
+    fixed = moved[FAR_FIXED.scene]
+    little = f"{fixed:.1g} µm" if fixed > 1e-6 else "nothing"  # next to rounding
+    return (
+        f"Figure 11: a flexible rod moves the platform by {moved[FAR_CB.scene]:.2g} µm at most; free-free modes "
+        f"find {moved[FAR_FREE.scene]:.1g} µm of it, fixed-fixed modes {little}",
+        "slim panels (added): difference from the ideal model; the added mode set is drawn as the band that it fills",
+    )
+
+
+def _of_clearance(ideal: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
+    (csj,), (post,) = others, posts
+    return (
+        f"Figure 12: {int(post.impact_count.sel(contact=JOINT))} impacts raise the largest force at A1 from "
+        f"{ideal.reaction.max():.0f} to {float(post.peak_force.sel(contact=JOINT)):.0f} N, the acceleration from "
+        f"{1e-3 * np.abs(ideal.acceleration).max():.0f} to {1e-3 * np.abs(csj.acceleration).max():.0f} m/s²",
+        "slim panels (added): difference from the ideal model, or a zoom to its range; "
+        "dots: largest normal force of each impact, as in the title",
+    )
+
+
+def _of_both(ideal: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
+    rigid, *flexible = posts
+    peaks = [f"{float(rigid.peak_acceleration.sel(body=PLATFORM, axis='z')):.0f} (CSJ)"]
+    for model, post in zip(FAR_CSJ, flexible, strict=True):
+        mean = float(post.peak_acceleration_mean.sel(ensemble_body=PLATFORM, axis="z"))
+        peaks.append(f"{mean:.0f} ({model.label.removeprefix('FAR-CSJ, ').split(' ')[0]})")
+    return (
+        "Figure 13: the mode set decides how far a flexible rod softens the impacts",
+        f"largest acceleration in m/s², of ensembles the mean: {', '.join(peaks)}. "
+        "Beyond its horizon a single run is pale, bands are the middle 90 % of "
+        "the ensembles (the added set's run is drawn as the band that it fills); "
+        "dots: largest force of each impact",
+    )
+
+
+def _figure(title: str, heading: Heading, models: Sequence[Model], *, columns: int, ensembles: bool = False) -> Figure:
+    needs = references((IDEAL, *models), "run", "post")
+    return Figure(title, needs, lambda data: _six_panels(heading, data, models, columns, ensembles))
+
+
+FIG11 = _figure("Figure 11: flexible actuated rod (FAR) against the ideal model, six panels", _of_rods, FAR, columns=4)
+FIG12 = _figure(
+    "Figure 12: clearance spherical joint (CSJ) against the ideal model, six panels", _of_clearance, [CSJ], columns=2
+)
+FIG13 = _figure(
+    "Figure 13: flexible rod and clearance (FAR-CSJ), CSJ and ideal models, six panels",
+    _of_both,
+    (CSJ, *FAR_CSJ),
+    columns=3,
+    ensembles=True,
+)

@@ -1,4 +1,4 @@
-"""What tables 4 and 5 share: the paper's frequencies next to ours and the exact ones."""
+"""Tables 4 and 5: the paper's frequencies of the rod next to ours and the exact ones."""
 
 from __future__ import annotations
 
@@ -8,7 +8,14 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
-from flexclear.papers.wang_wang_2019.published import TABLE4_ANSYS, TABLE5_ANSYS
+from flexclear.papers.wang_wang_2019.figures import Figure
+from flexclear.papers.wang_wang_2019.published import (
+    RIGID_MODES,
+    TABLE4_ANSYS,
+    TABLE4_NORMAL_MODE,
+    TABLE5_ANSYS,
+    TABLE5_NORMAL_MODE,
+)
 from flexclear.pipeline.post.plotting.table import Table
 
 COLUMNS = (
@@ -28,7 +35,7 @@ LEAST = 1e-3  # the last digit printed [Hz]
 MEANING = "± of ours: how much the frequency changes on a mesh of four times as many elements."
 
 
-def table(
+def _table(
     title: str, data: Sequence[xr.Dataset], ansys: Sequence[float], printed: Sequence[float], rigid: int
 ) -> Table:
     """Rows of one frequency table; `rigid` zero rows come first, as the paper prints them.
@@ -121,3 +128,20 @@ def _about_shear(circle: xr.Dataset) -> str:
         f"{100 * np.nanmin(drop):.1f} to "
         f"{100 * np.nanmax(drop):.1f} % (exact Timoshenko beam against exact Rayleigh beam)."
     )
+
+
+def _figure(number: int, reference: str, ansys: Sequence[float], printed: Sequence[float], rigid: int) -> Figure:
+    """The table of a reference condition; the other arguments as of `_table`."""
+    variants = [f"sps4/frequencies/{reference}_{inertia}" for inertia in ("square", "circle")]
+    needs = tuple(f"{scene}:{modes}/rod" for modes in ("modes", "fine-modes") for scene in variants)
+    ends = f"{reference}-{reference} reference conditions"
+    title = f"Table {number}: frequencies of the rod, {ends}"
+    return Figure(
+        f"Table {number}: natural frequencies of the rod under {ends}",
+        needs,
+        lambda data: _table(title, [data[name] for name in needs], ansys, printed, rigid),
+    )
+
+
+TABLE04 = _figure(4, "fixed", TABLE4_ANSYS, TABLE4_NORMAL_MODE, rigid=0)
+TABLE05 = _figure(5, "free", TABLE5_ANSYS, TABLE5_NORMAL_MODE, rigid=RIGID_MODES)

@@ -8,14 +8,15 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure as Drawing
 from matplotlib.ticker import FixedLocator, FuncFormatter
 
+from flexclear.papers.wang_wang_2019.figures import Data, Figure
 from flexclear.papers.wang_wang_2019.models import CSJ, FAR_CSJ, IDEAL, Model, Motion, motion, references
 from flexclear.pipeline.core.artifacts.quantities import common_times
 from flexclear.pipeline.post.plotting import style
 
-NEEDS = references((IDEAL, CSJ, *FAR_CSJ), "run", "post")
+MODELS = (IDEAL, CSJ, *FAR_CSJ)
 Values = Callable[[Motion], np.ndarray]
 #: of an axis that is logarithmic on both sides
 SPIKE_TICKS = [sign * size for size in (20.0, 50.0, 100.0, 200.0, 500.0) for sign in (-1.0, 1.0)] + [0.0]
@@ -38,27 +39,11 @@ class Plane:
     spikes: bool = False
 
 
-def files(name: str, plane: Plane, data: dict[str, xr.Dataset]) -> dict[str, bytes]:
-    """One of the figures, as PNG and SVG."""
-    with style.style():
-        figure = maps(plane, data)
-        heading = plane.heading.format(x=f"{off_ideal(plane.x, data):.1%}", y=f"{off_ideal(plane.y, data):.0%}")
-        scale = "; grey band: linear scale, logarithmic outside" if plane.spikes else ""
-        style.heading(
-            figure,
-            heading,
-            "the paper calls these phase plots Poincaré maps; second row (added): states when an impact begins, hollow "
-            f"beyond the horizon{scale}",
-        )
-        return style.files(name, figure)
-
-
-def maps(plane: Plane, data: dict[str, xr.Dataset]) -> Figure:
+def _maps(plane: Plane, data: Data) -> Drawing:
     """First row: phase plots, one per model; second row: the same states at the impacts only."""
-    models = (IDEAL, CSJ, *FAR_CSJ)
-    motions = [motion(model, data) for model in models]
-    figure, axes = style.grid(2, len(models), (13.2, 5.9), sharex=True, sharey="row")
-    for column, (model, run) in enumerate(zip(models, motions, strict=True)):
+    motions = [motion(model, data) for model in MODELS]
+    figure, axes = style.grid(2, len(MODELS), (13.2, 5.9), sharex=True, sharey="row")
+    for column, (model, run) in enumerate(zip(MODELS, motions, strict=True)):
         trajectory(axes[0, column], plane, run)
         axes[0, column].set_title(_short(model), fontsize=8.4)
         at_impacts(axes[1, column], plane, run, motions[0], data[f"{model.scene}:post"])
@@ -74,10 +59,17 @@ def maps(plane: Plane, data: dict[str, xr.Dataset]) -> Figure:
             panel.axhspan(-reach, reach, color="#f4f6f8", zorder=0, lw=0)
     axes[0, 0].set_ylabel(f"phase plot\n{plane.y_label}")
     axes[1, 0].set_ylabel(f"section\n{plane.y_label}")
+    scale = "; grey band: linear scale, logarithmic outside" if plane.spikes else ""
+    style.heading(
+        figure,
+        plane.heading.format(x=f"{off_ideal(plane.x, data):.1%}", y=f"{off_ideal(plane.y, data):.0%}"),
+        "the paper calls these phase plots Poincaré maps; second row (added): states when an impact begins, hollow "
+        f"beyond the horizon{scale}",
+    )
     return figure
 
 
-def off_ideal(values: Values, data: dict[str, xr.Dataset]) -> float:
+def off_ideal(values: Values, data: Data) -> float:
     """Largest difference of the model with clearance alone from the ideal one, over that one's largest value."""
     clear, ideal = motion(CSJ, data), motion(IDEAL, data)
     i, j = common_times(clear.time, ideal.time)
@@ -120,3 +112,41 @@ def at_times(time: np.ndarray, requested: np.ndarray, *values: np.ndarray) -> tu
     nearest = np.clip(np.searchsorted(time, requested - 1e-9), 0, time.size - 1)
     index = nearest[np.abs(time[nearest] - requested) <= 1e-9]
     return tuple(value[index] for value in values)
+
+
+def _figure(title: str, plane: Plane) -> Figure:
+    return Figure(title, references(MODELS, "run", "post"), lambda data: _maps(plane, data))
+
+
+FIG14 = _figure(
+    "Figure 14: phase plots of angle and velocity along z, all models",
+    Plane(
+        lambda m: m.angle,
+        lambda m: m.velocity,
+        "angle about y0 (rad)",
+        "z velocity (mm/s)",
+        "Figure 14: impacts take the velocity up to {y} of its largest value off the ideal model's, the angle {x}",
+    ),
+)
+FIG15 = _figure(
+    "Figure 15: phase plots of displacement and velocity along z, all models",
+    Plane(
+        lambda m: m.displacement,
+        lambda m: m.velocity,
+        "z displacement (mm)",
+        "z velocity (mm/s)",
+        "Figure 15: impacts take the velocity up to {y} of its largest value off the ideal model's, the displacement "
+        "{x}",
+    ),
+)
+FIG16 = _figure(
+    "Figure 16: phase plots of velocity and acceleration along z, all models",
+    Plane(
+        lambda m: m.velocity,
+        lambda m: 1e-3 * m.acceleration,
+        "z velocity (mm/s)",
+        "z acceleration (10³ mm/s²)",
+        "Figure 16: the acceleration shows every impact; in between the platform moves without leg 1",
+        spikes=True,
+    ),
+)

@@ -1,0 +1,165 @@
+"""Tables 1, 2, 3 and 6: what the paper prints of parts, material, joint and simulation, next to what is used here."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexclear.papers.wang_wang_2019.figures import Data, Figure
+from flexclear.papers.wang_wang_2019.models import CSJ, IDEAL, JOINT
+from flexclear.papers.wang_wang_2019.published import TABLE1, TABLE2, TABLE3, TABLE6
+from flexclear.pipeline.post.plotting.table import Table
+from flexclear.pipeline.post.single_run.series import parameters
+
+HEADS = ("parameter", "paper", "ours")
+ROD = "sps4/far_cb:mesh/rod1"
+#: members of table 1 and the bodies that they are here; the others belong to the ground
+BODIES = {
+    "cylinder": "cylinder1",
+    "actuated rod": "rod1",
+    "constrained rod": "central_rod",
+    "socket on moving platform": "socket_A1",
+    "ball": "ball_A1",
+    "moving platform": "platform",
+}
+ABSENT = "–"
+
+
+def _parts(data: Data) -> Table:
+    bodies = parameters(data[f"{IDEAL.scene}:run"])["body"]
+    rows = tuple(_part(member, bodies) for member in TABLE1)
+    heads = ("member", "body here", "mass, paper (kg)", "mass, ours (kg)", "length, paper (mm)",
+             "inertia, paper (kg mm²)", "inertia, ours (kg mm²)")  # fmt: skip
+    platform = bodies["platform"]
+    side = 1e3 * np.sqrt(6.0 * np.array(platform["inertia"]).max() / platform["mass"])
+    notes = (
+        "Inertia about the centre of mass: Ixx, Iyy, Izz. The paper's first column is the normal of plate and socket, "
+        "which is z here. Members without a body belong to the ground.",
+        f"The platform's moments are those of a square plate of side {side:.1f} mm and negligible thickness: the "
+        "printed length, 100 mm, is half of its side; 200 mm of the base may be half of one, too.",
+    )
+    return Table("Table 1: physical parameters", heads, rows, notes)
+
+
+def _part(member: str, bodies: dict[str, Any]) -> tuple[str, ...]:
+    printed, name = TABLE1[member], BODIES.get(member)
+    ours = bodies[name] if name else None
+    mass = f"{ours['mass']:.2f}" if ours else ABSENT
+    return (
+        member,
+        name or ABSENT,
+        f"{printed.mass:.2f}" if printed.mass is not None else ABSENT,
+        mass,
+        f"{printed.length:g}" if printed.length is not None else ABSENT,
+        _moments(printed.inertia),
+        _moments(1e6 * np.diag(np.array(ours["inertia"]))) if ours else ABSENT,
+    )
+
+
+def _moments(values: Any) -> str:
+    return ABSENT if values is None else ", ".join(f"{v:.3f}" for v in values)
+
+
+MATERIAL = {
+    "density": ("density (kg/m³)", "{:.0f}"),
+    "poisson": ("Poisson's ratio", "{:.2f}"),
+    "youngs_modulus": ("Young's modulus (Pa)", "{:.3g}"),
+    "radius": ("radius (m)", "{:.3f}"),
+    "length": ("length (m)", "{:.3f}"),
+}
+
+
+def _material(data: Data) -> Table:
+    """Read off the mesh that the modes are made of."""
+    mesh = data[ROD]
+    young, shear = (float(np.ravel(mesh[name].values)[0]) for name in ("youngs_modulus", "shear_modulus"))
+    ours = {
+        "density": float(np.ravel(mesh.density.values)[0]),
+        "poisson": young / (2.0 * shear) - 1.0,
+        "youngs_modulus": young,
+        "radius": float(np.sqrt(np.ravel(mesh.area.values)[0] / np.pi)),
+        "length": float(np.ptp(mesh.abscissa.values)),
+    }
+    rows = tuple(
+        (words, form.format(TABLE2[name]), form.format(ours[name])) for name, (words, form) in MATERIAL.items()
+    )
+    notes = (
+        f"{mesh.sizes['cell']} beam elements, as in the paper. The mass that follows is "
+        f"{ours['density'] * np.pi * ours['radius'] ** 2 * ours['length']:.4f} kg (Table 1: 0.21 kg).",
+    )
+    return Table("Table 2: the flexible rod", HEADS, rows, notes)
+
+
+def _joint(data: Data) -> Table:
+    joint = parameters(data[f"{CSJ.scene}:run"])["joint"][JOINT]
+    socket, ball = joint["socket_material"], joint["ball_material"]
+    rows = (
+        (
+            "socket radius (mm)",
+            f"{1e3 * TABLE3['socket_radius']:g}",
+            f"{1e3 * (joint['ball_radius'] + joint['clearance']):g}",
+        ),
+        ("ball radius (mm)", f"{1e3 * TABLE3['ball_radius']:g}", f"{1e3 * joint['ball_radius']:g}"),
+        ("clearance (mm)", "0.5, as follows", f"{1e3 * joint['clearance']:g}"),
+        ("Poisson's ratio, socket and ball", f"{TABLE3['poisson']:g}", f"{socket['poisson']:g}, {ball['poisson']:g}"),
+        (
+            "Young's modulus (GPa), socket and ball",
+            f"{1e-9 * TABLE3['youngs_modulus']:g}",
+            f"{1e-9 * socket['youngs_modulus']:g}, {1e-9 * ball['youngs_modulus']:g}",
+        ),
+        ("density (kg/m³)", f"{TABLE3['density']:g}", "not used: masses are those of Table 1"),
+        ("coefficient of restitution", "not printed", f"{joint['normal']['restitution']:g}, assumed"),
+    )
+    return Table("Table 3: the joint with clearance", HEADS, rows, (_stiffness(joint),))
+
+
+def _stiffness(joint: dict) -> str:
+    """K of eq. (26), by its formula."""
+    sigma = [
+        (1.0 - m["poisson"] ** 2) / (np.pi * m["youngs_modulus"])
+        for m in (joint["socket_material"], joint["ball_material"])
+    ]
+    R, r = joint["ball_radius"] + joint["clearance"], joint["ball_radius"]
+    K = 4.0 / (3.0 * np.pi * sum(sigma)) * np.sqrt(R * r / (R - r))
+    return f"Stiffness by eq. (26): K = {K:.4g} N/m^1.5."
+
+
+def _simulation(data: Data) -> Table:
+    run = data[f"{CSJ.scene}:run"]
+    given = parameters(run)
+    joint, solver = given["joint"][JOINT], given.get("solver", {})
+    friction = joint["friction"]
+    steps = run.attrs.get("steps", 0)
+    chosen = f"chosen by the tolerance: {steps} steps in the CSJ run" if steps else "chosen by the tolerance"
+    rows = (
+        ("time span (s)", f"{TABLE6['time_span']:g}", f"{float(run.time[-1] - run.time[0]):g}"),
+        ("time step (s)", f"{TABLE6['time_step']:g}", chosen),
+        ("integration tolerance", f"{TABLE6['tolerance']:g} mm", f"{solver.get('rtol', 1e-10):g}, relative"),
+        ("power exponent", f"{TABLE6['exponent']:g}", f"{joint['normal'].get('exponent', 1.5):g}"),
+        ("static friction coefficient", f"{TABLE6['static']:g}", f"{friction['static']:g}"),
+        ("slip friction coefficient", f"{TABLE6['dynamic']:g}", f"{friction['dynamic']:g}"),
+        ("critical velocity of static friction (mm/s)", f"{TABLE6['v_static']:g}", f"{1e3 * friction['v_static']:g}"),
+        (
+            "critical velocity of dynamic friction (mm/s)",
+            f"{TABLE6['v_dynamic']:g}",
+            f"{1e3 * friction['v_dynamic']:g}",
+        ),
+    )
+    notes = (
+        "The step is printed as '0.0 0 0 01s', most likely 1e-5 s. Runs at that step and at that tolerance stand in "
+        "Table 10.",
+    )
+    return Table("Table 6: parameters of the simulation", HEADS, rows, notes)
+
+
+TABLE01 = Figure(
+    "Table 1: physical parameters of the parts, the paper's and those of the scenes", (f"{IDEAL.scene}:run",), _parts
+)
+TABLE02 = Figure("Table 2: material of the flexible actuated rod, the paper's and that of its mesh", (ROD,), _material)
+TABLE03 = Figure(
+    "Table 3: the spherical joint with clearance, the paper's and that of the scenes", (f"{CSJ.scene}:run",), _joint
+)
+TABLE06 = Figure(
+    "Table 6: parameters of the simulation, the paper's and those of the scenes", (f"{CSJ.scene}:run",), _simulation
+)

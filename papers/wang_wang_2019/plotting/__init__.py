@@ -1,1 +1,0 @@
-"""Panels, overlays and tables that several figures of the paper share."""
