@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.post.cost.study import GROUPS, MARGIN, recording, resolved
-from flexclear.pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, scale_of, style
+from flexclear.pipeline.post.plotting.style import GRID, INK, SOFT, files, heading, panels, plain, scale_of, style
 
 COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#000000")
 MARKS = ("o", "s", "D", "P", "v", "^", "X", "<", ">")
@@ -50,16 +50,13 @@ def make(
     """``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
     chosen = [str(q) for q in study["quantity"].values]
     drawn = curves(study)
-    rows, recorded = -(-len(chosen) // COLUMNS), recording(study)
+    recorded = recording(study)
     with style():
-        figure, axes = grid(rows, COLUMNS, (10.5, 1.1 + 2.7 * rows))
-        for k, ax in enumerate(axes.ravel()):
-            if k < len(chosen):
-                bound = MARGIN * float(study["reference_uncertainty"].values[k])
-                _panel(ax, chosen[k], k, (drawn, others), marks, bound)
-                _mark_recording(ax, recorded)
-            else:
-                ax.set_visible(False)
+        figure, axes = panels(len(chosen), COLUMNS, 10.5, 1.1, 2.7)
+        for k, ax in enumerate(axes):
+            _panel(ax, chosen[k], k, (drawn, others), marks, MARGIN * float(study["reference_uncertainty"].values[k]))
+            if np.isfinite(recorded):  # a line where the record of a run would stand, whatever the integration took
+                ax.axvline(recorded, color=SOFT, linewidth=0.9, linestyle=":", zorder=0)
         _legend(figure, drawn, others, marks)
         heading(figure, title, _subtitle(study))
         return files(name, figure)
@@ -140,12 +137,6 @@ def _panel(
         ax.set_ylim(bottom=0.3 * bound)
     ax.set_xlabel("CPU time of the integration (s)")
     ax.set_ylabel("relative error")
-
-
-def _mark_recording(ax: Axes, seconds: float) -> None:
-    """A line where the record of a run would stand: it costs that whatever the integration took."""
-    if np.isfinite(seconds):
-        ax.axvline(seconds, color=SOFT, linewidth=0.9, linestyle=":", zorder=0)
 
 
 def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
