@@ -117,8 +117,7 @@ def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models
     from flexclear.commands import cost as cost_command
     from flexclear.stages.workplace import open_workplace
 
-    result: xr.Dataset = cost_command.dataset(_loaded(scene), open_workplace(), budget, models)
-    return result
+    return cost_command.dataset(_loaded(scene), open_workplace(), budget, models)
 
 
 def stability(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
@@ -131,8 +130,7 @@ def stability(scene: Scene | str | Path, budget: str | float | None = None) -> x
     from flexclear.commands import answers as answers_command
     from flexclear.stages.workplace import open_workplace
 
-    result: xr.Dataset = answers_command.dataset("stability", _loaded(scene), open_workplace(), budget)
-    return result
+    return answers_command.dataset("stability", _loaded(scene), open_workplace(), budget)
 
 
 def sweep(
@@ -179,8 +177,7 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
     """
     from flexclear.commands import sections as sections_command
 
-    datasets: tuple[xr.Dataset, xr.Dataset] = sections_command.judge(_loaded(scene))
-    return datasets
+    return sections_command.judge(_loaded(scene))
 
 
 def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str]) -> xr.Dataset:
@@ -200,8 +197,7 @@ def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str
     """
     from flexclear.commands import scenes
 
-    result: xr.Dataset = scenes.sensitivities(_loaded(scene), of, to)
-    return result
+    return scenes.sensitivities(_loaded(scene), of, to)
 
 
 def quantity(run: xr.Dataset, name: str) -> xr.DataArray:
@@ -236,7 +232,9 @@ def equilibrium(
     >>> round(rest["position"].sel(body="mass", axis="z").item(), 9)  # where its spring is free [m]
     0.25
     """
-    return _linear(scene, time, drives, moving=moving, vibrations=False)
+    from flexclear.commands import scenes
+
+    return scenes.linear(_loaded(scene), time, drives, moving=moving, vibrations=False)
 
 
 def frequencies(
@@ -260,9 +258,7 @@ def frequencies(
     """
     from flexclear.commands import scenes
 
-    if speeds is None:
-        return _linear(scene, time, drives, moving=moving, vibrations=True)
-    return scenes.linear(_loaded(scene), time, drives, speeds=speeds, drive=drive)
+    return scenes.linear(_loaded(scene), time, drives, moving=moving, speeds=speeds, drive=drive)
 
 
 def compare(
@@ -296,10 +292,8 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
     from flexclear.stages.workplace import open_workplace
 
     if budget is not None:
-        some: xr.Dataset = answers_command.dataset("matters", _loaded(scene), open_workplace(), budget)
-        return some
-    dataset: xr.Dataset = effects_command.dataset(_loaded(scene), open_workplace())
-    return dataset
+        return answers_command.dataset("matters", _loaded(scene), open_workplace(), budget)
+    return effects_command.dataset(_loaded(scene), open_workplace())
 
 
 def plan(
@@ -316,8 +310,7 @@ def plan(
     from flexclear.commands import plan as plan_command
     from flexclear.stages.workplace import open_workplace
 
-    planned: tuple[Scene, xr.Dataset] = plan_command.dataset(_loaded(scene), open_workplace(), accuracy, budget)
-    return planned
+    return plan_command.dataset(_loaded(scene), open_workplace(), accuracy, budget)
 
 
 def render(scene: Scene | str | Path) -> Path:
@@ -369,19 +362,6 @@ def open(scene: Scene | str | Path) -> xr.DataTree:
     from flexclear.commands import scenes
 
     return scenes.results(scene)
-
-
-def _linear(
-    scene: Scene | str | Path,
-    time: float | None,
-    drives: Mapping[str, float] | None,
-    *,
-    moving: bool,
-    vibrations: bool,
-) -> xr.Dataset:
-    from flexclear.commands import scenes
-
-    return scenes.linear(_loaded(scene), time, drives, moving=moving, vibrations=vibrations)
 
 
 def _loaded(scene: Scene | str | Path) -> Scene:

@@ -24,6 +24,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.cost import answer, causes, price, statistics, work_precision
+    from flexclear.pipeline.post.cost.split import causes_of
     from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
     from flexclear.pipeline.post.plotting.table import files
 
@@ -37,7 +38,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     study.attrs |= {"own_seconds": cost(asis, "cpu_seconds"), "own_evaluations": cost(asis, "evaluations")}
     ensembles = _ensembles(inputs)
     # the last one is that at the tightest tolerance
-    split = split_of(points, runs, chosen, next(reversed(ensembles.values()), None))
+    tightest = next(reversed(ensembles.values()), None)
+    split = {q.name: causes_of(q, points, runs, LOCATED, tightest) for q in chosen}
     title = params["title"]
     said = tuple(dict.fromkeys(f"{track['note']}." for track in params["peers"] if track["note"]))
     said += (f"Not run within the budget: {params['undone']}.",) if params["undone"] else ()
@@ -76,12 +78,3 @@ def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any])
             errors = relative_errors(run, reference, chosen, believed(points, runs))
             found.append(Mark(name, cost(run, "cpu_seconds"), errors))
     return tuple(found)
-
-
-def split_of(
-    points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any], ensemble: xr.Dataset | None
-) -> dict[str, dict[str, float]]:
-    """Relative error of the scene as it is, by quantity and cause."""
-    from flexclear.pipeline.post.cost.split import causes_of
-
-    return {q.name: causes_of(q, points, runs, LOCATED, ensemble) for q in chosen}

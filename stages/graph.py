@@ -16,11 +16,8 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import (
     derived_series,
-    linearisation,
     meshing,
     modal_analysis,
-    overview_figures,
-    poincare_sections,
     reduction,
     rendering,
     rigid_body,
@@ -59,31 +56,33 @@ class Graph:
     @cached_property
     def mesh(self) -> dict[str, Task]:
         """By body with a recipe."""
-        for recipe in self.scene.recipes().values():
-            meshing.check_size(Path(recipe), self.scene.limits, self.recipe)
+        recipes = {body: Path(recipe) for body, recipe in self.scene.recipes().items()}
+        for recipe in recipes.values():
+            meshing.check_size(recipe, self.scene.limits, self.recipe)
         return {
-            body: self._body_task(
+            body: self._task(
                 "mesh",
-                body,
-                "flexclear.stages.meshing:run",
-                meshing.params(Path(recipe), self.recipe),
-                modules=meshing.modules(Path(recipe)),
-                context={"folder": str(Path(recipe).parent.resolve()), "file": recipe},
+                "meshing:run",
+                meshing.params(recipe, self.recipe),
+                part=body,
+                modules=meshing.modules(recipe),
+                context={"folder": str(recipe.parent.resolve()), "file": self.scene.recipes()[body]},
             )
-            for body, recipe in self.scene.recipes().items()
+            for body, recipe in recipes.items()
         }
 
     @cached_property
     def modes(self) -> dict[str, Task]:
         """By flexible body."""
+        where = self.scene.path or self.scene.name
         return {
-            body: self._body_task(
+            body: self._task(
                 "modes",
-                body,
-                "flexclear.stages.modal_analysis:run",
+                "modal_analysis:run",
                 modal_analysis.params(part),
                 {"mesh": self.mesh[body]},
-                modal_analysis.modules(part, f"{self.scene.path or self.scene.name} [body.{body}.modes]"),
+                part=body,
+                modules=modal_analysis.modules(part, f"{where} [body.{body}.modes]"),
             )
             for body, part in self.scene.flexible().items()
         }
@@ -91,17 +90,15 @@ class Graph:
     @cached_property
     def bundle(self) -> dict[str, Task]:
         """By flexible body."""
+        kinds = {body: meshing.kind_of(Path(part.mesh)) for body, part in self.scene.flexible().items()}
         return {
-            body: self._body_task(
+            body: self._task(
                 "bundle",
-                body,
-                "flexclear.stages.reduction:run",
+                "reduction:run",
                 reduction.params(self.scene, body),
                 {"mesh": self.mesh[body], "modes": self.modes[body]},
-                (
-                    *meshing.modules(Path(part.mesh)),
-                    *reduction.modules(self.scene, body, meshing.kind_of(Path(part.mesh))),
-                ),
+                part=body,
+                modules=(*meshing.modules(Path(part.mesh)), *reduction.modules(self.scene, body, kinds[body])),
             )
             for body, part in self.scene.flexible().items()
         }
@@ -110,13 +107,13 @@ class Graph:
     def rigid(self) -> dict[str, Task]:
         """By rigid body with a recipe."""
         return {
-            body: self._body_task(
+            body: self._task(
                 "rigid",
-                body,
-                "flexclear.stages.rigid_body:run",
+                "rigid_body:run",
                 {},
                 {"mesh": self.mesh[body]},
-                meshing.modules(Path(part.mesh)),
+                part=body,
+                modules=meshing.modules(Path(part.mesh)),
             )
             for body, part in self.scene.meshed().items()
         }
@@ -124,51 +121,40 @@ class Graph:
     @cached_property
     def simulate(self) -> Task:
         """One run; shown as ``run.nc``."""
-        return self._simulation("simulate", "flexclear.stages.simulation:run", "run.nc", ensemble=False)
+        return self._simulation("simulate", simulation.params(self.scene), "run")
 
     @cached_property
     def ensemble(self) -> Task | None:
         """Members of the ensemble, if the scene asks for one."""
         if self.scene.ensemble is None:
             return None
-        return self._simulation("ensemble", "flexclear.stages.simulation:run_ensemble", "ensemble.nc", ensemble=True)
+        return self._simulation("ensemble", simulation.params(self.scene, ensemble=True))
 
     @cached_property
     def sections(self) -> Task:
         """The motion sampled once in each period of its laws; shown as ``sections.nc``."""
-        params, modules = poincare_sections.params(self.scene), simulation.modules(self.scene)
-        return self._scene_task(
-            "sections",
-            "flexclear.stages.poincare_sections:run",
-            params,
-            self.bodies(),
-            names={"nc": "sections.nc"},
-            modules=modules,
-        )
+        params = simulation.params(self.scene, sections=True, without=("output", "accuracy"))
+        return self._simulation("sections", params)
 
     def sensitivities(self, of: Sequence[str], to: Sequence[str]) -> Task:
         """Derivatives of quantities by numbers of the scene, up to the horizon of its run."""
         params = {**simulation.params(self.scene), "of": list(of), "to": list(to)}
-        modules, function = simulation.modules(self.scene), "flexclear.stages.sensitivities:run"
-        inputs = {**self.bodies(), **({"run": self.simulate} if self.scene.contacts() or self.scene.stop else {})}
-        return replace(self._scene_task("sensitivities", function, params, inputs, modules=modules), folder="")
+        task = self._simulation("sensitivities", params)
+        run = {"run": self.simulate} if self.scene.contacts() or self.scene.stop else {}
+        return replace(task, inputs={**task.inputs, **run}, names={}, folder="")
 
     @cached_property
     def verdict(self) -> Task:
         """Whether that motion is periodic, quasi-periodic or chaotic; shown as ``verdict.nc`` and a figure."""
-        inputs = {"sections": self.sections}
         # the figure is headed by the name, which is a fact for once
-        params: dict[str, object] = {"scene": self.scene.name}
-        return self._scene_task(
-            "verdict", "flexclear.stages.motion_verdict:run", params, inputs, names={"nc": "verdict.nc"}
-        )
+        params = {"scene": self.scene.name}
+        return self._task("verdict", "evaluation:verdict", params, {"sections": self.sections}, shown="verdict")
 
     @cached_property
     def post(self) -> Task:
         """What is derived from the run."""
         inputs = {"run": self.simulate} | ({"ensemble": self.ensemble} if self.ensemble else {})
-        params = derived_series.params(self.scene)
-        return self._scene_task("post", "flexclear.stages.derived_series:run", params, inputs, names={"nc": "post.nc"})
+        return self._task("post", "derived_series:run", derived_series.params(self.scene), inputs, shown="post")
 
     @cached_property
     def render(self) -> dict[str, Task]:
@@ -179,15 +165,13 @@ class Graph:
 
     def picture(self, what: str, kind: str, time: float | None = None) -> Task:
         """One of what `rendering.FORMATS` lists; `time`: of vibrations, as of `linear`."""
-        params = rendering.params(self.scene, what, kind)
-        bundles = {f"bundle/{body}": task for body, task in self.bundle.items()}
-        source = (
-            {} if what == "modes" else {"linear": self.linear(time)} if what == "vibrations" else {"run": self.simulate}
-        )
-        inputs: dict[str, Task] = {**source, **bundles}
-        task = self._scene_task("render", "flexclear.stages.rendering:run", params, inputs)
-        folder = self._folder("paraview" if kind == "pvd" else "")
-        return replace(task, part=f"{what} {kind}", folder=folder)
+        inputs = {f"bundle/{body}": task for body, task in self.bundle.items()}
+        if what == "vibrations":
+            inputs["linear"] = self.linear(time)
+        elif what != "modes":
+            inputs["run"] = self.simulate
+        task = self._task("render", "rendering:run", rendering.params(self.scene, what, kind), inputs)
+        return replace(task, part=f"{what} {kind}", folder=self._folder("paraview" if kind == "pvd" else ""))
 
     def linear(
         self,
@@ -198,17 +182,9 @@ class Graph:
         vibrations: bool = True,
     ) -> Task:
         """Equilibrium in one pose; with its natural vibrations shown as ``linear.nc``, else as ``equilibrium.nc``."""
-        params = linearisation.params(self.scene, time, drives, moving=moving, vibrations=vibrations)
-        name = "linear" if vibrations else "equilibrium"
-        modules = simulation.modules(self.scene)
-        return self._scene_task(
-            name,
-            "flexclear.stages.linearisation:run",
-            params,
-            self.bodies(),
-            names={"nc": f"{name}.nc"},
-            modules=modules,
-        )
+        pose = {"time": time, "drives": dict(drives or {}), "moving": moving, "vibrations": vibrations}
+        params = {**simulation.params(self.scene, without=("output",)), "pose": pose}
+        return self._simulation("linear" if vibrations else "equilibrium", params, function="linear")
 
     def campbell(
         self,
@@ -218,12 +194,8 @@ class Graph:
         drives: Mapping[str, float] | None = None,
     ) -> Task:
         """Vibrations over the speed of a drive, shown as ``campbell.nc``."""
-        params = linearisation.campbell_params(self.scene, speeds, drive, time, drives)
-        modules = simulation.modules(self.scene)
-        function = "flexclear.stages.linearisation:campbell"
-        return self._scene_task(
-            "campbell", function, params, self.bodies(), names={"nc": "campbell.nc"}, modules=modules
-        )
+        params = {**self.linear(time, drives, moving=True).params, "speeds": list(map(float, speeds)), "drive": drive}
+        return self._simulation("campbell", params, function="linear")
 
     def up_to(self, stage: str) -> list[Task]:
         """All tasks of the scene up to a stage, that stage included."""
@@ -279,9 +251,8 @@ class Graph:
     def overview(self) -> Task:
         """General figures of the run."""
         inputs = {"run": self.simulate, "post": self.post}
-        task = self._scene_task(
-            "overview", "flexclear.stages.overview_figures:run", overview_figures.params(self.scene), inputs
-        )
+        watched = {"watched": [quantity.written() for quantity in self.scene.watched()]}
+        task = self._task("overview", "evaluation:overview", watched, inputs)
         return replace(task, part="figures", folder=self._folder("figures"))
 
     @cached_property
@@ -295,54 +266,41 @@ class Graph:
             f"{rigid_body.PREFIX}{body}": task for body, task in self.rigid.items()
         }
 
-    def _simulation(self, stage: str, run: str, name: str, *, ensemble: bool) -> Task:
-        params = simulation.params(self.scene, ensemble=ensemble)
-        modules = simulation.modules(self.scene)
-        return self._scene_task(stage, run, params, self.bodies(), names={"nc": name}, modules=modules)
+    def _simulation(self, stage: str, params: Mapping[str, Any], shown: str = "", function: str = "") -> Task:
+        """A task of `stages.simulation`; function, shown: where they are not called as the stage."""
+        run, modules = f"simulation:{function or shown or stage}", simulation.modules(self.scene)
+        return self._task(stage, run, params, self.bodies(), shown=shown or stage, modules=modules)
 
     def _folder(self, below: str = "") -> str:
         return f"runs/{self.scene.name}/{below}".rstrip("/") if self.shown else ""
 
-    def _scene_task(
+    def _task(
         self,
         stage: str,
         run: str,
-        params: dict[str, object],
-        inputs: dict[str, Task],
-        names: dict[str, str] | None = None,
+        params: Mapping[str, Any],
+        inputs: Mapping[str, Task] | None = None,
+        *,
+        part: str = "",
+        shown: str = "",
         modules: tuple[str, ...] = (),
+        context: Mapping[str, Any] | None = None,
     ) -> Task:
-        return Task(
-            stage=stage,
-            scene=self.scene.name,
-            context={"name": self.scene.name, "limits": self.scene.limits.written()},
-            run=run,
-            params=params,
-            folder=self._folder(),
-            inputs=inputs,
-            names=names or {},
-            modules=modules,
-        )
+        """run: ``module:function`` of `stages`.  part: of a body, which then has its files in a folder of the stage.
 
-    def _body_task(
-        self,
-        stage: str,
-        body: str,
-        run: str,
-        params: dict[str, object],
-        inputs: dict[str, Task] | None = None,
-        modules: tuple[str, ...] = (),
-        context: dict[str, str] | None = None,
-    ) -> Task:
+        shown: name of the dataset, without its ending, where it is not the store's.
+        """
+        names = {"nc": f"{part}.nc", "vtu": f"{part}.vtu"} if part else {"nc": f"{shown}.nc"} if shown else {}
+        of_scene = {} if part else {"name": self.scene.name, "limits": self.scene.limits.written()}
         return Task(
             stage=stage,
             scene=self.scene.name,
-            part=body,
-            context=context or {},
-            run=run,
+            part=part,
+            context=context or of_scene,
+            run=f"flexclear.stages.{run}",
             params=params,
-            folder=self._folder(stage),
+            folder=self._folder(stage if part else ""),
             inputs=inputs or {},
-            names={"nc": f"{body}.nc", "vtu": f"{body}.vtu"},
+            names=names,
             modules=modules,
         )

@@ -31,13 +31,6 @@ FILMED = ("motion", "stress")
 SEEN = ("direction", "up", "zoom", "exaggeration", "duration", "impact_slowdown")
 
 
-def gl_state() -> str:
-    """Which GL libraries this machine has; part of the key of everything that is drawn with them."""
-    from flexclear.pipeline.post.render import gl
-
-    return gl.state()
-
-
 def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     """What is shown and how: what the scene says of its pictures, what is watched, the GL libraries where they matter.
 
@@ -45,7 +38,9 @@ def params(scene: Scene, what: str, kind: str) -> dict[str, Any]:
     """
     values: dict[str, Any] = {"what": what, "format": kind}
     if what in ("motion", "stress", "vibrations") and kind in ("png", "gif", "mp4"):
-        values["gl"] = gl_state()
+        from flexclear.pipeline.post.render import gl
+
+        values["gl"] = gl.state()  # which GL libraries this machine has
     if kind == "html":
         values["title"] = scene.title
     if what != "modes":

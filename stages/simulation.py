@@ -1,15 +1,19 @@
-"""Stage 4: scene and bundles -> one run, or an ensemble of runs."""
+"""Stage 4 and what is next to it: scene and bundles -> a run, an ensemble, sections, derivatives, vibrations."""
 
 from __future__ import annotations
 
+import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene import provenance
 from flexclear.pipeline.core.scene.appearance import UNSEEN
-from flexclear.pipeline.core.scene.resource_estimate import check_run
+from flexclear.pipeline.core.system import machine
+from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.core.workflow.task import given_arrays
 from flexclear.stages import rigid_body
@@ -26,16 +30,29 @@ Data = TypeVar("Data")
 #: limits of a scene that is made again without its own: what it asks for was judged when it was read
 JUDGED = {"rows": sys.maxsize, "members": sys.maxsize}
 
+#: bytes of a row of a run, fitted to runs of 1 to 24 bodies: always, of a body, joint, contact, load, coordinate
+ALWAYS, BODY, JOINT, CONTACT, LOAD, MODE = 200, 160, 100, 350, 100, 24
+#: a run is in memory so many times at its end, measured 3.5 to 4.4; and on disk, in the cache and shown
+HELD, KEPT = 4.5, 2.0
+#: of a member of an ensemble only some bodies' motion is recorded, at most as often as this
+MEMBER_ROWS = 2000
+SPEND = "choose a longer output.interval, or say more in [limits]"
 
-def params(scene: Scene, *, ensemble: bool = False, sections: bool = False) -> dict[str, Any]:
+
+def params(
+    scene: Scene, *, ensemble: bool = False, sections: bool = False, without: Sequence[str] = ()
+) -> dict[str, Any]:
     """What the engine sees of a scene. Titles, views, shapes, limits, sources, and paths of files are not
     part of it, nor are the ensemble and the sections of a single run, nor in an ensemble the accuracy of a single run,
-    nor whether that may be missed."""
-    unseen = ("title", "description", "view", "limits", "accuracy" if ensemble else "ensemble")
+    nor whether that may be missed.
+
+    without: further settings that what is computed does not depend on.
+    """
+    unseen = ("title", "description", "view", "limits", "accuracy" if ensemble else "ensemble", *without)
     left_out: dict[str, Any] = dict.fromkeys(unseen, True)
     left_out["body"] = {"__all__": set(UNSEEN)}
     if not ensemble:
-        left_out["accuracy"] = {"allow_missed"}
+        left_out.setdefault("accuracy", {"allow_missed"})
     if not sections:
         left_out["sections"] = True
     table = scene.model_dump(mode="json", exclude=left_out, exclude_none=True)
@@ -65,10 +82,38 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, Labelled], progress: Pro
     lacks = missing_compliance(scene, reduced)
     for text in lacks:
         progress(None, text)
-    with stopping.until(scene.limits.time, scene.limits.time_words):
+    with _in_time(scene):
         simulated = dynamics.simulated(scene, reduced, progress)
     warnings = "\n".join(filter(None, [str(simulated.attrs.get("warnings", "")), *lacks]))
     return {"nc": simulated.assign_attrs(warnings=warnings) if warnings else simulated}
+
+
+def check_run(scene: Scene, results: Path) -> None:
+    """ResourceError when a run or an ensemble of the scene would need more memory or disk than it may."""
+    rows = (scene.time.end - scene.time.start) / scene.output.interval + 1.0
+    need = rows * row(scene)
+    what = f"a run of {rows:.3g} rows"
+    machine.require_memory(HELD * need, what, SPEND, scene.limits.memory)
+    machine.require_disk(KEPT * need, what, results, SPEND, scene.limits.disk)
+    if scene.ensemble is not None:
+        n_bodies = len(scene.ensemble.bodies or scene.contacts() or scene.body)
+        need = scene.ensemble.members * min(rows, MEMBER_ROWS) * n_bodies * BODY
+        what = f"an ensemble of {scene.ensemble.members} members"
+        machine.require_memory(HELD * need, what, "ask for fewer members, or say more in [limits]", scene.limits.memory)
+    for name, body in scene.flexible().items():
+        if isinstance(body.modes.count, int) and body.modes.count > scene.limits.modes:
+            raise ResourceError(
+                f"body.{name}.modes.count = {body.modes.count} is more than the {scene.limits.modes} that limits.modes "
+                "allows: matrices of that size are factorised at every step"
+            )
+
+
+def row(scene: Scene) -> int:
+    """Bytes of a row of the scene's run, about."""
+    modes = sum(b.modes.count if isinstance(b.modes.count, int) else 30 for b in scene.flexible().values())
+    counts = (len(scene.owners()["body"]), len(scene.joint), len(scene.owners()["contact"]), len(scene.forces()), modes)
+    each = (BODY, JOINT, CONTACT, LOAD, MODE)
+    return ALWAYS + sum(count * size for count, size in zip(counts, each, strict=True))
 
 
 def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[str]:
@@ -86,14 +131,57 @@ def missing_compliance(scene: Scene, reduced: Mapping[str, Labelled]) -> list[st
     return messages
 
 
-def run_ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+def ensemble(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """All members (schema ENSEMBLE); inputs are ``bundle/<body>``."""
     from flexclear.pipeline import dynamics
 
     scene = rebuild(params, inputs)
     check_run(scene, results_root())
-    with stopping.until(scene.limits.time, scene.limits.time_words):
+    with _in_time(scene):
         return {"nc": dynamics.ensemble(scene, bundles(inputs), progress)}
+
+
+def sections(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Sections of a periodic motion (schema SECTIONS); inputs are ``bundle/<body>``."""
+    from flexclear.pipeline import dynamics
+
+    scene = rebuild(params, inputs)
+    with _in_time(scene):
+        return {"nc": dynamics.sections(scene, bundles(inputs), progress)}
+
+
+def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """Derivatives of quantities `of` by numbers of the scene, `to`.
+
+    inputs: ``bundle/<body>``, and ``run`` of a scene with contacts, which has the horizon.
+    """
+    from flexclear.pipeline import dynamics
+
+    scene = rebuild(params, inputs)
+    horizon = float(inputs["run"]["horizon"]) if "run" in inputs else math.inf
+    with _in_time(scene):
+        names = params["of"], params["to"]
+        return {"nc": dynamics.sensitivities(scene, bundles(inputs), progress, *names, horizon)}
+
+
+def linear(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
+    """The equilibrium in a `pose` (schema EQUILIBRIUM), or with its vibrations (schema LINEAR); over the speeds of a
+    drive these alone (schema CAMPBELL).  Inputs are ``bundle/<body>``."""
+    from flexclear.pipeline import dynamics
+
+    pose, scene, reduced = params["pose"], rebuild(params, inputs), bundles(inputs)
+    where = pose["time"], pose["drives"]
+    if "speeds" in params:
+        return {"nc": dynamics.campbell(scene, reduced, progress, params["speeds"], params["drive"], *where)}
+    solve = dynamics.frequencies if pose["vibrations"] else dynamics.equilibrium
+    return {"nc": solve(scene, reduced, progress, *where, pose["moving"])}
+
+
+@contextmanager
+def _in_time(scene: Scene) -> Iterator[None]:
+    """Meanwhile work is to stop when the time is over that the scene allows."""
+    with stopping.until(scene.limits.time, scene.limits.time_words):
+        yield
 
 
 def bundles(inputs: Mapping[str, Data]) -> dict[str, Data]:

@@ -12,7 +12,7 @@ import time
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.paths import TREE, results_root
 from flexclear.pipeline.core.artifacts.store import Store
@@ -24,6 +24,9 @@ from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import limit
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 #: options that mean the same on every command: how argparse adds each
 OPTIONS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
@@ -91,6 +94,12 @@ class Workplace:
         """Bring tasks up to date, in so many processes at most; default: this workplace's, else the cores there are."""
         with self.limited():
             return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
+
+    def datasets(self, *tasks: Task, jobs: int | None = None) -> list[xr.Dataset]:
+        """What tasks make, brought up to date; FailedTasksError where one of them, or of their inputs, fails."""
+        outcome = self.bring(list(tasks), jobs)
+        check(outcome)
+        return [self.store.load(outcome.records[id(task)]) for task in tasks]
 
     def limited(self) -> AbstractContextManager[None]:
         """Meanwhile work is to stop when the time is over that the command was given."""

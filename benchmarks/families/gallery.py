@@ -139,6 +139,14 @@ def _bracket(linear: xr.Dataset, scene: Scene) -> str:
     return f"It swings at {swing:.2f} Hz; its first vibration of the metal has {bend:.0f} Hz."
 
 
+def _meshed_rod(run: xr.Dataset, scene: Scene) -> str:
+    angle, place = run["joint_position"].sel(coordinate="main"), run["position"].sel(body="piston", axis="x")
+    ideal = 0.04 * np.cos(angle) + np.sqrt(0.16**2 - (0.04 * np.sin(angle)) ** 2)
+    force = np.linalg.norm(run["joint_force"].sel(joint="wrist"), axis=1).max()
+    off = 1e6 * float(abs(place - ideal).max())
+    return f"Up to {force:.0f} N go through the rod, and the piston is up to {off:.0f} µm off."
+
+
 def _bricard(run: xr.Dataset, scene: Scene) -> str:
     return (
         f"It has {int(run['mobility'][0])} freedom, though counting joints leaves none; "
@@ -271,6 +279,7 @@ ENTRIES = {
         Entry("checks/governor", "At which speed does it settle, and how high is the sleeve?", _governor),
         Entry("checks/overhung_rotor", "Which whirls has a disc on a turning shaft?", _rotor, linear=True, moving=True),
         Entry("gallery/bracket", "Which frequencies has a part meshed with Gmsh on its pin?", _bracket, linear=True),
+        Entry("gallery/meshed_rod", "What do a loose pin and a meshed rod do to a piston?", _meshed_rod),
         Entry("checks/bricard", "How many freedoms has it?", _bricard, {"time.end": "1 s"}),
         Entry("checks/andrews_squeezer", "How fast does the squeezer run away?", _squeezer),
         Entry("checks/gears", "Which ratio has the planetary train?", _gears, {"time.end": "0.2 s"}),

@@ -27,8 +27,8 @@ from benchmarks.reference_conditions.design import (
     TOP,
     Case,
 )
-from flexclear.commands.scenes import Workplace, check, open_workplace
 from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
+from flexclear.stages.workplace import Workplace, check, open_workplace
 
 #: directions in the axes of the rod's frames, z along the rod: axial, bending, torsion
 DIRECTIONS = ("z", "x", "rz")

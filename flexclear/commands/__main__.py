@@ -20,6 +20,7 @@ from typing import NoReturn
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.system.errors import INTERRUPTED, FlexclearError, InputError, ResourceError, shown
 from flexclear.pipeline.core.system.platforms import plain_output, reader_has_gone
+from flexclear.pipeline.core.system.version import version
 from flexclear.pipeline.core.workflow import workers
 
 CLOSED_PIPE = 141
@@ -117,23 +118,12 @@ def require_command(name: str) -> None:
     raise InputError(name, "there is no such command", suggestion(name, COMMANDS))
 
 
-class Version(argparse.Action):
-    """Prints the version, which is searched for when it is asked for."""
-
-    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> None:
-        """Print it and end."""
-        from flexclear.pipeline.core.system.version import version
-
-        print(f"flexclear {version()}")
-        parser.exit()
-
-
 def parser(arguments: list[str]) -> argparse.ArgumentParser:
     """The command line: one sub-command per verb; the module of the one that `arguments` ask for is imported."""
     if arguments:
         require_command(arguments[0])
     top = Parser(prog="flexclear", description="Flexible multibody mechanisms with joint clearance.")
-    top.add_argument("--version", action=Version, nargs=0, help="say the version")
+    top.add_argument("--version", action="version", version=f"flexclear {version()}", help="say the version")
     verbs = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     asked = [verb for verb in COMMANDS if verb in arguments[:1]]
     for verb in asked or COMMANDS:  # all of them only where their list is reported

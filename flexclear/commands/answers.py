@@ -15,10 +15,9 @@ from typing import TYPE_CHECKING
 from flexclear.commands import cost
 from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.ideal import ideal, loose
 from flexclear.pipeline.core.scene.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.scene.load import edited
-from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect
+from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import effect_ranking, kernels, limit, watched_quantities
@@ -240,9 +239,11 @@ class _Comparison:
             pairs |= dict.fromkeys(waiting, members)
             full = self._point("", members)
             waiting = [n for n in waiting if undecided(Pair(full, self._point(n, members), members), self.chosen)]
-        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: IDEAL}
+        both = self._gone.get(IDEAL)  # a single effect may be all of them: it is not listed twice
+        alone = any(gone == both for name, gone in self._gone.items() if name != IDEAL)
+        words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if alone else IDEAL}
         made = {name: (self._variant(name), self.tasks[name]) for name in ("", *names)}
-        left = [words[name] for name in undone]
+        left = [words[name] for name in undone if words[name]]
         return effect_ranking.task(self.scene, self.chosen, words, made, pairs, left)
 
     def _affordable(self) -> tuple[list[str], list[str]]:

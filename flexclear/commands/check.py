@@ -212,23 +212,10 @@ def _each(error: FlexclearError) -> list[FlexclearError]:
 
 
 def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
+    record = {"severity": severity, "file": None, "line": None, "place": "", "problem": str(mistake), "remedy": None}
     if not isinstance(mistake, InputError):
-        problem = str(mistake)
-        return {
-            "severity": severity,
-            "file": None,
-            "line": None,
-            "place": "",
-            "problem": problem,
-            "remedy": None,
-        }
+        return record
     location = lines.where(mistake)
     file, line = (str(location[0]), location[1]) if location else (None, None)
-    return {
-        "severity": severity,
-        "file": file,
-        "line": line,
-        "place": mistake.place,
-        "problem": mistake.problem,
-        "remedy": mistake.remedy,
-    }
+    place = {"file": file, "line": line, "place": mistake.place}
+    return {**record, **place, "problem": mistake.problem, "remedy": mistake.remedy}

@@ -87,16 +87,12 @@ def _unused(reached: Collection[str], parts: Collection[str]) -> Iterator[str]:
     They are imported for their types, or by each other, and do nothing for the scene.
     """
     for family in reached:
-        listed = getattr(import_module(family), "NAMES", None) if _is_package(family, reached) else None
+        inside = {name for name in reached if name.startswith(f"{family}.")}
+        listed = getattr(import_module(family), "NAMES", None) if inside else None
         if listed is None:
             continue
-        inside = {name for name in reached if name.startswith(f"{family}.")}
         those = {f"{family}.{where.partition(':')[0]}" for where in listed.values()}
         yield from (inside & those) - set(parts) if inside & set(parts) else inside
-
-
-def _is_package(name: str, reached: Collection[str]) -> bool:
-    return any(other.startswith(f"{name}.") for other in reached)
 
 
 def named(source: str) -> Iterator[str]:

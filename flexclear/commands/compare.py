@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from flexclear.commands import as_json
 from flexclear.commands.scenes import graphs, joined, print_files, scene_arguments
 from flexclear.pipeline.core.artifacts.store import Record, publish
-from flexclear.pipeline.core.scene.ideal import EFFECTS, ideal, loose
+from flexclear.pipeline.core.scene.variants import EFFECTS, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages.graph import Graph
@@ -146,13 +146,9 @@ def parts(comparison: Comparison) -> list[Part]:
     pictures = [
         media(name, comparison.file(name).read_bytes(), text)
         for name, text in PICTURES.items()
-        if _there(comparison, name)
+        if name in comparison.record.files
     ]
     return [Part("differences", "Differences and errors", tables), Part("runs", "Side by side", "".join(pictures))]
-
-
-def _there(comparison: Comparison, name: str) -> bool:
-    return name in comparison.record.files
 
 
 def _labels(sides: list[Scene]) -> list[str]:
@@ -168,7 +164,7 @@ def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:
     return Task(
         stage="comparison",
         scene=labels[-1],
-        run="flexclear.stages.run_comparison:run",
+        run="flexclear.stages.evaluation:comparison",
         params={"labels": labels, "quantities": list(quantities.values())},
         inputs=inputs,
         folder=f"compare/{joined(labels)}",

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from flexclear.commands import as_json, cost_design, cost_peers, scenes
 from flexclear.commands.cost_peers import Track
-from flexclear.commands.scenes import Workplace, bundles, check
+from flexclear.commands.scenes import Workplace, bundles
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.solver import of_run
@@ -113,6 +113,9 @@ class Study:
     evaluations: dict[str, dict[float, float]] = field(default_factory=dict)
     own: float = 0.0
     pace: float = 0.0
+    _complete: bool = False
+    _ensembles: dict[str, Task] = field(default_factory=dict)
+    _compiled: dict[tuple[str, ...], Task] = field(default_factory=dict)
 
     def begin(self) -> None:
         """Make the scene's own run, which predicts what others will take.
@@ -159,10 +162,8 @@ class Study:
     def setting(self) -> cost_design.Setting:
         """How the scene's own run is integrated, as the run says where the scene leaves it open."""
         graph = Graph(self.scene, shown=False)
-        outcome = self.workplace.bring([graph.simulate])
-        check(outcome)
-        text = self.workplace.store.load(outcome.records[id(graph.simulate)]).attrs
-        return cost_design.Setting(*of_run(self.scene.solver, self.scene.by_need(), text), self.scene.solver.step)
+        (run,) = self.workplace.datasets(graph.simulate)
+        return cost_design.Setting(*of_run(self.scene.solver, self.scene.by_need(), run.attrs), self.scene.solver.step)
 
     def task(self) -> Task:
         """The task of the study of all points that there are."""
@@ -192,9 +193,7 @@ class Study:
     def drawn(self) -> tuple[xr.Dataset, Path]:
         """The dataset of the points so far, and the folder with its tables and figures."""
         task = self.task()
-        outcome = self.workplace.bring([task])
-        check(outcome)
-        return self.workplace.store.load(outcome.records[id(task)]), self.workplace.store.root / task.folder
+        return self.workplace.datasets(task)[0], self.workplace.store.root / task.folder
 
     def ensembles(self) -> None:
         """Ensembles at several tolerances, of a scene that has one, as far as the budget goes."""
@@ -206,13 +205,8 @@ class Study:
                 self.undone.append(design)
                 continue
             task = _measured(design, "run_ensemble", {"quantities": names}, self._kernels(design))
-            check(self.workplace.bring([task]))
+            self.workplace.datasets(task)
             self._ensembles[f"ensemble:rtol {rtol:g}"] = task
-
-    def __post_init__(self) -> None:
-        self._complete = False
-        self._ensembles: dict[str, Task] = {}
-        self._compiled: dict[tuple[str, ...], Task] = {}
 
     def _queue(self, designs: Sequence[cost_design.Design]) -> None:
         """Make points in this order; those that the budget no longer holds are left undone."""
@@ -232,11 +226,8 @@ class Study:
         names, first = [q.name for q in self._chosen], kernels.shared(design.scene) not in self._compiled
         compiled = self._kernels(design)
         task = _measured(design, "run", {"quantities": names, "brief": bool(self.points)}, compiled)
-        outcome = self.workplace.bring([task, compiled] if first else [task])
-        check(outcome)
-        record = self.workplace.store.load(outcome.records[id(task)])
-        if first:
-            self.spent += float(self.workplace.store.load(outcome.records[id(compiled)]).attrs["compile_seconds"])
+        record, *kernel = self.workplace.datasets(*([task, compiled] if first else [task]))
+        self.spent += sum(float(one.attrs["compile_seconds"]) for one in kernel)
         self.runs[design.key] = task
         self.points.append(design)
         solver = design.scene.solver

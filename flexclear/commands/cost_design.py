@@ -119,14 +119,6 @@ def wide(scene: Scene, integrators: Collection[str] = ()) -> list[Design]:
     return [*result, _design(scene, "paper", paper, f"{_words(paper)}, as the paper")]
 
 
-def models(scene: Scene, own: Setting, highest: float) -> list[Design]:
-    """Mode sets by the frequencies that they reach, finer meshes, and another beam theory, with the own integrator.
-
-    highest: the highest frequency that the scene's bundles hold [Hz].
-    """
-    return list(_models(scene, own, highest))
-
-
 def _tolerant(scene: Scene, integrator: str, rtol: float) -> Design:
     solver = {"integrator": integrator, "rtol": rtol}
     return _design(scene, "tolerance", solver, adaptive_integrator=integrator, rtol=rtol)
@@ -167,7 +159,11 @@ def _sampling(scene: Scene, own: Setting) -> Iterator[Design]:
     yield Design("denser output", "sampling", {"interval": interval / FINER_OUTPUT}, finer)
 
 
-def _models(scene: Scene, own_setting: Setting, highest: float) -> Iterator[Design]:
+def models(scene: Scene, own_setting: Setting, highest: float) -> Iterator[Design]:
+    """Mode sets by the frequencies that they reach, finer meshes, and another beam theory, with the own integrator.
+
+    highest: the highest frequency that the scene's bundles hold [Hz].
+    """
     recipes = [read_toml(Path(body.mesh)) for body in scene.flexible().values()]
     own_theory = str(recipes[0].get("theory", "rayleigh"))
     own = next(iter(scene.flexible().values())).modes.reference

@@ -8,16 +8,27 @@ import platform
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
-from importlib import import_module
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from flexclear.commands import export, reproduction, scenes
+from flexclear.commands import export, new, reproduction, scenes
 from flexclear.pipeline.core.artifacts.paths import kernel_root, results_root
-from flexclear.pipeline.core.system import machine, platforms
+from flexclear.pipeline.core.artifacts.store import Store
+from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.fingerprint import TREE, library_version
-from flexclear.stages.workplace import add_options, open_workplace
+from flexclear.stages import simulation
+from flexclear.stages.workplace import Workplace, add_options, open_workplace
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.core.system.progress import Progress
+    from flexclear.stages.graph import Graph
 
 LIBRARIES = (
     "numpy",
@@ -36,8 +47,6 @@ OPTIONAL = ("pyvista", "vtk", "imageio")
 LABELS = {True: "ok   ", False: "WRONG", None: "lacks"}
 #: least space that is no reason to worry [B]
 LITTLE_MEMORY, LITTLE_DISK, LITTLE_FOR_KERNELS = 1e9, 2e9, 1e8
-#: characters of the longest path below the results, but for names of scenes that are longer than usual
-DEEPEST = 130
 #: a body in free fall: after the time T [s] it has fallen by g T^2/2
 GRAVITY, T = 9.81, 0.1
 SCENE = f"""
@@ -65,6 +74,8 @@ except FlexclearError as error:
     sys.exit(str(error))
 print(float(result.position.sel(body="ball", axis="z")[-1]))
 """
+#: templates that represent the kinds of parts that most mechanisms have
+USUAL = ("pendulum", "four-bar", "slider-crank", "leg")
 #: integration is exact to its tolerance, 1e-10 of metres
 CLOSE = 1e-9
 
@@ -112,7 +123,7 @@ def command(options: argparse.Namespace) -> None:
             raise UnwellError("it does not end here as it did there")
         return
     if options.compile is not None:
-        names = import_module("flexclear.commands.compile_ahead").compiled(options.compile, open_workplace())
+        names = compiled_for(options.compile, open_workplace())
         print(f"compiled: all that runs of {', '.join(names)} call; {_kernels()[0]}")
         return
     wrong = []
@@ -146,10 +157,6 @@ def _results(root: Path) -> tuple[str, bool]:
     wrong = [f"less than {machine.size(LITTLE_DISK)}"] if free <= LITTLE_DISK else []
     if not os.access(next(p for p in (root, *root.parents) if p.exists()), os.W_OK):
         wrong.append("nothing can be written there: FLEXCLEAR_RESULTS names another folder")
-    if len(str(root)) + DEEPEST > platforms.longest_path():
-        wrong.append(
-            f"longer than paths to files may be here ({platforms.longest_path()} characters with {DEEPEST} of ours)"
-        )
     return "; ".join([f"{root}, {machine.size(free)} free", *wrong]), not wrong
 
 
@@ -204,3 +211,45 @@ def _self_test() -> tuple[str, bool]:
         return f"a free fall cannot be computed: {' '.join(line.strip() for line in last_lines)}", False
     fine = abs(float(lines[-1]) - expected) < CLOSE
     return f"a free fall of {T:g} s ends at {float(lines[-1]):.12g} m, and should at {expected:.12g} m", fine
+
+
+def compiled_for(names: list[str], workplace: Workplace) -> list[str]:
+    """Compile, or fetch, what runs of scenes call; the usual ones' without names.  What each scene is called.
+
+    For an image, a cluster, or before a lesson: nothing is compiled behind a user's back, since a process that stays
+    after its command would take a laptop's battery, be billed or killed by a scheduler, and write into a folder that a
+    container is about to throw away. Code for one wiring is left to the runs that are long enough for it.
+    """
+    if names:
+        return _compiled(scenes.graphs(names), workplace)
+    with tempfile.TemporaryDirectory() as folder:
+        temporary = replace(workplace, store=Store(Path(folder) / "results"))
+        return _compiled(scenes.graphs([str(new.write(kind, Path(folder) / kind)[0]) for kind in USUAL]), temporary)
+
+
+def _compiled(requested: Sequence[Graph], workplace: Workplace) -> list[str]:
+    workplace.datasets(*(task for graph in requested for task in graph.bodies().values()))
+    workplace.monitor.start(len(requested))
+    for graph in requested:
+        bodies = graph.bodies()
+        known = dict(zip(bodies, workplace.datasets(*bodies.values()), strict=True))
+        name = workplace.monitor.begin(graph.scene.name, "kernels")
+        _compile(
+            simulation.rebuild(graph.simulate.params, known),
+            simulation.bundles(known),
+            partial(workplace.monitor.update, name),
+        )
+        workplace.monitor.finish(name, failed=False)
+    workplace.monitor.end()
+    return [graph.scene.name for graph in requested]
+
+
+def _compile(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress) -> None:
+    """What a scene's methods call, and those that may take over."""
+    from flexclear.pipeline.dynamics.compile import functions
+    from flexclear.pipeline.dynamics.effects import schemes
+    from flexclear.pipeline.dynamics.run.run import engine_of
+
+    model = engine_of(scene, reduced, progress).model
+    for scheme in schemes(scene):
+        functions.entry(model.parts, scheme, lambda text: progress(None, text)).complete()

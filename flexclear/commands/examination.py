@@ -203,7 +203,7 @@ def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) ->
 
     Loads, gears and stops are read for it: what is wrong with them is an error of the scene itself.
     """
-    from flexclear.pipeline.core.scene.ideal import ideal, loose
+    from flexclear.pipeline.core.scene.variants import ideal, loose
     from flexclear.pipeline.dynamics.model.mobility import analyse
     from flexclear.pipeline.dynamics.model.model import tabulate
 

@@ -56,10 +56,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def command(options: argparse.Namespace) -> None:
     """Print the table."""
     (graph,) = scenes.graphs([options.scene], options.set)
-    try:
-        time = None if options.at is None else quantity(options.at, "time")
-    except ValueError as error:
-        raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
+    time = scenes.moment(options.at)
     if options.speeds is not None:
         diagram(graph.scene, time, options)
         return

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.commands import as_json, scenes
-from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages.graph import Graph
@@ -45,10 +44,7 @@ def command(options: argparse.Namespace) -> None:
     requested = _requested(options.what, options.format)
     if options.at is not None and options.what != "vibrations":
         raise InputError("--at", "belongs to --what vibrations")
-    try:
-        time = None if options.at is None else quantity(options.at, "time")
-    except ValueError as error:
-        raise InputError(f"--at {options.at}", str(error), "give seconds, or a number with a unit of time") from None
+    time = scenes.moment(options.at)
     graphs, workplace = scenes.graphs(options.scenes, options.set), open_workplace(options)
     tasks = {graph.scene.name: _tasks(graph, requested, options.what is not None, time) for graph in graphs}
     made = [task for group in tasks.values() for task in group]

@@ -5,11 +5,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from flexclear.commands import as_json, export, shown_folders
+from flexclear.commands import as_json, export
 from flexclear.commands.plan import planned_scenes
 from flexclear.commands.scenes import (
     FACTS,
-    check_target,
+    check_out,
+    claim,
     conclude,
     copy_run,
     deficits,
@@ -17,10 +18,10 @@ from flexclear.commands.scenes import (
     print_files,
     scene_arguments,
 )
-from flexclear.pipeline.core.scene.resource_estimate import check_run
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages.graph import STAGES, Graph
+from flexclear.stages.simulation import check_run
 from flexclear.stages.workplace import Workplace, check, open_workplace
 
 
@@ -44,11 +45,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring scenes up to date; say what their bundles lack where those were asked for."""
-    if options.out is not None and len(options.scenes) > 1:
-        raise InputError("--out", f"takes one scene, not {len(options.scenes)}", "run the scenes one by one")
-    if options.out is not None:
-        export.check_format(options.out)
-        check_target(options.out)
+    check_out(options.out, options.scenes)
     if options.verify and not options.planned:
         raise InputError("--verify", "reports the true error of a plan, and no plan is requested", "add --planned")
     requested = graphs(options.scenes, options.set)
@@ -57,13 +54,13 @@ def command(options: argparse.Namespace) -> None:
     requested = [Graph(plan.planned) for plan in plans] or requested
     for graph in requested:
         check_run(graph.scene, workplace.store.root)
-        taken = shown_folders.claim(graph.scene, workplace.store)
+        taken = claim(graph.scene, workplace.store)
         if taken is not None:
             workplace.monitor.say(taken)
     outcome = workplace.bring([task for graph in requested for task in graph.up_to(options.to)])
     check(outcome)
     if options.to == "bundle" and not options.json:
-        print("\n\n".join(filter(None, (deficits(graph, workplace, outcome) for graph in requested))))
+        print("\n\n".join(filter(None, (deficits(graph, workplace) for graph in requested))))
     if options.out is not None:
         copy_run(requested[0], workplace, options.out)
     if options.json:

@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import compare
 from flexclear.commands.answers import Answer, Answers, said
-from flexclear.commands.scenes import Workplace, check, in_file
+from flexclear.commands.scenes import in_file
 from flexclear.pipeline.core.artifacts.store import Record, publish
-from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.provenance import assumed
+from flexclear.pipeline.core.scene.variants import loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.post.single_run.horizon import sentence
 from flexclear.stages import derived_series
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import FailedTasksError
+from flexclear.stages.workplace import FailedTasksError, Workplace, check
 
 if TYPE_CHECKING:
     import xarray as xr

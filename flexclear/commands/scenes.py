@@ -11,13 +11,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import export, shown_folders
-from flexclear.pipeline.core.artifacts.disk import disk_limits, sha256
+from flexclear.commands import export
+from flexclear.pipeline.core.artifacts.disk import checked, disk_limits, publish, read_checked, sha256
 from flexclear.pipeline.core.artifacts.paths import DATA, results_root
 from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
 from flexclear.pipeline.core.scene.references import dangling
+from flexclear.pipeline.core.scene.units import quantity
+from flexclear.pipeline.core.system import file_names
 from flexclear.pipeline.core.system.errors import InputError, InputErrors, ResourceError, SolverError
 from flexclear.pipeline.core.system.external_files import reading, require_file
 from flexclear.pipeline.core.system.version import DISTRIBUTION
@@ -25,7 +27,7 @@ from flexclear.pipeline.core.workflow.progress import WARNING
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, add_options, check, open_workplace, relative
+from flexclear.stages.workplace import Workplace, add_options, open_workplace, relative
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,11 +91,9 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
 
     task = Graph(scene, shown=as_in_its_file(scene)).simulate
     # in this process: workers would run a caller's script again from its top
-    outcome = workplace.bring([task], jobs=1)
-    check(outcome)
+    (made,) = workplace.datasets(task, jobs=1)
     from flexclear.pipeline.core.artifacts.table import recorded
 
-    made = workplace.store.load(outcome.records[id(task)])
     return recorded(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)))
 
 
@@ -163,21 +163,15 @@ def bundles(scene: Scene, workplace: Workplace | None = None, jobs: int | None =
     jobs: as of `Workplace.bring`; one is this process, since workers would run a caller's script again from its top.
     Raises FlexclearError.
     """
-    workplace, graph = workplace or open_workplace(), Graph(scene, shown=False)
-    outcome = workplace.bring(list(graph.bundle.values()), jobs)
-    check(outcome)
-    return _loaded(graph, workplace, outcome)
+    tasks = Graph(scene, shown=False).bundle
+    return dict(zip(tasks, (workplace or open_workplace()).datasets(*tasks.values(), jobs=jobs), strict=True))
 
 
-def _loaded(graph: Graph, workplace: Workplace, outcome: Outcome) -> dict[str, xr.Dataset]:
-    return {body: workplace.store.load(outcome.records[id(task)]) for body, task in graph.bundle.items()}
-
-
-def deficits(graph: Graph, workplace: Workplace, outcome: Outcome) -> str:
+def deficits(graph: Graph, workplace: Workplace) -> str:
     """What the scene's bundles lack, one table for each flexible body."""
     from flexclear.pipeline.core.artifacts.deficits import table
 
-    reduced = _loaded(graph, workplace, outcome)
+    reduced = dict(zip(graph.bundle, workplace.datasets(*graph.bundle.values()), strict=True))
     return "\n\n".join(f"{graph.scene.name}, {body}\n{table(data)}" for body, data in reduced.items())
 
 
@@ -203,19 +197,14 @@ def linear(
         task = graph.linear(time, drives, moving=moving, vibrations=vibrations)
     else:
         task = graph.campbell(speeds, drive, time, drives)
-    outcome = workplace.bring([task])
-    check(outcome)
-    return workplace.store.load(outcome.records[id(task)]).assign_attrs(title=scene.title, scene=scene.name)
+    return workplace.datasets(task)[0].assign_attrs(title=scene.title, scene=scene.name)
 
 
 def sensitivities(scene: Scene, of: Sequence[str], to: Sequence[str], workplace: Workplace | None = None) -> xr.Dataset:
     """Derivatives of quantities by numbers of a scene, brought up to date as `run` is."""
     examine(scene)
-    workplace = workplace or open_workplace()
     task = Graph(scene, shown=False).sensitivities(of, to)
-    outcome = workplace.bring([task], jobs=1)
-    check(outcome)
-    return workplace.store.load(outcome.records[id(task)])
+    return (workplace or open_workplace()).datasets(task, jobs=1)[0]
 
 
 def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
@@ -298,7 +287,7 @@ def graphs(names: list[str], settings: Sequence[str] = ()) -> list[Graph]:
     if wrong:
         messages = [lines.located(error) for error in wrong]
         raise messages[0] if len(messages) == 1 else InputErrors(messages)
-    shown_folders.refuse_namesakes([graph.scene for graph in by_scene.values()])
+    _refuse_namesakes([graph.scene for graph in by_scene.values()])
     return list(by_scene.values())
 
 
@@ -357,6 +346,26 @@ def copy_run(graph: Graph, workplace: Workplace, target: Path) -> None:
         export.write(dataset, target)
 
 
+def check_out(
+    out: Path | None, given: Sequence[str], what: str = "scene", endings: Sequence[str] = tuple(export.NEEDS)
+) -> None:
+    """InputError for `--out` where no file of one of the scenes can be written; asked before the work."""
+    if out is None:
+        return
+    if len(given) > 1:
+        raise InputError("--out", f"takes one {what}, not {len(given)}", f"run the {what}s one by one")
+    export.check_format(out, endings)
+    check_target(out)
+
+
+def moment(text: str | None) -> float | None:
+    """The time that `--at` names [s]; InputError for what is no time."""
+    try:
+        return None if text is None else quantity(text, "time")
+    except ValueError as error:
+        raise InputError(f"--at {text}", str(error), "give seconds, or a number with a unit of time") from None
+
+
 def check_target(target: Path, option: str = "--out") -> None:
     """InputError when a file cannot be put there; asked before the work, not after it."""
     where = f"{option} {target}"
@@ -369,3 +378,37 @@ def check_target(target: Path, option: str = "--out") -> None:
             raise InputError(where, "is no ordinary file", "name a file, and look at it when it is there")
     except OSError as error:
         raise InputError(where, f"can be no file: {error.strerror}", "name another one") from None
+
+
+def _refuse_namesakes(scenes: list[Scene]) -> None:
+    """InputError when two files given together have one name."""
+    folders: dict[str, Path] = {}
+    for scene in scenes:
+        path, name = _file(scene), file_names.folded(scene.name)  # as Windows and macOS name folders
+        if path is not None and folders.setdefault(name, path) != path:
+            raise InputError(
+                str(path),
+                f"is called '{scene.name}', as {folders[name]} is, and their results would replace each other",
+                "rename one, or call the command from a folder above both, which names them by their paths",
+            )
+
+
+def claim(scene: Scene, store: Store) -> str | None:
+    """Note that results/runs/<name> is of this file; a sentence when it was of another one that is still there."""
+    path = _file(scene)
+    if path is None:
+        return None
+    note = store.root / "runs" / scene.name / FACTS / "scene.owner"
+    before = (read_checked(note) or {}).get("file")
+    if before == str(path):
+        return None
+    with disk_limits(note.parent):
+        note.parent.mkdir(parents=True, exist_ok=True)
+        publish(note, checked({"file": str(path)}))
+    if not isinstance(before, str) or not is_file(Path(before)):
+        return None
+    return f"results/runs/{scene.name} showed {before}, and from now on shows {path}, which has the same name"
+
+
+def _file(scene: Scene) -> Path | None:
+    return None if scene.path is None else scene.path.resolve()

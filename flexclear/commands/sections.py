@@ -81,9 +81,7 @@ def judge(scene: Scene, workplace: Workplace | None = None) -> tuple[xr.Dataset,
     """Sections (schema SECTIONS) and verdict (schema VERDICT) of a scene, brought up to date as `run` is."""
     workplace = workplace or open_workplace()
     graph = Graph(scene, shown=as_in_its_file(scene))
-    outcome = workplace.bring([graph.sections, graph.verdict], jobs=1)
-    check(outcome)
-    made = [workplace.store.load(outcome.records[id(task)]) for task in (graph.sections, graph.verdict)]
+    made = workplace.datasets(graph.sections, graph.verdict, jobs=1)
     sections, judged = (data.assign_attrs(title=scene.title, scene=scene.name) for data in made)
     return sections, judged
 

@@ -47,14 +47,10 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(options: argparse.Namespace) -> None:
     """Bring sweeps up to date: dataset and figures below results/sweeps, a summary on the screen."""
-    if options.out is not None:
-        if len(options.sweeps) > 1:
-            raise InputError("--out", f"takes one sweep, not {len(options.sweeps)}", "run the sweeps one by one")
-        if options.out.suffix == sweep_large.SUFFIX:
-            sweep_large.require_zarr(f"--out {options.out}")
-        else:
-            export.check_format(options.out, (*export.NEEDS, sweep_large.SUFFIX))
-            scenes.check_target(options.out)
+    if options.out is not None and len(options.sweeps) == 1 and options.out.suffix == sweep_large.SUFFIX:
+        sweep_large.require_zarr(f"--out {options.out}")
+    else:
+        scenes.check_out(options.out, options.sweeps, "sweep", (*export.NEEDS, sweep_large.SUFFIX))
     workplace = open_workplace(options)
     paths = [scenes.find_scene(name) for name in options.sweeps]
     requested = [

@@ -11,8 +11,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.quantities import SAME_TIME, common_times
-from flexclear.pipeline.core.numerics.angles import angle_about_y
-from flexclear.pipeline.core.numerics.rotations import rotation_between
+from flexclear.pipeline.core.numerics.rotations import angle_about_y, rotation_between
 
 
 @dataclass(frozen=True, slots=True)

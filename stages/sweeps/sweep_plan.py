@@ -275,7 +275,7 @@ def _worded(base: Scene, made: Design) -> Iterator[tuple[Axis, Scene]]:
 def prepare(requested: Plan, workplace: Workplace) -> Plan:
     """The plan with its families, whose flexible bodies are brought up to date first, and its points by key."""
     points = requested.design.points()
-    groups = _groups(requested.scene, points)
+    groups = dict(_group(requested.scene, point) for point in points)
     graphs = {text: Graph(edited(requested.scene, first), shown=False) for text, first in groups.items()}
     outcome = workplace.bring([task for graph in graphs.values() for task in graph.simulate.inputs.values()])
     check(outcome)
@@ -320,10 +320,6 @@ def _group(scene: Scene, point: Mapping[str, Any]) -> tuple[str, dict[str, Any]]
     bodies = tuple(f"body.{name}." for name in scene.recipes())
     mine = {where: value for where, value in point.items() if where.startswith(bodies)} if bodies else {}
     return json.dumps(mine, sort_keys=True, default=str), mine
-
-
-def _groups(scene: Scene, points: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    return dict(_group(scene, point) for point in points)
 
 
 def _modules(requested: Plan) -> tuple[str, ...]:

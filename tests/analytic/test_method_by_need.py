@@ -21,7 +21,7 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.effects import schemes
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.run import progress_rate, trajectory
-from flexclear.pipeline.dynamics.run.method_choice.accuracy import FINER, Attempt, Search
+from flexclear.pipeline.dynamics.run.method_choice.accuracy import FINER_TOLERANCE, Attempt, Search
 from flexclear.pipeline.dynamics.run.method_choice.method_selection import Rates, Suit
 from flexclear.pipeline.dynamics.run.progress_rate import Look, limited, pace
 from tests.analytic.mechanism_runs import TREE, bundles
@@ -44,6 +44,16 @@ def simulated(scene: Scene, told: list[str] | None = None) -> xr.Dataset:
 def reference() -> xr.Dataset:
     """The ringing rod, by explicit steps at a tight tolerance."""
     return simulated(load_scene(RINGING, {**SHORT, "solver.rtol": 1e-11}))
+
+
+def test_forces_of_rounding_are_requested_by_no_default() -> None:
+    """A balanced rotor about an oblique axis, without weight: all its joints' forces are rounding."""
+    rotor = TREE / "scenes" / "checks" / "overhung_rotor.toml"
+    frame, speed = {"axis": (1.0, 2.0, 3.0)}, (0.0, 100.0)
+    turned = {"body.ground.frames.axle": frame, "body.disc.pose": None, "drive.axle.law.coefficients": speed}
+    run = simulated(load_scene(rotor, {**turned, "time.end": "1 s", "solver.by_need": True}))
+    assert run.attrs["accuracy_verdict"] == "met"
+    assert "force" not in run.attrs["accuracy_wanted"]
 
 
 def test_ringing_modes_get_the_method_that_follows_them() -> None:
@@ -241,7 +251,7 @@ def test_stability_is_looked_for_in_the_steps_of_late() -> None:
 
 def searched(method: str, loose: int, tight: int) -> Search:
     """Of which a run and one at a hundredth of its tolerance have been made."""
-    runs = {1e-4: (method, loose), 1e-4 * FINER: ("dop853", tight)}
+    runs = {1e-4: (method, loose), 1e-4 * FINER_TOLERANCE: ("dop853", tight)}
     made = {at: xr.Dataset(attrs={"method": name, "evaluations": n}) for at, (name, n) in runs.items()}
     return Search(load_scene(RIGID), lambda scene, judges: xr.Dataset(), runs=made)
 

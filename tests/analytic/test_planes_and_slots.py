@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.scene.ideal import ideal
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.scene.variants import ideal
 from flexclear.pipeline.core.system.errors import InputError
 from tests.analytic.mechanism_runs import TREE, impacts, run
 from tests.reference import contact_solutions as exact

@@ -16,7 +16,7 @@ from pathlib import Path, PureWindowsPath
 import pytest
 
 import flexclear as fc
-from flexclear.commands import doctor, reproduction, shown_folders
+from flexclear.commands import reproduction, scenes
 from flexclear.commands.__main__ import COMMANDS, main
 from flexclear.pipeline.core.scene.load import scene_name
 from flexclear.pipeline.core.system import file_names, platforms
@@ -304,24 +304,14 @@ def test_names_are_the_same_where_any_system_takes_them_for_the_same() -> None:
 
 
 def test_scenes_that_differ_in_capitals_only_are_not_run_together(tmp_path: Path, root: Path) -> None:
-    scenes = []
+    alike = []
     for name in ("one/Pin", "two/pin"):
         path = tmp_path / f"{name}.toml"
         path.parent.mkdir()
         shutil.copy(root / "scenes" / "checks" / "pendulum.toml", path)
-        scenes.append(fc.load_scene(path))
+        alike.append(fc.load_scene(path))
     with pytest.raises(InputError, match="replace each other"):
-        shown_folders.refuse_namesakes(scenes)
-
-
-def test_a_launcher_between_parent_and_child_is_no_end_of_the_parent(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Python in a virtual environment of Windows is started by one."""
-    parent = os.getppid() + 1
-    assert not platforms.is_parent(parent)
-    monkeypatch.setattr(platforms.sys, "platform", "win32")
-    for runs in (True, False):
-        monkeypatch.setattr(platforms, "alive", lambda process, runs=runs: runs and process == parent)
-        assert platforms.is_parent(parent) == runs
+        scenes._refuse_namesakes(alike)
 
 
 def test_a_path_written_as_on_windows_is_told_how_to_write_it(tmp_path: Path) -> None:
@@ -340,11 +330,3 @@ def test_a_path_of_windows_is_found_however_toml_writes_it() -> None:
     for spelling in reproduction._spellings(path):
         written = written.replace(spelling, "rod.toml")
     assert set(tomllib.loads(written).values()) == {"rod.toml"}
-
-
-def test_a_folder_of_results_that_is_too_deep_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert doctor._results(tmp_path)[1]
-    monkeypatch.setattr(platforms, "longest_path", lambda: 259)
-    told, fine = doctor._results(tmp_path / ("deep" * 40))
-    assert not fine
-    assert "longer than paths to files may be here (259 characters" in told

@@ -12,7 +12,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse
 from flexclear.pipeline.dynamics.model.model import tabulate
-from flexclear.pipeline.dynamics.model.rates import ZERO, rates
+from flexclear.pipeline.dynamics.model.rates import ZERO_SINGULAR_VALUE, rates
 from tests.properties import movable
 from tests.properties.mechanisms import Table
 from tests.properties.movable import Joint, Mechanism, Random, Setting
@@ -80,9 +80,9 @@ def test_zeros_stand_far_below_and_the_rest_far_above_the_floor(name: str) -> No
     here = rates(model, [link.start for link in model.mechanism.links])
     zeros, others = here.values[here.rank :], here.values[: here.rank]
     # coordinates of a thousand sizes are rounded to 1e-13 of it, in places ten times combined
-    assert np.max(zeros, initial=0.0) < 1e-4 * ZERO
+    assert np.max(zeros, initial=0.0) < 1e-4 * ZERO_SINGULAR_VALUE
     # no dimension of these units is below a tenth of another, and losses multiply
-    assert np.min(others, initial=1.0) > 1e3 * ZERO
+    assert np.min(others, initial=1.0) > 1e3 * ZERO_SINGULAR_VALUE
 
 
 @pytest.mark.parametrize("number", range(6))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from flexclear.pipeline.dynamics.integrate.phi_functions import COUNT, phi_functions
+from flexclear.pipeline.dynamics.integrate.phi_functions import PHI_COUNT, phi_functions
 from tests.properties.kernels import from_python
 
 
@@ -27,10 +27,10 @@ def by_exponential(X: np.ndarray, k: int) -> np.ndarray:
 @pytest.mark.parametrize("ratio", [0.0, 0.05, 0.9, 1.0, 1.02, 1.21, 1.3, 2.0, 40.0])
 def test_they_are_those_of_the_matrix(a: float, ratio: float) -> None:
     """Swinging, at the critical damping, and creeping back."""
-    b, w = 2.0 * ratio * np.sqrt(a), np.zeros(2 * COUNT)
+    b, w = 2.0 * ratio * np.sqrt(a), np.zeros(2 * PHI_COUNT)
     from_python(phi_functions)(w, 0, a, b)
     X = np.array([[0.0, 1.0], [-a, -b]])
-    for k in range(COUNT):
+    for k in range(PHI_COUNT):
         alpha, beta = w[2 * k : 2 * k + 2]
         # at most some 22 000 roundings of 1/k! in each number (a = 0.13), with room; beta times the largest entry of X
         tolerance = 1e-10 / factorial(k) * max(1.0, a, b)

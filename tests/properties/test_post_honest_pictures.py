@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import flexclear as fc
-from flexclear.pipeline.post.overview.curves import NOISE, impacts, without_noise
+from flexclear.pipeline.post.overview.curves import NOISE, impacts, noise, without_noise
 from flexclear.pipeline.post.render.mechanism import CLEARANCE_COLOR, SOCKET
 from flexclear.pipeline.post.render.ruler import exaggeration
 
@@ -42,12 +43,30 @@ def test_the_factor_of_a_clearance_is_what_is_drawn(root):
 
 def test_rounding_is_a_zero_line_and_small_motion_is_not():
     time = np.linspace(0.0, 1.0, 50)
-    assert (without_noise(1e-17 * np.sin(9.0 * time), 0.3) == 0.0).all()
-    assert (without_noise(0.2 + 1e-17 * np.sin(9.0 * time), 0.3) == 0.2).all()
+    assert (without_noise(1e-17 * np.sin(9.0 * time), NOISE * 0.3) == 0.0).all()
+    assert (without_noise(0.2 + 1e-17 * np.sin(9.0 * time), NOISE * 0.3) == 0.2).all()
     small = 1e-6 * np.sin(9.0 * time)
-    assert np.array_equal(without_noise(small, 0.3), small)
+    assert np.array_equal(without_noise(small, NOISE * 0.3), small)
     edge = 2.0 * NOISE * np.sin(9.0 * time)
-    assert np.array_equal(without_noise(edge, 1.0), edge)
+    assert np.array_equal(without_noise(edge, NOISE), edge)
+
+
+def test_rounding_is_judged_by_the_whole_motion_where_all_curves_of_a_kind_are_rounding():
+    """A crane of 100 m that turns at 1 rad/s, 50 J: a stage on it moves by a nanometre, its joints carry nothing."""
+    frames = np.array([[[0.0, 0.0, 0.0], [100.0, 0.0, 0.0]]] * 2)
+    vectors = ("time", "body", "axis")
+    run = xr.Dataset(
+        {
+            "frame_position": (("time", "frame", "axis"), frames),
+            "velocity": (vectors, np.zeros((2, 1, 3))),
+            "angular_velocity": (vectors, np.ones((2, 1, 3))),
+            "kinetic": ("time", [0.0, 50.0]),
+        }
+    )
+    change = np.array([0.0, 1.0])
+    for unit, rounding, motion in (("m", 1e-15, 1e-9), ("m/s", 1e-14, 1e-9), ("N", 1e-13, 1e-9), ("N m", 1e-12, 1e-6)):
+        assert not without_noise(rounding * change, noise(run, rounding * change, unit)).any()
+        assert np.array_equal(without_noise(motion * change, noise(run, motion * change, unit)), motion * change)
 
 
 @pytest.mark.parametrize(

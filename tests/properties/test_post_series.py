@@ -11,11 +11,12 @@ from hypothesis import strategies as st
 from flexclear.papers.wang_wang_2019.deviations import ensemble_deviations, max_deviation, velocity_at_events
 from flexclear.papers.wang_wang_2019.figures.phase import at_times
 from flexclear.pipeline.core.artifacts.quantities import common_times
-from flexclear.pipeline.core.numerics.angles import angle_about_y, turning
 from flexclear.pipeline.core.numerics.rotations import (
+    angle_about_y,
     quaternion_product,
     rotation_between,
     rotation_vector_to_quaternion,
+    turning,
 )
 from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.single_run.horizon import horizon, spread

@@ -10,10 +10,10 @@ import xarray as xr
 
 from flexclear.commands import compare
 from flexclear.commands.new import write
-from flexclear.pipeline.core.scene.ideal import ideal
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.parts import MeshedRigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
+from flexclear.pipeline.core.scene.variants import ideal
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.overview import comparison, curves, figures, overlay, page
 from flexclear.pipeline.structure.fe.recipe import read_recipe

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from flexclear.commands import compile_ahead, doctor, new
+from flexclear.commands import doctor, new
 from flexclear.commands.__main__ import main
 from flexclear.pipeline.dynamics.compile import files
 from flexclear.pipeline.post.render import gl
@@ -56,7 +56,7 @@ def test_the_usual_kinds_are_compiled_where_no_scene_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
-    monkeypatch.setattr(compile_ahead, "USUAL", ("pendulum",))
+    monkeypatch.setattr(doctor, "USUAL", ("pendulum",))
     assert main(["doctor", "--compile"]) == 0
     assert "compiled: all that runs of pendulum call" in capsys.readouterr().out
     assert not (tmp_path / "results").exists()

@@ -23,11 +23,12 @@ from flexclear.stages.graph import Graph
 LOADED = """
 import sys
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.stages import linearisation
+from flexclear.stages import simulation
 before = set(sys.modules)
 scene = load_scene(sys.argv[1])
-params = linearisation.params(scene, None, None, moving=False, vibrations=True)
-linearisation.run(params, {}, lambda share, text: None)
+pose = {"time": None, "drives": {}, "moving": False, "vibrations": True}
+params = {**simulation.params(scene), "pose": pose}
+simulation.linear(params, {}, lambda share, text: None)
 print(*sorted(n for n in sys.modules.keys() - before if n.split(".")[0] in ("flexclear",)))
 """
 

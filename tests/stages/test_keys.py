@@ -182,25 +182,18 @@ def copy(root: Path, tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_clearance_reruns_exactly_the_last_stages_of_that_scene(root: Path, sources: Sources):
-    path = root / "scenes" / "sps4" / "far_csj_cb.toml"
-    before = keys(Graph(load_scene(path)), sources)
-    after = keys(Graph(load_scene(path, {"joint.A1.clearance": "0.2 mm"})), sources)
-    assert changed(before, after) == {"simulate", "ensemble", "post"}
+RERUN = {
+    "joint.A1.clearance": ("0.2 mm", {"simulate", "ensemble", "post"}),
+    "body.rod1.modes.count": (8, {"modes rod1", "bundle rod1", "simulate", "ensemble", "post"}),
+    "ensemble.members": (8, {"ensemble", "post"}),
+}
 
 
-def test_number_of_modes_does_not_remesh(root: Path, sources: Sources):
-    path = root / "scenes" / "sps4" / "far_csj_cb.toml"
-    before = keys(Graph(load_scene(path)), sources)
-    after = keys(Graph(load_scene(path, {"body.rod1.modes.count": 8})), sources)
-    assert changed(before, after) == {"modes rod1", "bundle rod1", "simulate", "ensemble", "post"}
-
-
-def test_members_rerun_only_the_ensemble(root: Path, sources: Sources):
-    path = root / "scenes" / "sps4" / "far_csj_cb.toml"
-    before = keys(Graph(load_scene(path)), sources)
-    after = keys(Graph(load_scene(path, {"ensemble.members": 8})), sources)
-    assert changed(before, after) == {"ensemble", "post"}
+@pytest.mark.parametrize("path", RERUN)
+def test_an_edit_reruns_exactly_what_depends_on_it(path: str, root: Path, sources: Sources):
+    file, (value, stages) = root / "scenes" / "sps4" / "far_csj_cb.toml", RERUN[path]
+    before, after = (keys(Graph(load_scene(file, change)), sources) for change in ({}, {path: value}))
+    assert changed(before, after) == stages
 
 
 def test_titles_and_places_on_disk_do_not_count(root: Path, copy: Path, sources: Sources):

@@ -18,7 +18,6 @@ from flexclear.commands import cost, sections
 from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.scene.limits import check_cells
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
-from flexclear.pipeline.core.scene.resource_estimate import check_run, row
 from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import InputError, ResourceError
 from flexclear.pipeline.structure.fe.exchange import files
@@ -51,10 +50,10 @@ def test_a_run_that_memory_cannot_hold_is_refused_at_once(
 def test_limits_of_the_scene_take_the_place_of_the_machines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(machine, "memory", lambda: 0)
     path = written(tmp_path, SCENE + JOINT + '[limits]\nmemory = "1 GB"\ndisk = "1 GB"\n')
-    check_run(load_scene(path), tmp_path)
+    simulation.check_run(load_scene(path), tmp_path)
     for key in ("memory", "disk"):
         with pytest.raises(ResourceError, match="10 kB are allowed"):
-            check_run(load_scene(path, {f"limits.{key}": "10 kB"}), tmp_path)
+            simulation.check_run(load_scene(path, {f"limits.{key}": "10 kB"}), tmp_path)
     with pytest.raises(InputError, match=r"expected a size such as '4 GB'"):
         load_scene(path, {"limits.memory": "4 stones"})
 
@@ -159,7 +158,7 @@ def test_damaged_matrices_are_refused_in_words(tmp_path: Path):
 def test_the_estimate_of_a_row_is_what_a_run_takes(root: Path):
     """Measured: 344 bytes a row of checks/pendulum, 6792 of sps4/ideal; the factors cover the rest within two."""
     for name, measured in (("checks/pendulum", 344), ("sps4/ideal", 6792)):
-        estimate = row(load_scene(root / "scenes" / f"{name}.toml"))
+        estimate = simulation.row(load_scene(root / "scenes" / f"{name}.toml"))
         # an estimate: what matters is its order of size
         assert 0.5 * measured < estimate < 2.0 * measured
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -38,33 +37,6 @@ def test_two_hundred_runs_take_no_more_memory_than_fifty(tmp_path: Path, root: P
         check=True,
     )
     assert int(done.stdout) < 25e6
-
-
-#: pages that a process is given for arrays of 3 MB, of which it has two at a time, before and after
-PAGES = """import resource
-from flexclear.pipeline.core.system import platforms as system
-
-def given():
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-    for k in range(64):
-        bytes(bytearray(k + (3 << 20)))
-    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before
-
-bytearray(16 << 20)  # a first large array, after which the C library asks for less by itself
-first = given()
-system.keep_memory()
-given()
-print(first, given())
-"""
-
-
-@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="another C library")
-def test_freed_memory_is_kept_where_that_is_asked_for(root: Path) -> None:
-    """Measured: none of the 64 x 1536 pages that these arrays take, whatever it was before."""
-    command = [sys.executable, "-c", PAGES]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    _, after = map(int, done.stdout.split())
-    assert after < 64 * 1536 / 10  # a tenth of what being given each array anew takes
 
 
 def test_a_command_looks_for_no_garbage_at_its_end(root: Path) -> None:

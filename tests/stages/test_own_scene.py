@@ -21,6 +21,7 @@ from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.json_schema import scene_schema
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.plausibility import implausible
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from tests.stages.typical_mistakes import MISTAKES, WARNED
 
@@ -170,6 +171,17 @@ def test_the_schema_accepts_what_the_loader_accepts(path: Path, validators):
     if not recipe:
         assert implausible(load_scene(path)) == []
     assert list(validators[recipe].iter_errors(table)) == []
+
+
+@pytest.mark.parametrize("square_radius, warned", [(1e-2, False), (1e4, True)], ids=["disc", "kg m^2 for kg mm^2"])
+def test_a_disc_is_larger_than_the_distances_of_its_frames_and_denser_than_air(square_radius: float, warned: bool):
+    centre = {"frames": {"centre": {"position": [1e-3, 0.0, 0.0]}}, "mass": 10.0, "type": "rigid"}
+    disc = centre | {"inertia": [k * 10.0 * square_radius for k in (0.5, 0.5, 1.0)]}
+    ground, end = {"type": "ground", "frames": {"axle": {}}}, {"end": 1.0}
+    joint = {"type": "revolute", "between": ["ground.axle", "disc.centre"]}
+    parts = {"body": {"ground": ground, "disc": disc}, "joint": {"axle": joint}}
+    scene = Scene.model_validate({"title": "disc", "time": end, "output": {"interval": 0.1}, **parts})
+    assert bool(implausible(scene)) == warned
 
 
 @pytest.mark.parametrize("path", RECIPES, ids=lambda path: path.stem)

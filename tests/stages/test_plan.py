@@ -24,7 +24,7 @@ from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.linear.clearance_response import RANK, Bounds, bounds, lever_of
+from flexclear.pipeline.dynamics.linear.clearance_response import SQUARED_RANK, Bounds, bounds, lever_of
 from flexclear.pipeline.dynamics.linear.response import Response, first_excited, response, vibration
 from flexclear.pipeline.dynamics.model.constraints import constraints
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -393,7 +393,7 @@ def test_the_adjoint_of_a_pose_is_the_least_squares_response_to_openings(tmp_pat
     adjoint = lever.adjoint(shown)
     # the shift that makes the factors exist, 1e-13 of the largest squared singular value, beside the smallest
     values = np.linalg.svd(G, compute_uv=False)
-    shift = RANK * (values[0] / values[values > 1e-8 * values[0]][-1]) ** 2
+    shift = SQUARED_RANK * (values[0] / values[values > 1e-8 * values[0]][-1]) ** 2
     assert np.abs(adjoint.rows - expected).max() < 100.0 * shift * np.abs(expected).max()
     assert adjoint.free < 1e-6 * np.abs(shown).max()
 

@@ -7,14 +7,13 @@ import os
 import resource
 import subprocess
 import sys
-import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from flexclear.pipeline.core.artifacts import disk, netcdf
+from flexclear.pipeline.core.artifacts import disk
 from flexclear.pipeline.core.artifacts.disk import publish
 from flexclear.pipeline.core.artifacts.store import Record, Store, write_dataset
 from flexclear.pipeline.core.system.errors import ResourceError
@@ -346,20 +345,6 @@ def test_names_of_an_artifact_are_forced_to_the_disk_once_after_its_record(
     assert forced[2:] == [folder]
 
 
-def test_what_was_just_stored_is_not_parsed_and_given_once(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever loads it may change it: the next one gets it from the file."""
-    record = put(store)
-    with monkeypatch.context() as patch:
-        patch.delattr(netcdf, "read")
-        first = store.load(record)
-    second = store.load(record)
-    assert first.identical(second)
-    name = next(str(n) for n, v in first.data_vars.items() if v.dtype.kind == "f" and v.size)
-    first[name].values[...] = -1.0
-    assert not first.identical(second)
-    assert store.load(record).identical(second)
-
-
 def test_whoever_writes_into_what_was_just_stored_is_noticed(store: Store) -> None:
     """Also where sizes are equal: what is in memory is of the file that was written."""
     record = put(store)
@@ -368,19 +353,3 @@ def test_whoever_writes_into_what_was_just_stored_is_noticed(store: Store) -> No
     os.utime(path, (1.0, 1.0))  # some clocks of disks are slower than this test
     with pytest.raises(ResourceError, match="changed while it was read"):
         store.load(record)
-
-
-def test_where_no_thread_is_to_be_had_files_are_forced_to_the_disk_all_the_same(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Containers limit threads; nor does a process have new ones that is about to end."""
-
-    def none(self: threading.Thread) -> None:
-        raise RuntimeError("can't start new thread")
-
-    forced: list[Path] = []
-    monkeypatch.setattr(threading.Thread, "start", none)
-    monkeypatch.setattr(disk, "force", forced.append)
-    assert disk.publish(tmp_path / "a", b"content") == disk.sha256(b"content")
-    assert (tmp_path / "a").read_bytes() == b"content"
-    assert len(forced) == 1

@@ -19,7 +19,6 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from pathlib import Path
-from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.system import platforms
@@ -81,28 +80,12 @@ def publish(path: Path, content: bytes) -> str:
 
 
 def settle(made: Path, path: Path) -> str:
-    """Force the bytes of a file to the disk and give it its name; returns its sha256, taken while the disk writes.
+    """Force the bytes of a file to the disk and give it its name; returns its sha256.
 
     The name is on the disk after `system.sync_folder`, together with all others of its folder.
     """
-    failed = list[OSError]()
-
-    def write() -> None:
-        try:
-            force(made)
-        except OSError as error:
-            failed.append(error)
-
-    writer = Thread(target=write)
-    if not platforms.started(writer):
-        write()
-    try:
-        digest = digest_of(made)
-    finally:
-        if writer.ident is not None:
-            writer.join()
-    if failed:
-        raise failed[0]
+    force(made)
+    digest = digest_of(made)
     platforms.replace(made, path)
     return digest
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from threading import Lock
 from typing import Any
@@ -20,8 +19,6 @@ from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledAr
 
 #: bytes of a dataset from which on room on the disk counts for more than time
 COMPRESSED = 1 << 26
-#: bytes of values from which on the library is given not to keep what it has read: that would cost more than it takes
-_LARGE = 1 << 16
 #: how the library takes values of a kind, where otherwise than they are
 _TAKEN = {"U": np.dtype("O"), "b": np.dtype("i1")}
 _LOCK = Lock()
@@ -74,7 +71,6 @@ def _define(file: Any, name: str, array: LabelledArray, listed: Mapping[str, str
         shuffle=True,
         fletcher32=numeric,
         fill_value=values.dtype.type(np.nan) if kind == "f" else None,
-        chunk_cache=1,  # byte: nothing is written twice
     )
     variable.setncatts({**array.attrs, **listed, **truth})
     variable.set_auto_maskandscale(False)
@@ -115,10 +111,7 @@ def read(content: bytes) -> LabelledArrays:
         for name, variable in file.variables.items():
             own = {key: variable.getncattr(key) for key in variable.ncattrs() if key != _FILL}
             coords |= set(_words(own))
-            text = variable.dtype is str
-            if not text and variable.size * variable.dtype.itemsize >= _LARGE:
-                variable.set_var_chunk_cache(1)
-            values = np.asarray(variable[...], dtype=str if text else None)
+            values = np.asarray(variable[...], dtype=str if variable.dtype is str else None)
             if own.get("dtype") == "bool":
                 del own["dtype"]
                 values = values.astype(bool)
@@ -129,39 +122,3 @@ def read(content: bytes) -> LabelledArrays:
 def _words(attrs: dict[str, Any]) -> list[str]:
     """The coordinates that attributes list, which are then taken away."""
     return str(attrs.pop(_COORDINATES, "")).split()
-
-
-def as_read(data: LabelledArrays) -> LabelledArrays:
-    """What `read` gives of the file that `write` makes of them, without the file.
-
-    Large arrays that are as they are read are not copied, but for parts of larger ones: of what an engine has observed
-    a run holds a third, and whoever keeps that would keep all of it.
-    """
-    variables = {
-        name: LabelledArray(array.dims, _values_as_read(array.values), _attributes_as_read(array.attrs))
-        for name, array in data.variables.items()
-    }
-    return replace(data, variables=variables, attrs=_attributes_as_read(data.attrs))
-
-
-def _values_as_read(values: np.ndarray) -> np.ndarray:
-    """In one piece and of its own, writable, as this machine has them; texts as long as the longest of them."""
-    if values.dtype.kind in "OU":
-        return np.asarray(values.astype(object), dtype=str)
-    small = values.nbytes < _LARGE  # may be of what stays in this process, and costs nothing to copy
-    native = values.astype(values.dtype.newbyteorder("="), order="C", copy=small or values.base is not None)
-    return np.require(native, requirements=["C", "W"])
-
-
-def _attributes_as_read(attrs: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: _attribute_as_read(value) for name, value in attrs.items()}
-
-
-def _attribute_as_read(value: Any) -> Any:
-    """Texts, lists of more than one of them, numbers of NumPy, arrays of more than one."""
-    if isinstance(value, str):
-        return value
-    numbers = np.array(value).reshape(-1)
-    if numbers.dtype.kind in "OU":
-        return [*map(str, numbers)] if numbers.size > 1 else str(numbers[0])
-    return numbers[0] if numbers.size == 1 else numbers

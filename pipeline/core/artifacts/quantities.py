@@ -227,6 +227,22 @@ def scale(run: xr.Dataset, quantity: Quantity) -> float:
     return float(np.linalg.norm(values - start, axis=1).max())
 
 
+def natural_size(run: xr.Dataset, unit: str) -> float:
+    """Size that the motion of a whole mechanism gives a length, speed, force or torque [SI]; 0 of other units.
+
+    The extent of all frames; the largest speed of a centre of mass, or of a point at that distance; the kinetic energy
+    over the extent, or all of it. Values that are a tiny fraction of it are rounding.
+    """
+    extent = float(np.linalg.norm(np.ptp(run["frame_position"].values, axis=(0, 1))))
+    if unit == "m":
+        return extent
+    if unit == "m/s":
+        turning, speed = (np.abs(run[name].values).max(initial=0.0) for name in ("angular_velocity", "velocity"))
+        return float(max(speed, turning * extent))
+    energy = float(run["kinetic"].values.max())
+    return energy if unit == "N m" else energy / extent if unit == "N" and extent > 0.0 else 0.0
+
+
 def keep(run: xr.Dataset, chosen: Collection[Quantity]) -> xr.Dataset:
     """The part of a run that `error` and `scale` need for these quantities."""
     recorded: dict[str, xr.DataArray] = {}

@@ -54,8 +54,6 @@ REPORTED = ("warnings", "accuracy_verdict")
 OUTDATED = "OUTDATED.txt"
 #: between stem and suffix of what is left of a stopped run
 PARTIAL = ".partial"
-#: what this process has stored last by the sha256 of its file: which file that is, and arrays, until they are loaded
-_STORED: dict[str, tuple[tuple[int, ...], LabelledArrays]] = {}
 OUTDATED_TEXT = "Results in this folder are of an earlier state: they could not be brought up to date.\n\n"
 
 
@@ -113,10 +111,9 @@ class Store:
             try:
                 actual = digest_of(path)
             except OSError:
-                return f"{self._shown(path)} is missing, or no file"
+                return f"{self.below(path)} is missing, or no file"
             if actual != digest:
-                _STORED.pop(digest, None)
-                return f"{self._shown(path)} is corrupt (its content differs from its sha256)"
+                return f"{self.below(path)} is corrupt (its content differs from its sha256)"
         return None
 
     def put(
@@ -137,7 +134,7 @@ class Store:
             folder.mkdir(parents=True, exist_ok=True)
             for name, content in sorted(product.items()):
                 path = self.path(stage, key, name)
-                digests[name] = publish(path, content) if isinstance(content, bytes) else _store(path, content)
+                digests[name] = publish(path, content) if isinstance(content, bytes) else _written(path, content)
             said = {name: str(value) for name, value in _attributes(product).items() if name in REPORTED and value}
             record = Record(stage, key, digests, dict(facts), said, computed_by or {})
             publish(self.path(stage, key, "json"), checked(record.table()))
@@ -148,24 +145,17 @@ class Store:
         return self.arrays(record).to_xarray()
 
     def arrays(self, record: Record) -> LabelledArrays:
-        """The main file in memory. The bytes that were checked are those that are parsed.
-
-        What this process has stored last is not parsed: it is given once, where the file is still the one that was
-        written, since whoever gets it may change it.
-        """
+        """The main file in memory. The bytes that were checked are those that are parsed."""
         from flexclear.pipeline.core.artifacts import netcdf
 
         path = self.path(record.stage, record.key, MAIN)
-        file, stored = _STORED.pop(record.files[MAIN], (None, None))
-        if stored is not None and file == _identity(path):
-            return stored
         content = read_whole(path)
         if sha256(content) != record.files[MAIN]:
-            raise ResourceError(f"{self._shown(path)} changed while it was read; run again to rebuild it")
+            raise ResourceError(f"{self.below(path)} changed while it was read; run again to rebuild it")
         try:
             return netcdf.read(content)
         except (OSError, ValueError, RuntimeError, TypeError) as error:  # sums are right: it was never a dataset
-            raise ResourceError(f"{self._shown(path)} holds no dataset ({shown(str(error))}); remove it") from None
+            raise ResourceError(f"{self.below(path)} holds no dataset ({shown(str(error))}); remove it") from None
 
     def show(self, record: Record, folder: str, names: Mapping[str, str], label: str) -> None:
         """Make the current artifact visible: read-only copies in `folder`, and its facts in ``folder/.facts``.
@@ -199,9 +189,7 @@ class Store:
         if digest_of(target) != known if known else target.stat().st_mode & 0o222:
             aside = target.with_name(f"{target.stem}.edited{target.suffix}")
             platforms.replace(target, aside)
-            self.say(
-                f"{self._shown(target)} was edited; the edit is stored as {aside.name}, and the result shown again"
-            )
+            self.say(f"{self.below(target)} was edited; the edit is stored as {aside.name}, and the result shown again")
 
     def show_partial(self, dataset: xr.Dataset | LabelledArrays, folder: str, name: str) -> Path | None:
         """Put what is left of work that was stopped next to what is shown; its path, where anything is shown.
@@ -293,7 +281,8 @@ class Store:
         """Remove what killed processes left anywhere."""
         sweep(self.root)
 
-    def _shown(self, path: Path) -> str:
+    def below(self, path: Path) -> str:
+        """A path as messages name it."""
         return str(path.relative_to(self.root.parent))
 
 
@@ -329,16 +318,17 @@ def write_dataset(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
 
     Equal datasets give equal bytes: no times or names of this machine.
     """
-    from flexclear.pipeline.core.artifacts.labelled import of  # here, since what finds everything fresh writes nothing
-
-    digest = _written(path, of(dataset))
+    digest = _written(path, dataset)
     platforms.sync_folder(path.parent)
     return digest
 
 
-def _written(path: Path, data: LabelledArrays) -> str:
-    from flexclear.pipeline.core.artifacts import netcdf
+def _written(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
+    """The same; its name is not forced to the disk yet."""
+    from flexclear.pipeline.core.artifacts import netcdf  # here, since what finds everything fresh writes nothing
+    from flexclear.pipeline.core.artifacts.labelled import of
 
+    data = of(dataset)
     with temporary(path) as made:
         try:
             netcdf.write(made, data)
@@ -347,25 +337,3 @@ def _written(path: Path, data: LabelledArrays) -> str:
             made.write_bytes(bytes(data.nbytes + 2**20))
             raise OSError(errno.EIO, f"NetCDF: {error}", str(path)) from None
         return settle(made, path)
-
-
-def _store(path: Path, dataset: xr.Dataset | LabelledArrays) -> str:
-    """Write a dataset, and keep its arrays for `Store.arrays` until the next one is stored.
-
-    Its name is forced to the disk with that of its record.
-    """
-    from flexclear.pipeline.core.artifacts import netcdf
-    from flexclear.pipeline.core.artifacts.labelled import of
-
-    data = of(dataset)
-    _STORED.clear()
-    digest = _written(path, data)
-    if data.nbytes < netcdf.COMPRESSED:
-        _STORED[digest] = _identity(path), netcdf.as_read(data)
-    return digest
-
-
-def _identity(path: Path) -> tuple[int, ...]:
-    """What distinguishes a file from others, and from itself after somebody wrote into it."""
-    status = path.stat()
-    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns, status.st_ctime_ns

@@ -54,7 +54,7 @@ def inventory(store: Store, *, whole: bool) -> Inventory:
         there = [file.stat() for file in files if file.is_file()]
         artifacts.append(Artifact(record, sum(s.st_size for s in there), time.time() - path.stat().st_mtime))
     unreadable += [path for path in (store.root / "cache").rglob("*.names") if read_checked(path) is None]
-    damaged += [f"{_below(store, path)} is no record, or damaged" for path in unreadable]
+    damaged += [f"{store.below(path)} is no record, or damaged" for path in unreadable]
     return Inventory(tuple(artifacts), tuple(damaged), tuple(unreadable), tuple(_orphans(store, known)))
 
 
@@ -104,7 +104,7 @@ def shown_faults(store: Store, below: Path) -> list[str]:
         for path in sorted(facts.parent.iterdir()) if known else ():
             whole = path.suffix == ".nc" and not path.stem.endswith((PARTIAL, ".edited"))
             if (whole or path.name in names) and path.is_file() and sha256(path.read_bytes()) not in known:
-                faults.append(f"{_below(store, path)} differs from what was shown; the next command shows it again")
+                faults.append(f"{store.below(path)} differs from what was shown; the next command shows it again")
     return faults
 
 
@@ -149,7 +149,3 @@ def _orphans(store: Store, known: set[Path]) -> Iterator[Path]:
         ours = path.is_file() and path not in known and not path.name.endswith(BESIDE)
         if ours and time.time() - path.stat().st_mtime > YOUNG:
             yield path
-
-
-def _below(store: Store, path: Path) -> str:
-    return str(path.relative_to(store.root.parent))

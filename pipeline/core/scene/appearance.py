@@ -5,9 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Length, Part, Pose, Position
+from flexclear.pipeline.core.scene.fields import Length, Part, Pose, Position, Positive
 
-Positive = Field(gt=0.0)
 #: keys of a body that only pictures see
 UNSEEN = ("geometry", "color")
 

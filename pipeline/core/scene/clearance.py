@@ -3,13 +3,12 @@
 What a friction law called 'modified-coulomb' does is in `pipeline.dynamics.contact.friction.modified_coulomb`.
 """
 
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import FrameName, Length, Mass, Number, Part, Pressure, Speed
+from flexclear.pipeline.core.scene.fields import FrameName, Length, Mass, Number, Part, Positive, Pressure, Speed
 
-Positive = Field(gt=0.0)
 Share = Field(ge=0.0, le=1.0)
 
 
@@ -168,6 +167,27 @@ class _Contact(Part):
     floor: Annotated[Speed, Positive] | None = None
     initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | None = None
 
+    #: what the outer and the inner surface are called in keys
+    surfaces: ClassVar[tuple[str, str]]
+
+    @model_validator(mode="after")
+    def _stiffness_known(self) -> Self:
+        if self.normal.stiffness is None and None in self.materials:
+            names = " and ".join(f"{surface}_material" for surface in self.surfaces)
+            raise ValueError(f"the contact stiffness is unknown: give {names}, or normal.stiffness")
+        return self
+
+    @property
+    def radius(self) -> float:
+        """Radius of the inner surface [m]."""
+        return float(getattr(self, f"{self.surfaces[1]}_radius"))
+
+    @property
+    def materials(self) -> tuple[Material | None, Material | None]:
+        """Of the outer and the inner surface."""
+        outer, inner = (getattr(self, f"{surface}_material") for surface in self.surfaces)
+        return outer, inner
+
     @property
     def shape(self) -> tuple[float, float]:
         """What else the kernels of its surfaces take."""
@@ -187,26 +207,12 @@ class ClearanceSpherical(_Clearance):
     wear: of both surfaces; absent means none.
     """
 
+    surfaces = ("socket", "ball")
     type: Literal["clearance-spherical"]
     ball_radius: Annotated[Length, Positive]
     socket_material: Material | None = None
     ball_material: Material | None = None
     wear: Wear | None = None
-
-    @model_validator(mode="after")
-    def _stiffness_known(self) -> Self:
-        _require_materials(self.normal, self.materials, "socket_material and ball_material")
-        return self
-
-    @property
-    def radius(self) -> float:
-        """Radius of the inner surface [m]."""
-        return self.ball_radius
-
-    @property
-    def materials(self) -> tuple[Material | None, Material | None]:
-        """Of the outer and the inner surface."""
-        return self.socket_material, self.ball_material
 
 
 class ClearanceRevolute(_Clearance):
@@ -217,27 +223,13 @@ class ClearanceRevolute(_Clearance):
     wear: of both surfaces; absent means none.
     """
 
+    surfaces = ("journal", "pin")
     type: Literal["clearance-revolute"]
     pin_radius: Annotated[Length, Positive]
     length: Annotated[Length, Positive]
     journal_material: Material | None = None
     pin_material: Material | None = None
     wear: Wear | None = None
-
-    @model_validator(mode="after")
-    def _stiffness_known(self) -> Self:
-        _require_materials(self.normal, self.materials, "journal_material and pin_material")
-        return self
-
-    @property
-    def radius(self) -> float:
-        """Radius of the inner surface [m]."""
-        return self.pin_radius
-
-    @property
-    def materials(self) -> tuple[Material | None, Material | None]:
-        """Of the outer and the inner surface."""
-        return self.journal_material, self.pin_material
 
 
 class ClearanceSlot(_Clearance):
@@ -249,6 +241,7 @@ class ClearanceSlot(_Clearance):
     pin_radius: radius of the pin.  slot_material, pin_material: elastic constants, for the stiffness.
     """
 
+    surfaces = ("slot", "pin")
     type: Literal["clearance-slot"]
     travel: Annotated[Length, Positive]
     pin_radius: Annotated[Length, Positive]
@@ -256,25 +249,10 @@ class ClearanceSlot(_Clearance):
     slot_material: Material | None = None
     pin_material: Material | None = None
 
-    @model_validator(mode="after")
-    def _stiffness_known(self) -> Self:
-        _require_materials(self.normal, self.materials, "slot_material and pin_material")
-        return self
-
-    @property
-    def radius(self) -> float:
-        """Radius of the inner surface [m]."""
-        return self.pin_radius
-
     @property
     def shape(self) -> tuple[float, float]:
         """Half the length of the straight part [m]."""
         return 0.5 * self.travel, 0.0
-
-    @property
-    def materials(self) -> tuple[Material | None, Material | None]:
-        """Of the outer and the inner surface."""
-        return self.slot_material, self.pin_material
 
 
 class BallOnPlane(_Contact):
@@ -285,35 +263,16 @@ class BallOnPlane(_Contact):
     ball_radius: radius of the ball.  plane_material, ball_material: elastic constants, for the stiffness.
     """
 
+    surfaces = ("plane", "ball")
     type: Literal["ball-on-plane"]
     ball_radius: Annotated[Length, Positive]
     plane_material: Material | None = None
     ball_material: Material | None = None
 
-    @model_validator(mode="after")
-    def _stiffness_known(self) -> Self:
-        _require_materials(self.normal, self.materials, "plane_material and ball_material")
-        return self
-
-    @property
-    def radius(self) -> float:
-        """Radius of the inner surface [m]."""
-        return self.ball_radius
-
     @property
     def clearance(self) -> float:
         """Way that counts as far [m]: there is no other wall."""
         return self.ball_radius
-
-    @property
-    def materials(self) -> tuple[Material | None, Material | None]:
-        """Of the outer and the inner surface."""
-        return self.plane_material, self.ball_material
-
-
-def _require_materials(law: NormalLaw, materials: tuple[Material | None, Material | None], names: str) -> None:
-    if law.stiffness is None and None in materials:
-        raise ValueError(f"the contact stiffness is unknown: give {names}, or normal.stiffness")
 
 
 Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane

@@ -7,6 +7,7 @@ evaluates that order in any algebra: of units, of numbers, of arrays, of lines o
 
 from __future__ import annotations
 
+import ast
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -133,112 +134,91 @@ def _same(a: units.Exponents | None, b: units.Exponents | None) -> bool:
     return a is not None and b is not None and all(abs(x - y) < 1e-6 for x, y in zip(a, b, strict=True))
 
 
-class Reader:
-    """Reads an expression into postfix order.
+def postfix(
+    text: str, term: Callable[[str], Any], constants: Mapping[str, tuple[float, str]] | None = None
+) -> list[Any]:
+    """An expression in postfix order; ValueError for what is none.
 
     term: the quantity of a name; ValueError where there is none.  constants: value and SI unit of each, by name.
     """
+    words, leaves = _as_python(text)
 
-    def __init__(
-        self, text: str, term: Callable[[str], Any], constants: Mapping[str, tuple[float, str]] | None = None
-    ) -> None:
-        self.text, self.term, self.constants, self.place = text, term, constants or {}, 0
-        self.token = self._next()
+    def steps(node: ast.AST) -> list[Any]:
+        rights = []
+        while isinstance(node, ast.BinOp) and type(node.op) in _OPERATORS:  # of a long sum the left side is deep
+            rights.append((node.right, _OPERATORS[type(node.op)]))
+            node = node.left
+        match node:
+            case ast.Name(id=name) if name.startswith("_"):
+                found = [_leaf(leaves[int(name[1:])], term, constants or {})]
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                found = [*steps(operand), "minus"]
+            case ast.BinOp(left=left, op=ast.Pow(), right=right):
+                found = [*steps(left), _exponent(text, steps(right)), "^"]
+            case ast.Call(func=ast.Name(id=name), args=[first, *more], keywords=[]) if not name.startswith("_"):
+                if bool(more) != (name in SEVERAL):
+                    count = "one value" if more else "two values or more"
+                    raise ValueError(f"'{text}': {name}(...) takes {count}")
+                found = steps(first) + [step for one in more for step in (*steps(one), name)]
+                found += [] if more else [name]
+            case _:
+                raise _misread(text)
+        return found + [step for right, operator in reversed(rights) for step in (*steps(right), operator)]
 
-    def whole(self) -> list[Any]:
-        """The steps; ValueError for what is no expression."""
-        steps = self._sum()
-        if self.token is not None:
-            raise self._misread()
-        return steps
+    try:
+        return steps(ast.parse(" ".join(words), mode="eval").body)
+    except (SyntaxError, RecursionError, MemoryError):
+        raise _misread(text) from None
 
-    def _misread(self) -> ValueError:
-        return ValueError(
-            f"'{self.text}' is no quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or an expression of "
-            "them with + - * / ^, parentheses, functions such as norm(...) and numbers with units, spaces around + and "
-            "-"
-        )
 
-    def _next(self) -> re.Match[str] | None:
-        if self.place == len(self.text):
-            return None
-        match = _TOKEN.match(self.text, self.place)
-        if match is None:
-            raise self._misread()
-        self.place = match.end()
-        return match
+_OPERATORS: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 
-    def _take(self, *operators: str) -> str:
-        """The operator that is next, where it is one of these; or nothing."""
-        if self.token is None or self.token["operator"] not in operators:
-            return ""
-        taken: str = self.token["operator"]
-        self.token = self._next()
-        return taken
 
-    def _close(self) -> None:
-        if not self._take(")"):
-            raise self._misread()
+def _as_python(text: str) -> tuple[list[str], list[re.Match[str]]]:
+    """The words of an expression with names in the place of its leaves, ``_0`` of the first, and the leaves."""
+    words, leaves, place = list[str](), list[re.Match[str]](), 0
+    while place < len(text):
+        token = _TOKEN.match(text, place)
+        if token is None or (token["operator"] == ")" and words[-1:] == [","]):
+            raise _misread(text)
+        place = token.end()
+        if token["operator"]:
+            words.append(token["operator"].replace("^", "**"))
+        elif token["name"] in (*FUNCTIONS, *SEVERAL) and text.startswith("(", place):
+            words.append(token["name"])
+        else:
+            words.append(f"_{len(leaves)}")
+            leaves.append(token)
+    return words, leaves
 
-    def _sum(self) -> list[Any]:
-        steps = self._product()
-        while operator := self._take("+", "-"):
-            steps += [*self._product(), operator]
-        return steps
 
-    def _product(self) -> list[Any]:
-        steps = self._signed()
-        while operator := self._take("*", "/"):
-            steps += [*self._signed(), operator]
-        return steps
+def _leaf(token: re.Match[str], term: Callable[[str], Any], constants: Mapping[str, tuple[float, str]]) -> Any:
+    if token["number"]:
+        written = token["unit"]
+        factor, unit = (units.UNITS[written][0], units.si(units.measured(written))) if written else (1.0, "1")
+        return factor * float(token["number"]), unit
+    name = token["name"]
+    if name in constants:
+        return constants[name]
+    if name == "pi":
+        return math.pi, "1"
+    quantity = term(name)
+    if not quantity.over_time or quantity.dim == "quat":
+        raise ValueError(f"'{name}' cannot be part of an expression: it is no number or vector over time")
+    return quantity
 
-    def _signed(self) -> list[Any]:
-        if self._take("-"):
-            return [*self._signed(), "minus"]
-        steps = self._one()
-        return [*steps, self._exponent(), "^"] if self._take("^") else steps
 
-    def _exponent(self) -> tuple[float, str]:
-        sign = -1.0 if self._take("-") else 1.0
-        steps = self._one()
-        if not all(isinstance(step, (tuple, str)) for step in steps) or measure(steps) != (NUMBER, ""):
-            raise ValueError(f"'{self.text}': an exponent is a number without unit, as in x^1.5")
-        return sign * fold(steps, lambda leaf: float(leaf[0]), _number), "1"
+def _exponent(text: str, steps: list[Any]) -> tuple[float, str]:
+    if not all(isinstance(step, (tuple, str)) for step in steps) or measure(steps) != (NUMBER, ""):
+        raise ValueError(f"'{text}': an exponent is a number without unit, as in x^1.5")
+    return fold(steps, lambda leaf: float(leaf[0]), _number), "1"
 
-    def _one(self) -> list[Any]:
-        if self._take("("):
-            steps = self._sum()
-            self._close()
-            return steps
-        token = self.token
-        if token is None or token["operator"]:
-            raise self._misread()
-        self.token = self._next()
-        if token["number"]:
-            written = token["unit"]
-            factor, unit = (units.UNITS[written][0], units.si(units.measured(written))) if written else (1.0, "1")
-            return [(factor * float(token["number"]), unit)]
-        name = token["name"]
-        if name in (*FUNCTIONS, *SEVERAL) and self._take("("):
-            return self._function(name)
-        if name in self.constants:
-            return [self.constants[name]]
-        if name == "pi":
-            return [(math.pi, "1")]
-        term = self.term(name)
-        if not term.over_time or term.dim == "quat":
-            raise ValueError(f"'{name}' cannot be part of an expression: it is no number or vector over time")
-        return [term]
 
-    def _function(self, name: str) -> list[Any]:
-        steps, count = self._sum(), 1
-        while self._take(","):
-            steps += [*self._sum(), name]
-            count += 1
-        self._close()
-        if (count == 1) == (name in SEVERAL):
-            raise ValueError(f"'{self.text}': {name}(...) takes {'two values or more' if count == 1 else 'one value'}")
-        return steps if name in SEVERAL else [*steps, name]
+def _misread(text: str) -> ValueError:
+    return ValueError(
+        f"'{text}' is no quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or an expression of "
+        "them with + - * / ^, parentheses, functions such as norm(...) and numbers with units, spaces around + and -"
+    )
 
 
 def _number(operator: str, operands: list[float]) -> float:

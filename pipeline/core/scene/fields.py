@@ -2,8 +2,9 @@
 
 import math
 import re
+from dataclasses import dataclass
 from itertools import chain
-from typing import TYPE_CHECKING, Annotated, Any, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import (
     AfterValidator,
@@ -11,6 +12,7 @@ from pydantic import (
     BeforeValidator,
     ConfigDict,
     Field,
+    GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     WithJsonSchema,
     model_validator,
@@ -19,77 +21,57 @@ from pydantic import (
 from flexclear.pipeline.core.numerics.axes import check_axes, check_axis
 from flexclear.pipeline.core.scene.units import a, components, quantity
 
-
-def _scalar(dimension: str) -> Any:
-    """A float field that also takes text with a unit of this dimension."""
-    return Annotated[
-        float,
-        BeforeValidator(lambda value: quantity(value, dimension)),
-        WithJsonSchema({"type": ["number", "string"], "description": f"{dimension}: SI number, or text with a unit"}),
-    ]
-
-
-def _vector(dimension: str) -> Any:
-    """Three of them."""
-
-    def read(value: Any) -> tuple[float, ...]:
-        if not isinstance(value, (list, tuple)) or len(value) != 3:
-            raise ValueError(f"expected three components [x, y, z], each {a(dimension)}")
-        return tuple(components(value, dimension))
-
-    item = {"type": ["number", "string"]}
-    return Annotated[
-        tuple[float, float, float],
-        BeforeValidator(read),
-        WithJsonSchema({"type": "array", "items": item, "minItems": 3, "maxItems": 3, "description": dimension}),
-    ]
-
-
 if TYPE_CHECKING:
     import numpy as np
 
-    Length: TypeAlias = float
-    Time: TypeAlias = float
-    Mass: TypeAlias = float
-    Force: TypeAlias = float
-    Angle: TypeAlias = float
-    Speed: TypeAlias = float
-    Rate: TypeAlias = float
-    Stiffness: TypeAlias = float
-    Damping: TypeAlias = float
-    Pressure: TypeAlias = float
-    Density: TypeAlias = float
-    Number: TypeAlias = float
-    Area: TypeAlias = float
-    SecondMoment: TypeAlias = float
-    Position: TypeAlias = tuple[float, float, float]
-    Velocity: TypeAlias = tuple[float, float, float]
-    AngularVelocity: TypeAlias = tuple[float, float, float]
-    Acceleration: TypeAlias = tuple[float, float, float]
-    Direction: TypeAlias = tuple[float, float, float]
-    RotationVector: TypeAlias = tuple[float, float, float]
-else:
-    Length = _scalar("length")
-    Time = _scalar("time")
-    Mass = _scalar("mass")
-    Force = _scalar("force")
-    Angle = _scalar("angle")
-    Speed = _scalar("velocity")
-    Rate = _scalar("angular velocity")
-    Stiffness = _scalar("stiffness")
-    Damping = _scalar("damping")
-    Pressure = _scalar("pressure")
-    Density = _scalar("density")
-    Number = _scalar("number")
-    Area = _scalar("area")
-    SecondMoment = _scalar("second moment of area")
-    Position = _vector("length")
-    Velocity = _vector("velocity")
-    AngularVelocity = _vector("angular velocity")
-    Acceleration = _vector("acceleration")
-    Direction = _vector("number")
-    RotationVector = _vector("angle")
 
+@dataclass(frozen=True)
+class Measure:
+    """Lets a float, or a vector of three, also be text with a unit of this dimension."""
+
+    dimension: str
+    vector: bool = False
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
+        return handler.generate_schema(Annotated[source, BeforeValidator(self.read)])
+
+    def __get_pydantic_json_schema__(self, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        one: dict[str, Any] = {"type": ["number", "string"]}
+        if self.vector:
+            return {"type": "array", "items": one, "minItems": 3, "maxItems": 3, "description": self.dimension}
+        return one | {"description": f"{self.dimension}: SI number, or text with a unit"}
+
+    def read(self, value: Any) -> Any:
+        """SI value; ValueError in words."""
+        if not self.vector:
+            return quantity(value, self.dimension)
+        if not isinstance(value, (list, tuple)) or len(value) != 3:
+            raise ValueError(f"expected three components [x, y, z], each {a(self.dimension)}")
+        return tuple(components(value, self.dimension))
+
+
+Three = tuple[float, float, float]
+Length = Annotated[float, Measure("length")]
+Time = Annotated[float, Measure("time")]
+Mass = Annotated[float, Measure("mass")]
+Force = Annotated[float, Measure("force")]
+Angle = Annotated[float, Measure("angle")]
+Speed = Annotated[float, Measure("velocity")]
+Rate = Annotated[float, Measure("angular velocity")]
+Stiffness = Annotated[float, Measure("stiffness")]
+Damping = Annotated[float, Measure("damping")]
+Pressure = Annotated[float, Measure("pressure")]
+Density = Annotated[float, Measure("density")]
+Number = Annotated[float, Measure("number")]
+Area = Annotated[float, Measure("area")]
+SecondMoment = Annotated[float, Measure("second moment of area")]
+Position = Annotated[Three, Measure("length", vector=True)]
+Velocity = Annotated[Three, Measure("velocity", vector=True)]
+AngularVelocity = Annotated[Three, Measure("angular velocity", vector=True)]
+Acceleration = Annotated[Three, Measure("acceleration", vector=True)]
+Direction = Annotated[Three, Measure("number", vector=True)]
+RotationVector = Annotated[Three, Measure("angle", vector=True)]
+Positive = Field(gt=0.0)
 
 #: what computing an inertia elsewhere, such as by turning it, may leave of symmetry and of a zero moment
 _ROUNDING = 1e-12
@@ -136,7 +118,7 @@ def _principal(rows: list[list[float]]) -> list[float]:
 
 
 Inertia = Annotated[
-    tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]],
+    tuple[Three, Three, Three],
     BeforeValidator(_inertia),
     WithJsonSchema({"type": "array", "description": "[Ixx, Iyy, Izz] or 3x3, about the centre of mass, body axes"}),
 ]
@@ -186,7 +168,7 @@ class Part(BaseModel):
     @classmethod
     def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """The schema, with the meanings of keys from the docstring."""
-        from flexclear.pipeline.core.scene.key_descriptions import meanings  # reads docstrings, which only schemas need
+        from flexclear.pipeline.core.scene.citations import meanings  # reads docstrings, which only schemas need
 
         schema = handler(core)
         properties = handler.resolve_ref_schema(schema).get("properties", {})

@@ -5,9 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, Union
 from pydantic import Field, create_model
 
 from flexclear.pipeline.core.scene.clearance import FRICTIONS
-from flexclear.pipeline.core.scene.fields import Force, Length, Part
-
-Positive = Field(gt=0.0)
+from flexclear.pipeline.core.scene.fields import Force, Length, Part, Positive
 
 #: sizes that the bearing of a joint may have, and the one that it must have
 SIZES: dict[str, tuple[set[str], set[str]]] = {

@@ -1,4 +1,4 @@
-"""What a scene may ask of the machine; what its run would ask is estimated in `resource_estimate`."""
+"""What a scene may ask of the machine."""
 
 import re
 from math import prod

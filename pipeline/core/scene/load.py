@@ -8,7 +8,7 @@ import re
 import stat
 import tomllib
 from collections.abc import Iterator, Mapping
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -180,6 +180,8 @@ def scene_name(path: Path) -> str:
         here = Path.cwd()
         parts = whole.relative_to(here).parts if whole.is_relative_to(here) else (whole.name,)
     for reason in filter(None, map(file_names.unfit, parts)):
+        if not is_file(path):  # as a pattern that no file matched
+            raise InputError(shown(str(path)), "there is no such file")
         raise InputError(shown(str(path)), f"{reason}: results go into a folder of that name", "rename it")
     return "/".join(parts)
 
@@ -263,8 +265,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         text = path.read_text(encoding="utf-8-sig")
         if DEEP.search(text):
             raise InputError(str(path), "nests tables too deeply to be read: a key has more than 50 parts")
-        content: dict[str, Any] = _copied(_parsed(text))
-        return content
+        return tomllib.loads(text)
     except FileNotFoundError:
         raise InputError(str(path), "there is no such file", _neighbours(path)) from None
     except UnicodeDecodeError as error:
@@ -277,19 +278,6 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(str(path), "nests tables or lists too deeply to be read") from None
     except ValueError as error:  # a NUL in the path, a number of more digits than Python reads
         raise InputError(str(path), f"cannot be read: {error}", "name a TOML file") from None
-
-
-@lru_cache(maxsize=64)
-def _parsed(text: str) -> dict[str, Any]:
-    """A text's table; many scenes extend one, and recipes are asked for by several stages. Copy it before any edit."""
-    return tomllib.loads(text)
-
-
-def _copied(node: Any) -> Any:
-    """Tables and lists anew, down to what nobody can change; `copy.deepcopy` takes six times as long."""
-    if isinstance(node, dict):
-        return {key: _copied(value) for key, value in node.items()}
-    return [_copied(value) for value in node] if isinstance(node, list) else node
 
 
 def _neighbours(path: Path) -> str | None:

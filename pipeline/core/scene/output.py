@@ -10,7 +10,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from flexclear.pipeline.core.scene.fields import Part, Position, Time
-from flexclear.pipeline.core.scene.variable import Schema, Variable
+from flexclear.pipeline.core.scene.variable import Schema, table
 
 
 class Gauge(Part):
@@ -64,14 +64,14 @@ class Output(Part):
 
     def without(self, bodies: Collection[str]) -> dict[str, Any]:
         """The same as a table in which the stresses of these bodies are not asked for."""
-        table = self.model_dump(mode="json", exclude_none=True, exclude={"stress", "gauges"})
+        rest = self.model_dump(mode="json", exclude_none=True, exclude={"stress", "gauges"})
         stress = [name for name in self.stress or () if name not in bodies]
         gauges = {
             name: gauge.model_dump(mode="json", exclude_none=True)
             for name, gauge in (self.gauges or {}).items()
             if gauge.body not in bodies
         }
-        return table | ({"stress": stress} if stress else {}) | ({"gauges": gauges} if gauges else {})
+        return rest | ({"stress": stress} if stress else {}) | ({"gauges": gauges} if gauges else {})
 
     def requests(self) -> dict[str, Any]:
         """What is asked for, by key."""
@@ -80,43 +80,18 @@ class Output(Part):
 
 #: key of `Output` -> variables that it adds to a run; all are optional
 VARIABLES: dict[str, Schema] = {
-    "stress": {
-        "section_force": Variable(
-            ("time", "section", "axis"),
-            "N",
-            "N, Qy, Qz: force of the far part of the rod on the near one, axes of the section (x along the rod)",
-            optional=True,
-        ),
-        "section_moment": Variable(
-            ("time", "section", "axis"),
-            "N m",
-            "T, My, Mz: its moment about the section's centre, likewise",
-            optional=True,
-        ),
-        "peak_axial_stress": Variable(
-            ("time", "section"),
-            "Pa",
-            "axial stress of the section that is largest in size, tension positive",
-            optional=True,
-        ),
-        "peak_von_mises_stress": Variable(
-            ("time", "section"), "Pa", "largest von Mises stress of the section", optional=True
-        ),
-        "von_mises_stress": Variable(
-            ("time", "gauge"), "Pa", "von Mises stress of the gauge's node where it is largest", optional=True
-        ),
-        **{
-            f"{rank}_principal_stress": Variable(
-                ("time", "gauge"), "Pa", f"{size} principal stress there, tension positive", optional=True
-            )
-            for rank, size in (("first", "largest"), ("second", "middle"), ("third", "smallest"))
-        },
-        "stress_position": Variable(
-            ("time", "gauge", "axis"), "m", "undeformed position of that node, body frame", optional=True
-        ),
-        "stress_tensor": Variable(("time", "gauge", "tensor"), "Pa", "stress there, body axes", optional=True),
-        "stress_factor": Variable(
-            ("time", "stress_field"), "1", "what the bundle's stress field is multiplied by, SI", optional=True
-        ),
-    },
+    "stress": table("""
+section_force? | time section axis | N | N, Qy, Qz: force of the far part of the rod on the near one, axes of the
+    section (x along the rod)
+section_moment? | time section axis | N m | T, My, Mz: its moment about the section's centre, likewise
+peak_axial_stress? | time section | Pa | axial stress of the section that is largest in size, tension positive
+peak_von_mises_stress? | time section | Pa | largest von Mises stress of the section
+von_mises_stress? | time gauge | Pa | von Mises stress of the gauge's node where it is largest
+first_principal_stress? | time gauge | Pa | largest principal stress there, tension positive
+second_principal_stress? | time gauge | Pa | middle principal stress there, tension positive
+third_principal_stress? | time gauge | Pa | smallest principal stress there, tension positive
+stress_position? | time gauge axis | m | undeformed position of that node, body frame
+stress_tensor? | time gauge tensor | Pa | stress there, body axes
+stress_factor? | time stress_field | 1 | what the bundle's stress field is multiplied by, SI
+"""),
 }

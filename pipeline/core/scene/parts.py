@@ -18,13 +18,12 @@ from flexclear.pipeline.core.scene.fields import (
     PartName,
     Pose,
     Position,
+    Positive,
     Time,
     Velocity,
 )
 from flexclear.pipeline.core.scene.joint_friction import JointFriction, require_fitting
 from flexclear.pipeline.core.scene.units import quantity
-
-Positive = Field(gt=0.0)
 
 
 class Ground(Seen):

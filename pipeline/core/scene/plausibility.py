@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 #: largest plausible ratio of a body's radius of gyration to the extent of its frames: kg m^2 for kg mm^2 makes it 1000
 #: times larger, a flywheel on a short crank ten times
 FAR = 30.0
+#: density [kg/m^3] above which a body with its frames close together may well be so large, as a disc on a thin shaft:
+#: about that of air
+AIRY = 1.0
 #: density [kg/m^3] above which no inertia is plausible; point masses of textbooks reach 1e8
 DENSE = 1e9
 #: the same of a body that has so many times the mass of every other body of the scene
@@ -51,7 +54,7 @@ def _inertias(scene: Scene) -> Iterator[InputError]:
         own = _extent([body.com, *(frame.position for frame in body.frames.values())])
         extent = own or whole
         gyration = sqrt(max(body.inertia[k][k] for k in range(3)) / body.mass)
-        if extent > 0.0 and gyration > FAR * extent:
+        if extent > 0.0 and gyration > FAR * extent and least_density(body) < AIRY:
             size = f"the body's frames lie within {own:.3g} m" if own else f"the whole scene is {whole:.3g} m large"
             text = f"mass and inertia give a radius of gyration of {gyration:.3g} m, but {size}"
             yield warning(scene, f"body.{name}.inertia", text, UNITS)

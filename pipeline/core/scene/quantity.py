@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from flexclear.pipeline.core.scene import units
-from flexclear.pipeline.core.scene.expression import FUNCTIONS, SEVERAL, Reader, measure
+from flexclear.pipeline.core.scene.expression import FUNCTIONS, SEVERAL, measure, postfix
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.run_schema import RUN
 
@@ -241,9 +241,7 @@ def read(
     constants: value and SI unit of each.  local: what further names mean.
     """
     known = local or {}
-    return Reader(
-        _as_owned(text), lambda name: known[name] if name in known else _term(name, owners), constants
-    ).whole()
+    return postfix(_as_owned(text), lambda name: known[name] if name in known else _term(name, owners), constants)
 
 
 def _as_owned(text: str) -> str:

@@ -25,9 +25,12 @@ def dangling(table: Mapping[str, Any], recipe: Recipe, path: str) -> list[InputE
     for where, name in _named_joints(table):
         if name not in joints:
             errors.append(InputError(f"{path} [{where}]", f"there is no joint '{name}'", suggestion(name, joints)))
-    for where, name in _named_bodies(table):
+    ensemble = table.get("ensemble")
+    for name in _texts(ensemble.get("bodies")) if isinstance(ensemble, dict) else ():
         if name not in frames:
-            errors.append(InputError(f"{path} [{where}]", f"there is no body '{name}'", suggestion(name, frames)))
+            errors.append(
+                InputError(f"{path} [ensemble.bodies]", f"there is no body '{name}'", suggestion(name, frames))
+            )
     for name, body in _tables(table.get("body")):
         errors += _interfaces(f"{path} [body.{name}.modes", body, frames[name])
     return errors
@@ -96,9 +99,3 @@ def _named_joints(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
         for key in ("first", "second"):
             if isinstance(part.get(key), str):
                 yield f"gear.{name}.{key}", part[key].partition(".")[0]
-
-
-def _named_bodies(table: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
-    ensemble = table.get("ensemble")
-    if isinstance(ensemble, dict):
-        yield from (("ensemble.bodies", name) for name in _texts(ensemble.get("bodies")))

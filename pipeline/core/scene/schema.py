@@ -15,9 +15,8 @@ from flexclear.pipeline.core.scene.clearance import (
 )
 from flexclear.pipeline.core.scene.drives import Drive
 from flexclear.pipeline.core.scene.events import Event, require_possible
-from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Time
+from flexclear.pipeline.core.scene.fields import Direction, Length, Number, Part, PartName, Positive, Time
 from flexclear.pipeline.core.scene.formulas import check_formulas
-from flexclear.pipeline.core.scene.gears import Gear
 from flexclear.pipeline.core.scene.limits import Limits, check_members, check_rows
 from flexclear.pipeline.core.scene.loads import Gravity, Load, SampledPid
 from flexclear.pipeline.core.scene.output import Output
@@ -34,11 +33,10 @@ from flexclear.pipeline.core.scene.parts import (
 from flexclear.pipeline.core.scene.quantity import Quantity, parse, usual
 from flexclear.pipeline.core.scene.solver import NAMING, PlainIntegrator, Solver
 from flexclear.pipeline.core.scene.start import Start
-from flexclear.pipeline.core.scene.stops import Stop
+from flexclear.pipeline.core.scene.stops import Gear, Stop
 from flexclear.pipeline.core.scene.units import any_quantity, measured, quantity
 from flexclear.pipeline.core.system import file_names
 
-Positive = Field(gt=0.0)
 #: types of joints with one freedom: driving it determines the whole relative motion
 SINGLE = ("revolute", "prismatic")
 #: samples of a controller; at each of them a step ends

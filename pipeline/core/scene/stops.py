@@ -1,4 +1,4 @@
-"""Stops at the ends of joint coordinates."""
+"""Stops at the ends of joint coordinates, and gears between them."""
 
 from typing import Self
 
@@ -46,3 +46,21 @@ class Stop(Part):
     def ends(self) -> tuple[str, ...]:
         """Which ends there are."""
         return tuple(end for end in ("lower", "upper") if getattr(self, end) is not None)
+
+
+class Gear(Part):
+    """A joint coordinate that follows another one: change of `second` = ratio times change of `first`.
+
+    first, second: joints (``A``), with the coordinate where there are several (``A.rotation``).
+    ratio: a number; of a slide that follows an angle a length per angle ("10 mm/rad"), and the other way round.
+    """
+
+    first: str
+    second: str
+    ratio: Value
+
+    @model_validator(mode="after")
+    def _two(self) -> Self:
+        if self.first == self.second:
+            raise ValueError(f"a gear couples two coordinates; first and second are both '{self.first}'")
+        return self

@@ -1,4 +1,5 @@
-"""Variants of a scene: which of its effects can be taken away, the scene without some of them, and that as a file.
+"""Variants of a scene: which of its effects can be taken away, the scene without some of them, as the ideal mechanism,
+and that as a file.
 
 An effect is named by the path that goes with it: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
 ``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant differs from its scene by parts
@@ -15,8 +16,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flexclear.pipeline.core.scene.ideal import KEPT, WITHOUT_CLEARANCE, loose, owned
+from flexclear.pipeline.core.scene.appearance import UNSEEN
+from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.load import FAMILIES, edited
+from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
@@ -25,6 +28,12 @@ from flexclear.pipeline.core.system.errors import InputError
 OF_THE_WORLD = ("gravity", "joint-friction")
 #: kinds of effects, as they are reported
 CLEARANCE, FLEXIBILITY = "clearance", "flexibility"
+#: what an ideal mechanism lacks, by kind of effect, and how a scene without it is called
+EFFECTS = {CLEARANCE: "without clearance", FLEXIBILITY: "rigid"}
+#: joint with clearance -> the joint that connects the same frames without; slots and planes have none
+WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
+#: keys of a flexible body that a rigid one from the same recipe has, too
+KEPT = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -93,9 +102,65 @@ def without(scene: Scene, gone: Collection[Effect]) -> Scene:
     for family in dict.fromkeys(where.split(".")[0] for where in removed):
         left = {n: p.model_dump(mode="json", exclude_none=True) for n, p in getattr(scene, family).items()}
         table[family] = {n: p for n, p in left.items() if f"{family}.{n}" not in removed}
-    result = edited(scene, table | _settings(scene, gone) | owned(scene, _left(gone)))
+    result = edited(scene, table | _settings(scene, gone) | _owned(scene, _left(gone)))
     result._name = f"{scene.name} without {', '.join(sorted(effect.name for effect in gone))}"
     return result
+
+
+def ideal(scene: Scene, effects_gone: Collection[str] = tuple(EFFECTS)) -> Scene:
+    """The ideal mechanism of a scene: without clearance, flexibility, or both; it is called as the scene is.
+
+    Raises InputError when the scene has none of them.
+    """
+    gone = [effect for effect in effects(scene) if effect.kind in effects_gone]
+    if not gone:
+        raise InputError(
+            str(scene.path or scene.name),
+            f"has no {' and no '.join(effects_gone)} that could be taken away",
+            "compare it with another scene: flexclear compare A B",
+        )
+    result = without(scene, gone)
+    result._name = scene.name
+    return result
+
+
+def loose(scene: Scene) -> dict[str, Clearance]:
+    """The joints with clearance that have an ideal counterpart, by name: pins and balls, not slots and planes."""
+    return {name: joint for name, joint in scene.contacts().items() if joint.type in WITHOUT_CLEARANCE}
+
+
+def _owned(scene: Scene, left: Collection[str]) -> dict[str, Any]:
+    """Edits of what is asked for, where the joints with clearance, or the stops, of these names are taken away."""
+    keys: dict[str, Any] = {}
+    owners = scene.owners()
+    if left:
+        loosened = ("contact", "worn")
+        owners |= {
+            of: {n: turns for n, turns in owners[of].items() if n.partition(".")[0] not in left} for of in loosened
+        }
+        if not owners["contact"]:
+            keys["ensemble"] = None
+        if scene.accuracy is not None:
+            requested = {
+                n: w.model_dump(exclude_none=True) for n, w in scene.accuracy.quantities.items() if _has(n, owners)
+            }
+            rest = scene.accuracy.model_dump(exclude={"quantities"}, exclude_none=True)
+            keys["accuracy"] = {**rest, "quantities": requested} if requested else None
+        if scene.view is not None and scene.view.watch is not None:
+            watched = [name for name in scene.view.watch if _has(name, owners)]
+            keys["view.watch"] = watched or None
+            if not watched:
+                keys["view"] = None
+                del keys["view.watch"]
+    return keys
+
+
+def _has(name: str, owners: dict[str, dict[str, bool]]) -> bool:
+    try:
+        parse(name, owners)
+    except ValueError:
+        return False
+    return True
 
 
 def _settings(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
+import shutil
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
 from flexclear.pipeline.core.system.errors import ResourceError
-from flexclear.pipeline.core.system.platforms import free_space, memory
+from flexclear.pipeline.core.system.platforms import memory
 
 __all__ = ["disk", "instruction_set", "memory", "require_disk", "require_memory", "size"]
 
@@ -23,7 +24,7 @@ FRACTION = 0.8
 
 def disk(folder: Path) -> int:
     """Bytes free where a folder is or will be."""
-    return free_space(next(p for p in (folder, *folder.parents) if p.is_dir()))
+    return shutil.disk_usage(next(p for p in (folder, *folder.parents) if p.is_dir())).free
 
 
 def require_memory(need: float, what: str, remedy: str, limit: float | None = None) -> None:

@@ -8,25 +8,15 @@ from __future__ import annotations
 import contextlib
 import itertools
 import os
-import shutil
-import signal
 import stat
 import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 #: the request that lets a file share the bytes of another until one of them is written (linux/fs.h)
 FICLONE = 0x40049409
-#: the request that the system send a signal when the parent dies (linux/prctl.h)
-PR_SET_PDEATHSIG = 1
-#: what the GNU C library calls the sizes from which on memory is given back, and when (malloc.h); how much is retained
-#: [B]
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD, KEPT = -1, -3, 64 << 20
-#: where Windows keeps whether paths may be long, and characters of a path when they may and when not
-FILE_SYSTEM, LONG_PATH, SHORT_PATH = r"SYSTEM\CurrentControlSet\Control\FileSystem", 32767, 259
 #: how long a file is awaited that another program has open, and between two attempts [s]
 PATIENCE, PAUSE = 2.0, 0.05
 
@@ -67,20 +57,6 @@ def peak_memory() -> int:
         return 0
     peak: int = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else 1024 * peak
-
-
-def keep_memory() -> None:
-    """Let this process keep up to `KEPT` bytes that it has freed, where the C library is GNU's.
-
-    It gives arrays of a megabyte back one by one otherwise, and a short run spends a thirtieth of its time on being
-    given the same pages again.
-    """
-    import ctypes
-
-    with contextlib.suppress(AttributeError, OSError, TypeError):  # of other C libraries; Windows wants a name
-        change = ctypes.CDLL(None).mallopt
-        change(M_MMAP_THRESHOLD, min(KEPT, 32 << 20))  # it takes no more than 32 MB
-        change(M_TRIM_THRESHOLD, KEPT)
 
 
 def share_blocks(source: Any, target: Any) -> bool:
@@ -134,15 +110,6 @@ def _insist(change: Callable[[], None], path: Path) -> None:
                 time.sleep(PAUSE)
 
 
-def started(thread: Thread) -> bool:
-    """Start a thread; whether the system lets this process have another one (a limit of a container, its own end)."""
-    try:
-        thread.start()
-    except RuntimeError:
-        return False
-    return True
-
-
 def sync_folder(folder: Path) -> None:
     """Force the names in a folder to the disk, where folders can be opened, and the file system knows such a thing."""
     with contextlib.suppress(OSError):
@@ -151,22 +118,6 @@ def sync_folder(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
-
-
-def longest_path() -> int:
-    """Characters of a path that files can have: few on a Windows without long paths enabled."""
-    registry = _module("winreg")
-    if registry is None:
-        return sys.maxsize
-    with contextlib.suppress(OSError), registry.OpenKey(registry.HKEY_LOCAL_MACHINE, FILE_SYSTEM) as key:
-        if registry.QueryValueEx(key, "LongPathsEnabled")[0]:
-            return LONG_PATH
-    return SHORT_PATH
-
-
-def free_space(folder: Path) -> int:
-    """Bytes free on the disk of a folder."""
-    return shutil.disk_usage(folder).free
 
 
 def others_can_write(folder: Path, *, inside: bool) -> bool:
@@ -190,24 +141,6 @@ def alive(process: int) -> bool:
         return psutil.pid_exists(process)
     except OverflowError:  # no system has such a number
         return False
-
-
-def end_with_parent() -> None:
-    """Ask the system to end this process when its parent dies, where systems do that (Linux)."""
-    if sys.platform == "linux":
-        import ctypes
-
-        # compiled code and compilers do not let a thread of Python run; the system asks nobody
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-
-
-def is_parent(process: int) -> bool:
-    """Whether a process that has started this one still runs.
-
-    On Windows the parent's number says nothing: it also names a parent that is gone, and in a virtual environment
-    it is that of a launcher that is between the two.
-    """
-    return alive(process) if sys.platform == "win32" else os.getppid() == process
 
 
 def plain_output() -> None:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import copy_context
-from threading import Event, Thread
+from functools import partial
+from threading import Event
 from typing import TypeVar
 
 from flexclear.pipeline.core.system.errors import StoppedError
-from flexclear.pipeline.core.system.platforms import cores, started
+from flexclear.pipeline.core.system.platforms import cores
 from flexclear.pipeline.core.system.progress import Progress, silent
 
 __all__ = ["cores", "free", "meanwhile", "side_by_side", "tell", "width"]
@@ -85,34 +86,22 @@ def meanwhile(work: Callable[[Progress], Result]) -> Iterator[Callable[[], Resul
     failed.  Where no processor is free, or no thread is to be had, it is done when its result is asked for.  What waits
     raises what the work raised.
     """
-    given_up, results, errors = Event(), list[Result](), list[BaseException]()
+    from concurrent.futures import ThreadPoolExecutor
+
+    given_up = Event()
 
     def alive(fraction: float | None, text: str) -> None:
         if given_up.is_set():
             raise _GivenUpError
 
-    def do() -> None:
+    result: Callable[[], Result] = partial(work, silent)
+    with ThreadPoolExecutor(1) as pool:
+        if free():
+            with suppress(RuntimeError):  # no thread: a limit of a container, or the process is about to end
+                result = pool.submit(copy_context().run, work, alive).result
         try:
-            results.append(work(alive))
+            yield result
         except BaseException as error:
-            errors.append(error)
-
-    def ended() -> None:  # also where Ctrl-C came while it was being started
-        while thread.is_alive():
-            thread.join(TICK)
-
-    def result() -> Result:
-        ended()
-        if errors:
-            raise errors[0]
-        return results[0]
-
-    thread = Thread(target=copy_context().run, args=(do,))
-    try:
-        yield result if free() and started(thread) else lambda: work(silent)
-    except BaseException as error:
-        if not isinstance(error, StoppedError):  # of that the work hears itself, and leaves what it has in good order
-            given_up.set()
-        raise
-    finally:
-        ended()
+            if not isinstance(error, StoppedError):  # of that the work hears itself, and leaves all in good order
+                given_up.set()
+            raise

@@ -19,35 +19,15 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
 from flexclear.pipeline.core.artifacts.disk import checked, publish, read_checked
-from flexclear.pipeline.core.artifacts.paths import TREE
-
-__all__ = [
-    "TREE",
-    "Sources",
-    "code_digest",
-    "imported",
-    "library_version",
-    "library_versions",
-    "parents",
-    "source_file",
-    "sources_of",
-]
+from flexclear.pipeline.core.artifacts.paths import TREE as TREE
 
 OWN = ("flexclear", "benchmarks")
-#: by module: digest of its text, digest of its code, own modules and libraries that it imports
-Known = dict[str, tuple[str, str, list[str], list[str]]]
-#: what one `Sources` has parsed, no other parses
-KNOWN: Known = {}
 #: modules that only word messages, citations and validation errors: no result depends on them
 _SCENE = "flexclear.pipeline.core.scene"
-WORDING = {
-    "flexclear.pipeline.core.scene.citations",
-    f"{_SCENE}.key_descriptions",
-    f"{_SCENE}.validation_errors",
-    f"{_SCENE}.plausibility",
-}
+WORDING = {f"{_SCENE}.{name}" for name in ("citations", "validation_errors", "plausibility")}
 #: the functions that `import flexclear` offers stand above the stages: no result reaches them
 ABOVE = {"flexclear.public"}
 #: how often a source is parsed at most, where threads of libraries come between
@@ -68,9 +48,13 @@ class Module:
 
     text: str
     digest: str
-    own: frozenset[str]
-    libraries: frozenset[str]
+    own: tuple[str, ...]
+    libraries: tuple[str, ...]
     package: bool
+
+    def written(self) -> list[Any]:
+        """As the memo of a `Sources` has it."""
+        return [self.text, self.digest, list(self.own), list(self.libraries)]
 
 
 @dataclass(frozen=True)
@@ -85,10 +69,9 @@ class Sources:
     root: Path
     memo: Path | None = None
     read: dict[str, Module | None] = field(default_factory=dict, repr=False, compare=False)
-    imports: Known = field(default_factory=dict, repr=False, compare=False)
+    remembered: dict[str, list[Any]] = field(default_factory=dict, repr=False, compare=False)
     next: dict[str, tuple[str, ...]] = field(default_factory=dict, repr=False, compare=False)
     closures: dict[frozenset[str], dict[str, Module]] = field(default_factory=dict, repr=False, compare=False)
-    codes: dict[frozenset[str], dict[str, str]] = field(default_factory=dict, repr=False, compare=False)
 
     def closure(self, roots: Iterable[str]) -> dict[str, Module]:
         """Every own module that `roots` reach by imports, packages on the way included.
@@ -97,31 +80,23 @@ class Sources:
         """
         requested = frozenset(roots)
         if requested not in self.closures:
-            self._remember()
-            known = dict(self.imports)
+            if self.memo is not None and not self.remembered:
+                self.remembered.update(read_checked(self.memo) or {})
             self.closures[requested] = self._reach(requested)
-            for name, module in self.closures[requested].items():
-                if self.imports.get(name, [""])[0] != module.text:
-                    self.imports[name] = (module.text, module.digest, sorted(module.own), sorted(module.libraries))
-            if self.memo is not None and self.imports != known:
+            new = {name: module.written() for name, module in self.closures[requested].items()}
+            if self.memo is not None and any(self.remembered.get(name) != entry for name, entry in new.items()):
+                self.remembered.update(new)
                 with contextlib.suppress(OSError):
-                    publish(self.memo, checked(self.imports))
+                    publish(self.memo, checked(self.remembered))
         return self.closures[requested]
 
     def code(self, roots: Iterable[str]) -> dict[str, str]:
-        """Facts of the code that `roots` reach, by kind and name: digests of modules, versions of libraries.
-
-        Many tasks share them: they are not to be changed.
-        """
-        requested = frozenset(roots)
-        if requested not in self.codes:
-            closure = self.closure(requested)
-            libraries = frozenset().union(*(module.libraries for module in closure.values())) - MACHINE
-            counting = {name: module for name, module in closure.items() if name not in WORDING}
-            self.codes[requested] = {f"module {name}": module.digest for name, module in counting.items()} | {
-                f"library {name}": version for name, version in library_versions(libraries).items()
-            }
-        return self.codes[requested]
+        """Facts of the code that `roots` reach, by kind and name: digests of modules, versions of libraries."""
+        closure = self.closure(roots)
+        libraries = frozenset().union(*(module.libraries for module in closure.values())) - MACHINE
+        return {f"module {name}": module.digest for name, module in closure.items() if name not in WORDING} | {
+            f"library {name}": version for name, version in library_versions(libraries).items()
+        }
 
     def module(self, name: str) -> Module | None:
         """The module called `name`, or None when there is no such file (an attribute, say)."""
@@ -155,21 +130,19 @@ class Sources:
 
     def _parse(self, path: Path, name: str) -> Module:
         source, package = path.read_bytes(), path.name == "__init__.py"
-        text = hashlib.sha256(source).hexdigest()
-        if KNOWN.get(name, [""])[0] != text:
-            tree = _parsed(source)
-            own, libraries = _imported(tree, name, package, deep=True)
-            code = code_digest(tree)
-            KNOWN[name] = (text, code, sorted(own), sorted(libraries))
-        _, code, own_names, library_names = KNOWN[name]
-        return Module(text, code, frozenset(own_names), frozenset(library_names), package)
+        text, *known = self.remembered.get(name, [""])
+        if text != hashlib.sha256(source).hexdigest() or len(known) != 3:
+            return _examined(source, name, package)
+        digest, own, libraries = known
+        return Module(text, digest, tuple(own), tuple(libraries), package)
 
-    def _remember(self) -> None:
-        """Read the memo, once; one that is damaged is as good as none."""
-        if self.memo is not None and not self.imports:
-            remembered = read_checked(self.memo) or {}
-            self.imports.update({name: entry for name, entry in remembered.items() if len(entry) == 4})
-            KNOWN.update(self.imports)
+
+@cache
+def _examined(source: bytes, name: str, package: bool) -> Module:
+    tree = _parsed(source)
+    own, libraries = (tuple(sorted(names)) for names in _imported(tree, name, package, deep=True))
+    code = code_digest(tree)
+    return Module(hashlib.sha256(source).hexdigest(), code, own, libraries, package)
 
 
 #: this program's own modules, as this process has read them
@@ -219,39 +192,17 @@ def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[s
 
 
 def code_digest(tree: ast.Module) -> str:
-    """Digest of what a module does: its syntax tree without docstrings and without the words of raised errors."""
-    words: list[str] = []
-    _write_code(tree, words, worded=True)
-    return hashlib.sha256("\0".join(words).encode()).hexdigest()
-
-
-def _write_code(node: ast.AST, words: list[str], worded: bool) -> None:
-    """Append the names, constants and nesting of a syntax tree, in a form that all releases of Python share.
-
-    worded: whether texts count; in a statement that raises an error they do not.
-    """
-    worded = worded and not isinstance(node, ast.Raise)
-    words.append(type(node).__name__)
-    for name in node._fields:
-        value = getattr(node, name, None)
-        if name in ("ctx", "kind", "type_comment", "type_ignores") or value is None or value == []:
-            continue
-        words.append(name)
-        if name == "body" and isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
-            value = value[1:]
-        for part in value if isinstance(value, list) else [value]:
-            if not worded and (isinstance(part, ast.JoinedStr) or _is_text(part)):
-                words.append("text")
-            elif isinstance(part, ast.AST):
-                _write_code(part, words, worded)
-            else:
-                words.append(repr(part))
-        words.append("]")
-    words.append(")")
-
-
-def _is_text(node: object) -> bool:
-    return isinstance(node, ast.Constant) and isinstance(node.value, str)
+    """Digest of what a module does: its syntax tree, from which docstrings and words of raised errors are taken."""
+    for node in ast.walk(tree):
+        if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            del node.body[0]
+        elif isinstance(node, ast.Raise):
+            for part in ast.walk(node):
+                if isinstance(part, ast.JoinedStr):
+                    part.values = []
+                elif isinstance(part, ast.Constant) and isinstance(part.value, str):
+                    part.value = ""
+    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
 
 
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)

@@ -181,7 +181,7 @@ class Journal:
             return None
         content = whole[DIGEST + 1 :]
         noted = whole[:DIGEST].decode(errors="replace")
-        if not _same(sealed(content), noted) or digest not in (None, noted):
+        if not hmac.compare_digest(sealed(content).encode(), noted.encode()) or digest not in (None, noted):
             return None
         with np.load(io.BytesIO(content), allow_pickle=False) as file:
             arrays = {key: file[key] for key in file.files}
@@ -230,11 +230,6 @@ def sealed(content: bytes) -> str:
     of results must not be continued. The secret lies next to the compiled kernels, in the user's own folder.
     """
     return hmac.new(_secret(), content, "sha256").hexdigest()
-
-
-def _same(one: str, other: str) -> bool:
-    """Whether two digests are equal, in a time that does not depend on where they differ."""
-    return hmac.compare_digest(one.encode(), other.encode())
 
 
 @cache

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.store import MAIN, Record, Store
-from flexclear.pipeline.core.system import platforms
 from flexclear.pipeline.core.system.errors import INTERRUPTED, FlexclearError, ResourceError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import cores, stopping, workers
@@ -131,8 +130,6 @@ def _settle_fresh(plan: _Plan, store: Store, sources: Sources) -> None:
 
 def _alone(plan: _Plan, store: Store, sources: Sources, monitor: Monitor) -> None:
     """One after the other in this process."""
-    if workers.of_a_command():  # of somebody else's process nothing is changed
-        platforms.keep_memory()
     while ready := plan.ready():
         why = stopping.requested()
         if why:

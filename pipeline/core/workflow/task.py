@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from json.encoder import encode_basestring
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -107,38 +105,13 @@ def flatten(node: Any, where: str = "") -> list[tuple[str, str]]:
     Empty tables and lists are leaves, so that adding an empty one is seen. What JSON cannot say (a
     date or a nan that somebody wrote into a recipe) is stored as text; the stage will refuse it.
     """
-    leaves: list[tuple[str, str]] = []
-    _gather(node, where, leaves)
-    return leaves
-
-
-def _gather(node: Any, where: str, leaves: list[tuple[str, str]]) -> None:
-    """`flatten` into a list: a report has tens of thousands of leaves."""
-    text = _plain(node)
-    if text is not None:
-        leaves.append((where, text))
-        return
     if isinstance(node, Mapping) and node:
-        items = ((str(name), value) for name, value in node.items())
+        below = [(str(name), value) for name, value in node.items()]
     elif isinstance(node, (list, tuple)) and any(isinstance(x, (dict, list, tuple, Mapping)) for x in node):
-        items = ((str(n), value) for n, value in enumerate(node))
+        below = [(str(number), value) for number, value in enumerate(node)]
     else:
-        leaves.append((where, _JSON.encode(node)))
-        return
-    for name, value in items:
-        _gather(value, f"{where}.{name}" if where else name.lstrip("."), leaves)
-
-
-def _plain(node: Any) -> str | None:
-    """What JSON's encoder, which takes ten times as long, makes of a text, a number and a list of floats."""
-    kind = type(node)
-    if kind is str:
-        return encode_basestring(node)
-    if kind is int or (kind is float and math.isfinite(node)):
-        return repr(node)
-    if kind is list and all(type(x) is float and math.isfinite(x) for x in node):
-        return f"[{', '.join(map(repr, node))}]"
-    return None
+        return [(where, _JSON.encode(node))]
+    return [leaf for name, value in below for leaf in flatten(value, f"{where}.{name}" if where else name.lstrip("."))]
 
 
 def reasons(new: Mapping[str, str], last: Mapping[str, str] | None, unknown: frozenset[str] = frozenset()) -> list[str]:

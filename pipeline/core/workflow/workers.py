@@ -6,14 +6,12 @@ import os
 import signal
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.system import platforms
 from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.workflow import cores, stopping
 
@@ -23,8 +21,6 @@ if TYPE_CHECKING:
 
 #: what is said of a helper that somebody has killed
 LOST = "a helper process was killed; is the memory full? Finished results are stored: run again to go on"
-#: where the system sends no signal at a parent's end, the parent is searched for so often [s]
-LOOK = 1.0
 
 
 @dataclass(frozen=True)
@@ -60,30 +56,28 @@ def pool(width: int, bell: Bell | None = None) -> ProcessPoolExecutor:
     # imported here, because a run that finds everything fresh must start quickly
     from concurrent.futures import ProcessPoolExecutor
 
-    return ProcessPoolExecutor(width, mp_context=_context(), initializer=_begin, initargs=(os.getpid(), bell))
+    return ProcessPoolExecutor(width, mp_context=_context(), initializer=_begin, initargs=(bell,))
 
 
-def _begin(parent: int, bell: Bell | None) -> None:
-    _follow(parent)
-    platforms.keep_memory()
+def _begin(bell: Bell | None) -> None:
+    _follow()
     if bell is not None:
         stopping.obey(bell.rung.wait, lambda: bell.why.value.decode(errors="replace"), bell.count_deaf)
 
 
-def _follow(parent: int) -> None:
-    """In a process that the main thread of `parent` started: end when it does; Ctrl-C is left to it.
-
-    parent: its number, as it says itself: by now the system may have given this process another one.
-    """
+def _follow() -> None:
+    """In a process that another one started: end when that does; Ctrl-C is left to it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    platforms.end_with_parent()
-    threading.Thread(target=_watch, args=(parent,), daemon=True).start()
+    threading.Thread(target=_watch, daemon=True).start()
 
 
-def _watch(parent: int) -> None:
-    while platforms.is_parent(parent):
-        time.sleep(LOOK)
-    os._exit(1)
+def _watch() -> None:
+    from multiprocessing import parent_process
+
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
 
 
 def _context() -> Any:
@@ -127,7 +121,7 @@ class Team:
 
         server, bell = SyncManager(ctx=_context()), Bell.made()
         with without_main():
-            server.start(_follow, (os.getpid(),))
+            server.start(_follow)
         return Team(width, pool(width, bell), bell, server, server.Queue())
 
     def end(self) -> None:
@@ -160,11 +154,6 @@ def reused() -> Iterator[None]:
         _keeping -= 1
         while _idle and not _keeping:
             _idle.pop().end()
-
-
-def of_a_command() -> bool:
-    """Whether this process is a command's own: inside of `reused`."""
-    return _keeping > 0
 
 
 @contextmanager

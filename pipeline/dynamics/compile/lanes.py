@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.specialise.straight import exactly
 
 #: all lanes at once take as long as this fraction of them does one by one
-FEW = 4
+LANE_COST = 4
 
 
 def _pointer(kind: Any) -> Any:
@@ -45,7 +45,7 @@ def make_lanes(laws: Callable, note: Callable, abreast: Callable, lanes: int) ->
     table: see `memory.LANE_WORDS`. places: room for 6 lanes words, then for whose numbers are in which lane, 0 where
     they are to be put there again. numbers: as of `straight.abreast`.
     """
-    few = lanes // FEW
+    few = lanes // LANE_COST
 
     @kernel
     def engine(table, own):

@@ -11,7 +11,7 @@ from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.dynamics.contact import restitution as closed_form
 
 #: a law that delivers a restitution further than this from the one asked for is used outside its range
-CLOSE = 0.05
+RESTITUTION_ERROR = 0.05
 
 
 class Numbers(NamedTuple):
@@ -44,7 +44,7 @@ class Resolved:
 class Hysteresis:
     """A law F = K d^n (1 + a d'/d'0); `factor` gives a for the coefficient of restitution asked for.
 
-    valid: restitutions for which the law delivers what it is asked for within CLOSE.
+    valid: restitutions for which the law delivers what it is asked for within RESTITUTION_ERROR.
     exponent: where the scene gives none.
     """
 
@@ -96,7 +96,7 @@ class Hysteresis:
         return closed_form.root(lambda c: self.factor(c) - a, least, 1.0)
 
     def _warning(self, law: NormalLaw, delivered: float) -> str | None:
-        if law.restitution is None or abs(delivered - law.restitution) <= CLOSE:
+        if law.restitution is None or abs(delivered - law.restitution) <= RESTITUTION_ERROR:
             return None
         low, high = self.valid
         return (

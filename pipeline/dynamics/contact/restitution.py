@@ -15,7 +15,7 @@ from collections.abc import Callable
 #: nearest to 1 that psi(-y) may come; beyond it 1 - y is rounding
 NEAREST = 1.0 - 2.0**-53
 #: below this the first term of the series, e = 1 - 2 a / 3, is as exact as a root of differences of rounding size
-SLIGHT = 1e-7
+SLIGHT_DAMPING = 1e-7
 
 
 def psi(x: float) -> float:
@@ -27,7 +27,7 @@ def psi(x: float) -> float:
 
 def delivered(a: float) -> float:
     """Rebound over approach speed that the factor a >= 0 gives a free impact."""
-    if a < SLIGHT:
+    if a < SLIGHT_DAMPING:
         return 1.0 - 2.0 * a / 3.0
     wanted = psi(a)
     if wanted >= psi(-NEAREST):
@@ -39,7 +39,7 @@ def factor(e: float) -> float:
     """Factor a that delivers the restitution 0 < e <= 1; ValueError for 0, which no finite factor delivers."""
     if e <= 0.0:
         raise ValueError("no finite damping delivers a restitution of 0; ask for a small one, such as 0.01")
-    if 1.0 - e < SLIGHT:
+    if 1.0 - e < SLIGHT_DAMPING:
         return 1.5 * (1.0 - e)
 
     def defect(y: float) -> float:  # y = a e

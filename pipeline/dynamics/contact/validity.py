@@ -13,7 +13,7 @@ from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics.contact.law import Resolved
 
 #: above this fraction of the inner radius a contact is no longer small and Hertz's theory ends
-SMALL = 0.3
+SMALL_CONTACT = 0.3
 #: above this fraction of the inner radius a penetration is no local indentation any more, whatever the law
 SHALLOW = 0.1
 
@@ -28,10 +28,10 @@ def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -
         return found  # the end of a coordinate has no surfaces
     surfaces = lookup("flexclear.pipeline.dynamics.contact", joint.type, where=name)
     size = surfaces.contact_size(joint, depth, force)
-    if joint.normal.stiffness is None and size > SMALL * joint.radius:
+    if joint.normal.stiffness is None and size > SMALL_CONTACT * joint.radius:
         found.append(
             f"{name}: the contact grows to a radius of {size:.3g} m, {size / joint.radius:.2g} of the inner "
-            f"surface's; its stiffness from radii and materials (Hertz) holds below {SMALL:g}"
+            f"surface's; its stiffness from radii and materials (Hertz) holds below {SMALL_CONTACT:g}"
         )
     if depth > SHALLOW * joint.radius:
         found.append(

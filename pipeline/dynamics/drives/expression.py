@@ -22,7 +22,7 @@ from flexclear.pipeline.core.scene.quantity import read
 from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, Terms
 
 #: samples among which a switch is searched for: at least, and per period of the fastest sine
-FEWEST, PER_PERIOD, MOST = 256, 32, 2_000_000
+FEWEST_SAMPLES, PER_PERIOD, MOST_SAMPLES = 256, 32, 2_000_000
 ZERO = Piece(0.0, (0.0,))
 #: functions of a constant
 PLAIN = {name: getattr(math, name) for name in ("exp", "log", "sqrt", "tan", "tanh")}
@@ -102,8 +102,8 @@ def _split(switch: Course, above: Course, below: Course, span: tuple[float, floa
 def _roots(piece: Piece, start: float, end: float) -> list[float]:
     """Times strictly between start and end at which a piece changes its sign."""
     fastest = max((abs(w) for _, w, _ in piece.terms), default=0.0)
-    count = FEWEST + PER_PERIOD * fastest * (end - start) / (2.0 * math.pi)
-    if count > MOST:
+    count = FEWEST_SAMPLES + PER_PERIOD * fastest * (end - start) / (2.0 * math.pi)
+    if count > MOST_SAMPLES:
         raise ValueError(f"it has {count / PER_PERIOD:.3g} periods up to its end, too many to search for kinks in")
     grid = np.linspace(start, end, int(count))
     values = np.array([piece.value(float(t)) for t in grid])

@@ -16,8 +16,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.scene import integrators
-from flexclear.pipeline.core.scene.ideal import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.core.scene.registry import module_of
+from flexclear.pipeline.core.scene.variants import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 from flexclear.pipeline.dynamics.effects.effect import Effect
 

@@ -43,7 +43,7 @@ from flexclear.pipeline.dynamics.vectors import (
 
 #: pivots at most this fraction of the largest that all inertia beyond could give in any pose mean a coordinate that
 #: moves no mass; rounding leaves a few times 1e-16 of it
-MASSLESS_PIVOT = 1e-14
+MASSLESS_ARTICULATED = 1e-14
 
 NONE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 #: what gives `forces` the inertia of a rigid link: about its own origin
@@ -124,7 +124,7 @@ def reduce(d, i):
             moment = add(turn_symmetric(A, angular), turn(B, linear))
             force = add(turn_back(B, angular), turn_symmetric(C, linear))
             pivot = dot(angular, moment) + dot(linear, force)
-            least = MASSLESS_PIVOT * (polar * dot(angular, angular) + mass * dot(linear, linear))
+            least = MASSLESS_ARTICULATED * (polar * dot(angular, angular) + mass * dot(linear, linear))
             sound = sound & (pivot > least)  # not so of NaN
             inverse = 1.0 / pivot
             root, rest = np.sqrt(inverse), -dot(angular, M) - dot(linear, F)

@@ -17,7 +17,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, at, at6, cross, dot, put, scale, sub, turn_symmetric
 
 #: pivots of M below this fraction of their diagonal mean a coordinate that moves no mass
-MASSLESS_PIVOT = 1e-15
+MASSLESS_COMPOSITE = 1e-15
 
 localise, step = no_column, no_arm
 #: what gives `forces` the inertia of a rigid link: about the kernels' origin
@@ -150,7 +150,7 @@ def make_eliminate(flexible: Any = None) -> Callable:
             gather(d, i)
         modal(d)
         assemble_mass(d)
-        sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, d.nv, MASSLESS_PIVOT)
+        sound = envelope.factor(d.h, d.at_envelope, d.w, d.at_mass, d.nv, MASSLESS_COMPOSITE)
         for k in range(d.nv):
             d.force[k] = -d.bias[k]
         forward(d, d.at_force)

@@ -15,16 +15,16 @@ from flexclear.pipeline.dynamics.equations.retraction import make_position_rates
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 
-ITERATIONS = 8
+PROJECTIONS = 8
 #: pivot ratio of the closures below which residuals are left alone: of a residual r, a correction r / sqrt(ratio)
 BLIND = 1e-8
 #: rounding may stop the residuals this far above a very tight tolerance
-ROUNDING = 1e3
+ROUNDING_FACTOR = 1e3
 #: rows that are not solved for may open by this fraction of the mechanism's size: joints whose axes miss each other by
-#: less than `model.rates.ZERO` count as redundant, and on the way they part by that much times some turns
-APART = 1e-6
+#: less than `model.rates.ZERO_SINGULAR_VALUE` count as redundant, and on the way they part by that, times some turns
+OPEN_REDUNDANT = 1e-6
 #: a gap is closed as if over this time [s]: modes with shorter periods follow by their stiffness, not by their mass
-SLOWLY = 0.1
+CLOSING_TIME = 0.1
 
 
 @kernel
@@ -101,7 +101,7 @@ def make_stiffen(closures: Any) -> Callable:
                 row = d.envelope[c0 + i].origin + c0
                 # without held shapes, shapes are eigenmodes
                 for j in range(0 if i >= body.n_held > 0 else i, i + 1):
-                    d.mass[row + j] += SLOWLY**2 * d.interface_data[stiffness + n * i + j].value
+                    d.mass[row + j] += CLOSING_TIME**2 * d.interface_data[stiffness + n * i + j].value
         factor(d.h, d.at_envelope, d.w, d.at_mass, d.nv, 0.0)
         complete(d)
 
@@ -140,10 +140,10 @@ def make_projection(
         residual says little about the error behind it, nothing is changed.
         """
         d = data(h, f, w, n)
-        step, used, apart = d.at_correction, 0, APART * d.length
+        step, used, apart = d.at_correction, 0, OPEN_REDUNDANT * d.length
         if d.last_pivot < BLIND:
             return 0
-        for _ in range(ITERATIONS):
+        for _ in range(PROJECTIONS):
             if open_by(d) <= tolerance:
                 return used if widest(d, d.residual, False) <= max(apart, tolerance) else -1
             if d.abridged:
@@ -162,8 +162,8 @@ def make_projection(
             used += 1
             if d.evaluation != m.OK:
                 return -1
-        if not widest(d, d.residual, True) <= ROUNDING * tolerance:
+        if not widest(d, d.residual, True) <= ROUNDING_FACTOR * tolerance:
             return -1
-        return used if widest(d, d.residual, False) <= max(apart, ROUNDING * tolerance) else -1
+        return used if widest(d, d.residual, False) <= max(apart, ROUNDING_FACTOR * tolerance) else -1
 
     return project

@@ -26,7 +26,7 @@ from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapp
 from flexclear.pipeline.dynamics.run.evaluation.tree_factor import mass_factor
 
 #: singular values below this fraction of the largest are rounding
-RANK = 1e-9
+IMPULSE_RANK = 1e-9
 
 
 class Blow(NamedTuple):
@@ -61,7 +61,7 @@ def blow(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) 
     factor = np.linalg.cholesky(M)
     half = np.linalg.solve(factor, J.T).T
     _, values, V = np.linalg.svd(half)
-    rank = int(np.sum(values > RANK * values.max(initial=0.0)))
+    rank = int(np.sum(values > IMPULSE_RANK * values.max(initial=0.0)))
     Z = np.linalg.solve(factor.T, V[rank:].T)
     scale = np.maximum(np.abs(Z).max(axis=0, initial=0.0), np.finfo(float).tiny)
     states = np.tile(y, (1 + Z.shape[1], 1))
@@ -70,7 +70,7 @@ def blow(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) 
     rates = np.array([series[name][1] for name in targets]).reshape(len(targets), -1)
     C = (rates[:, 1:] - rates[:, :1]) * scale
     missing = np.array(list(targets.values())) - rates[:, 0]
-    impulses = np.linalg.lstsq(C @ C.T, missing, rcond=RANK)[0]
+    impulses = np.linalg.lstsq(C @ C.T, missing, rcond=IMPULSE_RANK)[0]
     after, s = y.copy(), C.T @ impulses
     after[model.speeds] += Z @ s
     work = float(np.array(list(targets.values())) @ impulses)

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 #: evaluations after which the conditions are examined; where a run fails after an event, again with fewer
 PAUSES = (2_000, 50)
 #: conditions are examined at so many times at least
-LOOKS = 500
+CONDITION_TIMES = 500
 #: an event nearer than this fraction of the run to its end does not happen
 END = 1e-12
 
@@ -170,7 +170,7 @@ class _Plan:
         if not watched:
             return *self._steps(engine, made, y, never, times, SLICE), None
         span = self.scene.time.end - self.scene.time.start
-        looks = np.linspace(engine.start, engine.end, 2 + int(LOOKS * (engine.end - engine.start) / span))
+        looks = np.linspace(engine.start, engine.end, 2 + int(CONDITION_TIMES * (engine.end - engine.start) / span))
         done: Followed | None = None
         for pause in PAUSES:
             try:

@@ -24,7 +24,7 @@ from flexclear.pipeline.dynamics.run.horizon.periods import Moment, handed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
 #: parts into which an interval is divided to look closer, and how often: what is left is a straight line
-PARTS, PASSES = 12, 5
+PARTS, CLOSER_LOOKS = 12, 5
 #: rows are looked at when they are more by this factor than at the last look
 GROWTH = 1.05
 
@@ -97,7 +97,7 @@ class Watch:
         begin, found = float(self._time(row)[0]), False
         if begin in self._engine.breaks and self._values(self._observed(row, after=True), self._time(row))[name][0] > 0:
             return begin
-        for _ in range(PASSES):
+        for _ in range(CLOSER_LOOKS):
             times = np.linspace(begin, end, PARTS + 1)
             inner = self._between(row, times)
             every = self._joined(known, self._observed(inner))

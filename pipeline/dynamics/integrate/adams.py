@@ -24,14 +24,14 @@ from flexclear.pipeline.dynamics.kernels import kernel
 LAST = rk4.STAGES
 # memory: number of slopes kept, their distance, then the slopes themselves, the latest first
 COUNT, DISTANCE, KEPT = range(3)
-MOST = 3
+MOST_STEPS_BACK = 3
 #: steps whose lengths differ by less than this fraction are alike: rounding of times
-ALIKE = 1e-8
+EQUAL_STEPS = 1e-8
 
 
 def memory(h: np.ndarray) -> int:
     """Floats kept between steps."""
-    return KEPT + MOST * int(h[m.NY])
+    return KEPT + MOST_STEPS_BACK * int(h[m.NY])
 
 
 @kernel
@@ -44,7 +44,7 @@ def begin(d):
 def alike(d, step):
     """Whether a step is as long as those between the slopes that are kept."""
     distance = d.memory[DISTANCE]
-    return abs(step - distance) <= ALIKE * distance
+    return abs(step - distance) <= EQUAL_STEPS * distance
 
 
 @kernel
@@ -57,7 +57,7 @@ def keep(d, step):
         d.memory[KEPT + 2 * size + c] = d.memory[KEPT + size + c]
         d.memory[KEPT + size + c] = d.memory[KEPT + c]
         d.memory[KEPT + c] = d.w[slope(d, 0) + c]
-    d.memory[COUNT] = min(d.memory[COUNT] + 1.0, MOST)
+    d.memory[COUNT] = min(d.memory[COUNT] + 1.0, MOST_STEPS_BACK)
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
@@ -69,7 +69,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     def attempt(d, step):
         """State Y_NEW after a step from Y; False when there is no slope at the predicted state."""
         o, size, now, predicted = d.at_memory, d.ny, slope(d, 0), slope(d, 1)
-        if d.memory[COUNT] < MOST or not alike(d, step):
+        if d.memory[COUNT] < MOST_STEPS_BACK or not alike(d, step):
             return runge_kutta_step(d, step)
         one, two, three = o + KEPT, o + KEPT + size, o + KEPT + 2 * size
         for c in range(size):

@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate.contact_phases import make_follow_contacts, watch_end
 from flexclear.pipeline.dynamics.integrate.method import slope
 from flexclear.pipeline.dynamics.integrate.mode_changes import (
-    NEVER,
+    NO_CHANGE,
     cubic_tells,
     ends_tell,
     make_locate_change,
@@ -31,11 +31,11 @@ from flexclear.pipeline.dynamics.kernels import kernel
 MOST_IMMEDIATE = 200
 #: what a contact does in a small fraction of a step is not where the dense output of the whole step has it;
 #: the step is then repeated, at most so often, with this fraction of its length or more
-MOST_SHORTENED, SHORTER = 8, 0.1
+MOST_SHORTENED, REPEATED_FRACTION = 8, 0.1
 #: a contact that begins deeper than this fraction of its clearance, and so many tolerances, has been stepped over
-DEEP, ERRORS = 1e-6, 100.0
+DEPTH_STEPPED_OVER, ERRORS = 1e-6, 100.0
 #: fraction of its length by which a step may miss the event that it is to end on
-CLOSE = 1e-6
+EVENT_MISS = 1e-6
 #: a contact that would end where it has just begun is looked at in shorter steps, down to one in which it moves by so
 #: many times what its gap is off zero
 FURTHER = 10.0
@@ -110,7 +110,7 @@ def try_again(d, c):
 def stepped_over(d, c):
     """Whether contact c, about to change its mode where a step starts, has begun long before."""
     gap, length = d.touch[c].gap, d.contact_numbers[c].length
-    deep = DEEP * d.contact_numbers[c].clearance + ERRORS * d.rtol * length
+    deep = DEPTH_STEPPED_OVER * d.contact_numbers[c].clearance + ERRORS * d.rtol * length
     return gap < -deep and d.mode[c] == 0
 
 
@@ -162,7 +162,7 @@ def make_resolve_events(
                 return step, False
             off = gap / rate
             step += off
-        return step, abs(off) <= CLOSE * step
+        return step, abs(off) <= EVENT_MISS * step
 
     _, note_end, accept, make_end_on_guard = guards
     end_on_guard = make_end_on_guard(evaluate_at, extend, repeat)
@@ -170,7 +170,7 @@ def make_resolve_events(
     @kernel
     def first_change(d, step):
         """Contact and share of the step of its first mode change, and whether the dense output is ready."""
-        ready, first, which = False, NEVER, -1
+        ready, first, which = False, NO_CHANGE, -1
         for c in range(d.n_contacts):
             if not (ends_tell(d, c) or cubic_tells(d, c, step)):
                 continue
@@ -228,7 +228,7 @@ def make_resolve_events(
                 return try_again(d, which), ready, t_new, step
             if there or shortened == MOST_SHORTENED:
                 break
-            step *= min(0.5, max(SHORTER, 2.0 * first))
+            step *= min(0.5, max(REPEATED_FRACTION, 2.0 * first))
             t_new = t + step
             if not repeat(d, step):
                 return try_again(d, which), ready, t_new, step

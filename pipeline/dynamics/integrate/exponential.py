@@ -48,7 +48,7 @@ MOST_SWEEPS = 10
 #: how much of the slowest convergence is forgotten from step to step
 FORGETTING = 0.3
 #: steps are so long that corrections fall by this factor per sweep, which goes with their square; no less is aimed at
-SWIFT, LEAST = 0.1, 0.01
+SWIFT, LEAST_CONTRACTION = 0.1, 0.01
 
 # Memory between steps -------------------------------------------------------------------------------------------------
 # whether the oscillators are those of the present pose, whether there are any, step of the phi functions, length of the
@@ -62,7 +62,7 @@ DEPARTURE, BEFORE = 0, NODES
 OF_SLOPE, OF_STATE, TOTAL, SPARE, N_PAIRS = range(NODES, NODES + 5)
 #: sources of a state within the step: the departures and the slope at its start
 SOURCES = NODES + 1
-PHI = 2 * phi_functions.COUNT
+PHI = 2 * phi_functions.PHI_COUNT
 #: floats of an oscillator at a node: its phi functions, and what each source adds to (z, z') by them
 AT_NODE = PHI + 2 * SOURCES
 
@@ -273,7 +273,7 @@ def error(d, step):
         lift(d, basis(d), pair(d, TOTAL), step, out)
         norms = (norms[1], scaled_norm(d, out))
     fourth, third = norms
-    d.most_growth = min(d.most_growth, np.sqrt(SWIFT / max(d.memory[SLOWEST], LEAST)))
+    d.most_growth = min(d.most_growth, np.sqrt(SWIFT / max(d.memory[SLOWEST], LEAST_CONTRACTION)))
     if fourth == 0.0:
         return 0.0
     return fourth**2 / np.sqrt(fourth**2 + 0.01 * third**2)

@@ -33,14 +33,14 @@ from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite
 from flexclear.pipeline.dynamics.integrate.method import Method, slope
-from flexclear.pipeline.dynamics.integrate.newton import PERTURBATION, converged, limit, lu_factor, lu_solve
+from flexclear.pipeline.dynamics.integrate.newton import COLUMN_STEP, converged, limit, lu_factor, lu_solve
 from flexclear.pipeline.dynamics.integrate.norms import error_scale, finite, scaled_norm, set_error_scales
 from flexclear.pipeline.dynamics.kernels import kernel
 
 # rows of SLOPES: start of the step, Newton's iterate, end of the step, estimates, search for events
 ITERATE, LAST, ESTIMATE, ROWS = 1, 2, 3, 5
 #: iterations of the simplified kind, and from which number on they ask for a new Jacobian at the next step
-MOST_ITERATIONS, SLOW = 10, 4
+MOST_ITERATIONS, SLOW_FROM = 10, 4
 #: iterations of the damped kind, and halvings of one correction
 MOST_CORRECTIONS, MOST_HALVINGS = 30, 12
 
@@ -332,7 +332,7 @@ def make_newton(evaluate: Callable, retract: Callable) -> tuple[Callable, Callab
             predict(d, step)
             count = iterate(d, step)
             if count > 0:
-                d.memory[JACOBIAN_HOLDS] = 1.0 if count <= SLOW else 0.0
+                d.memory[JACOBIAN_HOLDS] = 1.0 if count <= SLOW_FROM else 0.0
                 return True
             d.memory[JACOBIAN_HOLDS] = 0.0
             if fresh:
@@ -366,13 +366,13 @@ def make_jacobian(evaluate: Callable, retract: Callable) -> Callable:
             d.y_stage[c] = d.w[y + c]
         for k in range(n_rates(d)):
             floor, value = d.floors[d.groups[nq + k].group].natural, d.w[y + nq + k]
-            changed = value + PERTURBATION * (floor + abs(value))
+            changed = value + COLUMN_STEP * (floor + abs(value))
             d.y_stage[nq + k] = changed
             if not column(d, t, slope_there, k, changed - value, matrix(d, BY_STATE)):
                 return False
             d.y_stage[nq + k] = value
         for k in range(nv):
-            change = PERTURBATION * d.floors[d.groups[nq + k].group].natural
+            change = COLUMN_STEP * d.floors[d.groups[nq + k].group].natural
             for j in range(nv):
                 d.w[shift + j] = change if j == k else 0.0
             retract(d, y, shift, d.at_y_stage, positions(d))

@@ -28,12 +28,12 @@ from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub
 
 #: how close to its level a guard ends a step, as a fraction of the guard's size over the root of the tolerance: what a
 #: step errs that ends so far beyond falls with the square of it
-CLOSE = 0.1
+LEVEL_DISTANCE = 0.1
 #: a vector reverses that passes zero within this fraction of its way: in a plane mechanism that is rounding
 REVERSES = 1e-6
 MOST_REPEATS = 3
 #: a step that would be a smaller fraction of the tried one, or of the time reached, ends where it did
-SHORTEST = 1e-12
+SHORTEST_STEP = 1e-12
 #: what `first_passed` gives where a step passes no guard
 NONE = (2.0, -1, 0.0, 1.0, 0.0, 0.0)
 
@@ -88,8 +88,8 @@ def closeness(d, g):
     """Return how far from its level guard g counts as there; of one without a scale, by what the step changes."""
     numbers, bearing = d.guard_numbers[g], d.guards[g].bearing
     if bearing < 0 and numbers.scale == 0.0:
-        return CLOSE * np.sqrt(d.rtol) * length(sub(d.guarded[g].end, d.guarded[g].start))
-    return CLOSE * np.sqrt(d.rtol) * (d.bearing[bearing].load if bearing >= 0 else numbers.scale)
+        return LEVEL_DISTANCE * np.sqrt(d.rtol) * length(sub(d.guarded[g].end, d.guarded[g].start))
+    return LEVEL_DISTANCE * np.sqrt(d.rtol) * (d.bearing[bearing].load if bearing >= 0 else numbers.scale)
 
 
 @kernel
@@ -188,7 +188,7 @@ def make_end_on_guard(evaluate_at: Callable, extend: Callable, repeat: Callable)
             return 0.0
         close = closeness(d, g)
         theta = locate(d, step, g, 0.0, close, a, b, fa, fb)
-        if not theta < before or theta * step <= SHORTEST * max(abs(d.time), step):
+        if not theta < before or theta * step <= SHORTEST_STEP * max(abs(d.time), step):
             return 0.0
         size = land(d, step, theta, g, close, a, fa)
         if size < 0.0:

@@ -27,11 +27,11 @@ from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot
 
 #: off-diagonal entries of this fraction of the diagonal ones' geometric mean are zero; sweeps, quadratically convergent
-NOTHING, SWEEPS = 1e-13, 20
+OFF_DIAGONAL, SWEEPS = 1e-13, 20
 #: oscillators below this fraction of the largest frequency are not stiff, and left alone
-SLOW = 1e-6
+NOT_STIFF = 1e-6
 #: largest change of a coordinate by which the positions' rates are asked for
-A_LITTLE = 1e-9
+POSITION_CHANGE = 1e-9
 
 
 @kernel
@@ -273,7 +273,7 @@ def diagonalise(d, o, n):
             for q in range(p + 1, n):
                 P, R = matrix(d, o, p), matrix(d, o, q)
                 mixed, a, b = d.w[P + q], d.w[P + p], d.w[R + q]
-                if not abs(mixed) > NOTHING * np.sqrt(max(a * b, 0.0)):
+                if not abs(mixed) > OFF_DIAGONAL * np.sqrt(max(a * b, 0.0)):
                     continue
                 turned = True
                 half = 0.5 * (b - a) / mixed
@@ -316,7 +316,7 @@ def make_find_oscillators(retract: Callable) -> Callable:
             largest = max(largest, d.w[matrix(d, o, i) + i])
         for i in range(n):
             shape, omega2 = lifting(d, o, i), d.w[matrix(d, o, i) + i]
-            stiff = omega2 > SLOW * SLOW * largest
+            stiff = omega2 > NOT_STIFF * NOT_STIFF * largest
             d.w[square(d, o, i)] = omega2 if stiff else 0.0
             for j in range(n):
                 d.w[reading(d, o, i) + j] = d.w[axes(d, o, i) + j] * d.w[root(d, o, j)]
@@ -335,10 +335,10 @@ def make_find_oscillators(retract: Callable) -> Callable:
                 longest = max(longest, abs(d.w[shape + nq + c]))
             if longest > 0.0:
                 for c in range(nv):
-                    d.w[spare + c] = d.w[shape + nq + c] * (A_LITTLE / longest)
+                    d.w[spare + c] = d.w[shape + nq + c] * (POSITION_CHANGE / longest)
                 retract(d, state, spare, spare + nv, spare + nv + nq)
                 for c in range(nq):
-                    d.w[shape + c] = d.w[spare + nv + nq + c] * (longest / A_LITTLE)
+                    d.w[shape + c] = d.w[spare + nv + nq + c] * (longest / POSITION_CHANGE)
 
     @kernel
     def find_oscillators(d, o, known):

@@ -12,16 +12,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.integrate.within_step import NEAR
+from flexclear.pipeline.dynamics.integrate.within_step import ROOT_CORRECTION
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import dot, sub
 
 #: a gap is zero below this fraction of the clearance plus this one, four roundings, of the mechanism's size: a
 #: difference of the sites' positions has no digits below, which matters where clearances are of micrometres
-ZERO_GAP, ROUNDING = 1e-12, 8.9e-16
+ZERO_GAP, FOUR_ROUNDINGS = 1e-12, 8.9e-16
 ROOT_ITERATIONS, TURN_ITERATIONS = 60, 40
 #: fraction of the step at which a contact changes its mode that does not
-NEVER = 2.0
+NO_CHANGE = 2.0
 #: the cubic through a step's ends is trusted to this fraction of its own departure from a straight line; in long steps
 #: of order 8 it is off by a tenth of that
 TRUST = 0.2
@@ -29,7 +29,7 @@ TRUST = 0.2
 #: where the cubic through a stretch's ends misses its middle by more than this fraction of its departure, and of the
 #: distance from which the mode change is reached (what lies behind it may be thousands of times larger), and while the
 #: ball travels more than its clearance, of which the gap may tell nothing
-WIDEST, FAITHFUL = 0.25, 0.05
+WIDEST_STRETCH, FAITHFUL = 0.25, 0.05
 #: to this fraction: even the rate of a gap jumps where a ball passes the centre of its socket
 SHORTEST = 2.0**-13
 #: by more than a cubic, of this departure, may be lower between the quarters of its halves
@@ -45,7 +45,7 @@ def side(d, c):
 @kernel
 def zero_gap(d, c):
     """Size [m] below which the gap of contact c is zero."""
-    return ZERO_GAP * d.contact_numbers[c].clearance + ROUNDING * d.length
+    return ZERO_GAP * d.contact_numbers[c].clearance + FOUR_ROUNDINGS * d.length
 
 
 @kernel
@@ -94,7 +94,7 @@ def cubic_tells(d, c, step):
 def make_locate_change(evaluate_at: Callable) -> Callable:
     """The kernel locate_change(d, step, c), after `ends_tell` or `cubic_tells`.
 
-    It gives the fraction of the step where contact c changes its mode: 0 at once, NEVER not at all.
+    It gives the fraction of the step where contact c changes its mode: 0 at once, NO_CHANGE not at all.
     evaluate_at(d, step, theta): evaluates the dense output at a fraction of the step.
     """
 
@@ -119,7 +119,7 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
                 share = at_low / (at_low - at_high)
             theta = low + share * (high - low)
             value, rate = distance_at(d, step, theta, c)
-            if sign * value < -zero or abs(theta - before) <= NEAR:
+            if sign * value < -zero or abs(theta - before) <= ROOT_CORRECTION:
                 return theta
             if sign * rate > 0.0 or (sign < 0.0 and value < 0.0):
                 high, at_high = theta, max(sign * rate, 0.0)
@@ -149,7 +149,7 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
 
     @kernel
     def change_within(d, step, c, low, high, start, falling, end, rising):
-        """First mode change between two shares of the step with at most one turn between them, or NEVER.
+        """First mode change between two shares of the step with at most one turn between them, or NO_CHANGE.
 
         start, end: distances there; falling, rising: whether they fall at the first, and rise at the second.
         """
@@ -167,17 +167,17 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
             value, _ = distance_at(d, step, bottom, c)
             if value < -zero:
                 return root(d, step, c, low, bottom) if start > zero else low
-        return NEVER
+        return NO_CHANGE
 
     @kernel
     def search(d, step, c):
-        """First mode change in the step, stretch by stretch: 0 at once, NEVER not at all."""
+        """First mode change in the step, stretch by stretch: 0 at once, NO_CHANGE not at all."""
         zero, room = zero_gap(d, c), d.contact_numbers[c].clearance
         d0, r0 = distance_at(d, step, 0.0, c)
         p0 = d.touch[c].offset
-        d1, r1 = distance_at(d, step, WIDEST, c)
+        d1, r1 = distance_at(d, step, WIDEST_STRETCH, c)
         p1 = d.touch[c].offset
-        low, high = 0.0, WIDEST
+        low, high = 0.0, WIDEST_STRETCH
         while True:
             width, middle = high - low, 0.5 * (low + high)
             dm, r = distance_at(d, step, middle, c)
@@ -192,14 +192,14 @@ def make_locate_change(evaluate_at: Callable) -> Callable:
                     high, d1, r1, p1 = middle, dm, r, p
                     continue
                 theta = change_within(d, step, c, low, middle, d0, r0 < 0.0, dm, r >= 0.0)
-                if theta == NEVER:
+                if theta == NO_CHANGE:
                     theta = change_within(d, step, c, middle, high, dm, r < 0.0, d1, r1 >= 0.0)
-                if theta != NEVER:
+                if theta != NO_CHANGE:
                     return theta
             if high >= 1.0:
-                return NEVER
+                return NO_CHANGE
             low, d0, r0, p0 = high, d1, r1, p1
-            high = min(low + min(2.0 * width, WIDEST), 1.0)
+            high = min(low + min(2.0 * width, WIDEST_STRETCH), 1.0)
             d1, r1 = distance_at(d, step, high, c)
             p1 = d.touch[c].offset
 

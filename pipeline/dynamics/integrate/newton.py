@@ -11,17 +11,17 @@ from __future__ import annotations
 from flexclear.pipeline.dynamics.kernels import kernel
 
 #: what is left may be this fraction of the tolerance, or ten roundings if that is more
-SHARE, ROUNDING = 1e-2, 2.2e-15
+TOLERANCE_FRACTION, TEN_ROUNDINGS = 1e-2, 2.2e-15
 #: a first correction this far below the limit needs no second one to know how fast they fall
-SMALL = 1e-3
+SMALL_CORRECTION = 1e-3
 #: perturbation of a Jacobian's column, relative to the variable's size: root of the rounding error
-PERTURBATION = 1e-8
+COLUMN_STEP = 1e-8
 
 
 @kernel
 def limit(rtol):
     """Norm of what may be left, in units of the tolerance."""
-    return max(SHARE, ROUNDING / rtol)
+    return max(TOLERANCE_FRACTION, TEN_ROUNDINGS / rtol)
 
 
 @kernel
@@ -31,7 +31,7 @@ def converged(k, norm, last_norm, rtol):
     if not norm <= 1e300:
         return -1
     if k == 0:
-        return 1 if norm <= SMALL * enough else 0
+        return 1 if norm <= SMALL_CORRECTION * enough else 0
     rate = norm / last_norm
     if rate < 1.0 and rate / (1.0 - rate) * norm < enough:
         return 1

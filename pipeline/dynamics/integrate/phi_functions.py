@@ -18,28 +18,28 @@ import numpy as np
 from flexclear.pipeline.dynamics.kernels import kernel
 
 #: phi_0 to phi_4: a right-hand side that is a cubic in time needs the last
-COUNT = 5
+PHI_COUNT = 5
 #: below this a + b the series of phi_4 is taken, and the others from it: upwards, division by a leaves rounding
-SERIES, TERMS = 1.0, 14
+SERIES_LIMIT, TERMS = 1.0, 14
 #: where (b / 2)^2 - a is more, two decays are distinguished; where it is less, a is not small
-APART = 0.0625
+DISTINCT = 0.0625
 #: even order to which sine and cosine are expanded in between
-ALIKE = 12
-INVERSE_FACTORIALS = np.array([1.0 / factorial(k) for k in range(COUNT + TERMS)])
+EVEN_ORDER = 12
+INVERSE_FACTORIALS = np.array([1.0 / factorial(k) for k in range(PHI_COUNT + TERMS)])
 
 
 @kernel
 def decaying(w, out, x):
     """phi_0(-x), phi_1(-x), ... for a number x >= 0 into every second place of w from place out."""
     value = 0.0
-    if x < SERIES:
-        for k in range(COUNT + TERMS - 1, -1, -1):
+    if x < SERIES_LIMIT:
+        for k in range(PHI_COUNT + TERMS - 1, -1, -1):
             value = INVERSE_FACTORIALS[k] - x * value
-            if k < COUNT:
+            if k < PHI_COUNT:
                 w[out + 2 * k] = value
         return
     value = np.exp(-x)
-    for k in range(COUNT):
+    for k in range(PHI_COUNT):
         w[out + 2 * k] = value
         value = (INVERSE_FACTORIALS[k] - value) / x
 
@@ -51,7 +51,7 @@ def apart(w, out, a, b, root):
     slow = a / fast
     decaying(w, out, slow)
     decaying(w, out + 1, fast)
-    for k in range(COUNT):
+    for k in range(PHI_COUNT):
         beta = (w[out + 2 * k] - w[out + 2 * k + 1]) / (2.0 * root)
         w[out + 2 * k] += slow * beta
         w[out + 2 * k + 1] = beta
@@ -63,26 +63,26 @@ def phi_functions(w, out, a, b):
 
     Good to some ten thousand roundings of 1/k!, and mostly to a few.
     """
-    if a + b < SERIES:
-        alpha, beta = INVERSE_FACTORIALS[COUNT - 1 + TERMS], 0.0
-        for k in range(COUNT + TERMS - 2, -1, -1):
+    if a + b < SERIES_LIMIT:
+        alpha, beta = INVERSE_FACTORIALS[PHI_COUNT - 1 + TERMS], 0.0
+        for k in range(PHI_COUNT + TERMS - 2, -1, -1):
             alpha, beta = INVERSE_FACTORIALS[k] - a * beta, alpha - b * beta
-            if k < COUNT:
+            if k < PHI_COUNT:
                 w[out + 2 * k], w[out + 2 * k + 1] = alpha, beta
         return
     square, decay = a - 0.25 * b * b, np.exp(-0.5 * b)
-    if square < -APART:
+    if square < -DISTINCT:
         apart(w, out, a, b, np.sqrt(-square))
         return
-    if square > APART:
+    if square > DISTINCT:
         root = np.sqrt(square)
         alpha, beta = decay * np.cos(root), decay * np.sin(root) / root
     else:  # the same series, whether it swings or creeps
         alpha = beta = decay
-        for k in range(ALIKE, 0, -2):
+        for k in range(EVEN_ORDER, 0, -2):
             alpha, beta = decay - square / ((k - 1) * k) * alpha, decay - square / (k * (k + 1)) * beta
     alpha += 0.5 * b * beta
-    for k in range(COUNT):
+    for k in range(PHI_COUNT):
         w[out + 2 * k], w[out + 2 * k + 1] = alpha, beta
         rest = alpha - INVERSE_FACTORIALS[k]
         alpha, beta = beta - b * rest / a, -rest / a

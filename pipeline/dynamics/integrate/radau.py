@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.integrate import hermite
 from flexclear.pipeline.dynamics.integrate.method import Method, slope
 from flexclear.pipeline.dynamics.integrate.newton import (
-    PERTURBATION,
+    COLUMN_STEP,
     converged,
     lu_factor,
     lu_factor_complex,
@@ -63,7 +63,7 @@ P = np.array(
 )
 MOST_ITERATIONS = 7
 #: corrections that fall slower than this ask for a new Jacobian at the next step
-SLOW = 0.3
+SLOW_CONVERGENCE = 0.3
 
 # Memory between steps ------------------------------------------------------------------------------------------------
 # step of the factors, whether the Jacobian still holds, length of the step before (0: none); then vectors over the
@@ -269,7 +269,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
                     d.w[jacobian_entry(d, i, k)] = 0.0
                 continue
             y = d.y[k]
-            d.y_stage[k] = y + PERTURBATION * (d.floors[d.groups[k].group].natural + abs(y))
+            d.y_stage[k] = y + COLUMN_STEP * (d.floors[d.groups[k].group].natural + abs(y))
             change = d.y_stage[k] - y
             evaluate(d, d.time, d.at_y_stage, near)
             d.evaluations += 1
@@ -320,7 +320,7 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
             predict(d, step)
             rate = iterate(d, step)
             if rate >= 0.0:
-                d.memory[JACOBIAN_HOLDS] = 1.0 if rate <= SLOW else 0.0
+                d.memory[JACOBIAN_HOLDS] = 1.0 if rate <= SLOW_CONVERGENCE else 0.0
                 for c in range(d.ny):
                     d.y_new[c] = d.y[c] + d.w[stage_vector(d, Z, 2) + c]
                 return True

@@ -14,12 +14,12 @@ from flexclear.pipeline.dynamics.kernels import kernel
 #: recorded states are projected to this fraction of rtol times the mechanism's size; to more of a loose rtol, up to the
 #: second fraction, as it grows by so many times rtol: what a run left open itself need not cost an evaluation in every
 #: row
-RECORD_SHARE, MOST_SHARE, LOOSER = 1e-3, 0.1, 1e3
+RECORD_SHARE, MOST_SHARE, LOOSER_FACTOR = 1e-3, 0.1, 1e3
 
 
 def record_share(rtol: float) -> float:
     """Fraction of rtol times the mechanism's size to which the loops of recorded states are closed."""
-    return min(MOST_SHARE, max(RECORD_SHARE, LOOSER * rtol))
+    return min(MOST_SHARE, max(RECORD_SHARE, LOOSER_FACTOR * rtol))
 
 
 share_of_records = kernel(record_share)

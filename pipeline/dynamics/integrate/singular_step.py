@@ -32,9 +32,9 @@ FROM, HALF = 0.3, 0.5
 #: a row that has less than this fraction left cannot be stepped from, predicted or not
 TOO_LITTLE = 2e-4
 #: steps up to there end this fraction of the way before it short; the time of the pose is known better from nearer
-MARGIN, NEARER = 0.1, 0.7
+POSE_MARGIN, NEARER = 0.1, 0.7
 #: fraction of a step over which a slope is taken: the state there comes from the slope at the end
-A_LITTLE = 1e-4
+SLOPE_FRACTION = 1e-4
 #: fraction of the mechanism's size to which closures are closed where the polynomial ends
 TIGHTLY = 1e-15
 
@@ -140,7 +140,7 @@ def make_foresee(evaluate: Callable) -> Callable:
             if d.left > LOW:
                 d.most_reach = NEVER
             return
-        back = A_LITTLE * min(span, rough)
+        back = SLOPE_FRACTION * min(span, rough)
         for k in range(d.ny):
             d.y_stage[k] = d.y[k] - back * d.slopes[k]
         evaluate(d, t - back, d.at_y_stage, d.at_y_new)
@@ -162,7 +162,7 @@ def steer(d, t):
         return 0.0
     if ahead >= NEVER - t or d.most_reach == 0.0:
         return step
-    return min(step, min(ahead - (1.0 - MARGIN) * reach, NEARER * ahead))
+    return min(step, min(ahead - (1.0 - POSE_MARGIN) * reach, NEARER * ahead))
 
 
 @kernel

@@ -36,7 +36,7 @@ AGAIN = -2
 #: fraction of the planned step below which a step has been cut short
 CUT = 0.9
 #: such a step is tried again with this fraction of its length
-SHORTER = 0.3
+RETRY_FRACTION = 0.3
 #: steps in a row that end next to a singular pose before it counts as one that the motion does not leave
 MOST_BLIND = 20.0
 #: error norm of a step that could not be made
@@ -288,7 +288,7 @@ def make_advance(
             happened, known, t_end, step = resolve_events(d, step, t_new, rows, events)
             if happened == AGAIN and d.fixed == 0.0 and not along:  # a polynomial would be the same again
                 d.rejected += 1
-                d.step, d.rejected_step = SHORTER * step, 0.0
+                d.step, d.rejected_step = RETRY_FRACTION * step, 0.0
                 continue
             if happened < 0:
                 return False

@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.kernels import kernel
 
 #: a root's last correction, as a fraction of the step: what is left is its square, nearly; a maximum's, since it is
 #: flat
-NEAR, NEAR_MAXIMUM = 1e-8, 1e-6
+ROOT_CORRECTION, MAXIMUM_CORRECTION = 1e-8, 1e-6
 GOLDEN = 0.3819660112501051
 MOST_LOOKS = 60
 
@@ -70,7 +70,7 @@ def make_locate(value_at: Callable) -> Callable:
             if not a < theta < b:
                 theta = 0.5 * (a + b)
             value = value_at(d, step, theta, which) - level
-            if abs(value) <= enough or abs(theta - before) <= NEAR:
+            if abs(value) <= enough or abs(theta - before) <= ROOT_CORRECTION:
                 return theta
             if (value > 0.0) == (fb > 0.0):
                 b, fb = theta, value
@@ -95,18 +95,20 @@ def make_maximum(evaluate_at: Callable) -> Callable:
         fx = f_second = f_third = sign * d.w[place]
         for _ in range(MOST_LOOKS):
             middle = 0.5 * (a + b)
-            if abs(x - middle) <= 2.0 * NEAR_MAXIMUM - 0.5 * (b - a):
+            if abs(x - middle) <= 2.0 * MAXIMUM_CORRECTION - 0.5 * (b - a):
                 break
             r, q = (x - second) * (f_third - fx), (x - third) * (f_second - fx)
             p, q = (x - third) * q - (x - second) * r, 2.0 * (q - r)
             p, q = (-p, q) if q > 0.0 else (p, -q)
             wild = abs(p) >= abs(0.5 * q * e) or p <= q * (a - x) or p >= q * (b - x)
-            if abs(e) <= NEAR_MAXIMUM or wild:
+            if abs(e) <= MAXIMUM_CORRECTION or wild:
                 e = b - x if x < middle else a - x
                 move = GOLDEN * e
             else:
                 e, move = move, p / q
-            u = x + (move if abs(move) >= NEAR_MAXIMUM else (NEAR_MAXIMUM if move > 0.0 else -NEAR_MAXIMUM))
+            u = x + (
+                move if abs(move) >= MAXIMUM_CORRECTION else (MAXIMUM_CORRECTION if move > 0.0 else -MAXIMUM_CORRECTION)
+            )
             evaluate_at(d, step, u)
             fu = sign * d.w[place]
             if fu >= fx:

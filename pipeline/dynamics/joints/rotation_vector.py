@@ -16,13 +16,13 @@ from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO, add, at, cross, dot, put, scale
 
 #: angle^2 below which the functions are taken from their series; their next terms are below rounding there
-SMALL = 1e-2
+SERIES_ANGLE = 1e-2
 
 
 @kernel
 def _functions(s):
     """sin/angle, a, b and the derivatives of a and b by s = angle^2."""
-    if s < SMALL:
+    if s < SERIES_ANGLE:
         c = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0)))
         a = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0))))
         b = (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0)))) / 6.0

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 #: drives reach the requested pose in strides of this fraction of the mechanism's size, or this angle
 STRIDE = 0.05
 #: shortest stride, as a fraction of the whole way, before the pose counts as out of reach
-SHORTEST = 1e-4
+SHORTEST_STRIDE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
             q, fraction = closed(bench, q), attempt
         except SolverError:
             stride *= 0.5
-            if stride < SHORTEST:
+            if stride < SHORTEST_STRIDE:
                 raise
     return q
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: fraction of a vibration's displacements, or of its energy, that decides what it is
-MOST = 0.8
+DECISIVE = 0.8
 WHIRLS = ("backward", "", "forward")
 
 
@@ -159,7 +159,7 @@ def _point(bench: Bench, rest: Equilibrium, small: Vibrations, axis: np.ndarray)
     same = np.array([e[np.isclose(own, w)].sum() / e.sum() for e, w in zip(energy.T, omega, strict=True)])
     translation, rotation, fractions = motions(bench, rest, small.shape)
     sense = _sense(np.concatenate([translation, model.length * rotation], axis=1), axis)
-    sense[same < MOST] = 0.0
+    sense[same < DECISIVE] = 0.0
     parts = list(fractions)
     heaviest = np.argmax(np.stack([fractions[name] for name in parts], axis=1), axis=1)
     frames = equilibrium(bench, rest, True).frame_position.values
@@ -177,8 +177,8 @@ def _sense(moved: np.ndarray, axis: np.ndarray) -> np.ndarray:
         np.sum(np.abs(v) ** 2, axis=1) for v in (right + 1j * up, right - 1j * up, np.sqrt(2.0) * (moved @ z))
     )
     whole = np.maximum(forward + backward + along, np.finfo(float).tiny)
-    sense = np.where(forward > MOST * whole, 1.0, np.where(backward > MOST * whole, -1.0, np.nan))
-    return np.where(along > (1.0 - MOST) * whole, 0.0, sense)
+    sense = np.where(forward > DECISIVE * whole, 1.0, np.where(backward > DECISIVE * whole, -1.0, np.nan))
+    return np.where(along > (1.0 - DECISIVE) * whole, 0.0, sense)
 
 
 def _followed(points: Sequence[Point | None]) -> list[Branch]:

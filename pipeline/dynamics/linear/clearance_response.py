@@ -43,10 +43,10 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: the motion is examined so often
-LOOKS = 32
+BOUND_TIMES = 32
 #: squared singular values of the joints' rates far below this fraction of the largest are zero, and what is shown may
 #: be free by this: where a pose comes within some 3e-4 of a singular one there is no bound
-RANK, FREE = 1e-13, 1e-6
+SQUARED_RANK, FREE = 1e-13, 1e-6
 #: the force that presses a joint with clearance together is at least so many times the ideal one when it has been open
 KNOCK = 10.0
 #: quantities that the pose decides
@@ -74,7 +74,7 @@ def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Bounds:
     asked = [q for q in chosen if q.kind in OF_POSE and q.owner in model.mechanism.link_of]
     loads = joint_wrenches(Motions(model, seen), loose)
     load = {name: float(np.linalg.norm(loads[name][1], axis=1).max()) for name in loose}
-    rows = np.unique(np.linspace(0, len(seen.state) - 1, LOOKS).astype(int))
+    rows = np.unique(np.linspace(0, len(seen.state) - 1, BOUND_TIMES).astype(int))
     clearance = {name: {q.name: 0.0 for q in asked} for name in loose}
     joints = constraints(model.mechanism)
     whole = is_whole(model)
@@ -148,7 +148,7 @@ def lever_of(model: Model, joints: Sequence[Constraint], poses: Sequence[Placeme
     """The joints' rates in a pose of all links, and what solves with them."""
     G = sparse.csc_array(misfit(model.mechanism, list(joints), poses).gradient())
     normal = (G.T @ G).tocsc()
-    least = RANK * float(normal.diagonal().max(initial=1.0))
+    least = SQUARED_RANK * float(normal.diagonal().max(initial=1.0))
     factored = splu(normal + least * sparse.eye_array(normal.shape[0], format="csc"))
     where, axes, row = {}, {}, 0
     for joint in joints:

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: iterations before giving up
-MOST = 200
+MOST_MOVES = 200
 #: longest step, as a fraction of the mechanism's size or of a radian
-LONGEST = 0.2
+LONGEST_MOVE = 0.2
 #: balanced: unbalanced force below this fraction of those in balance (or of the weight), or a step too short to matter
-BALANCED, SHORT = 1e-12, 1e-14
+BALANCED, SHORT_MOVE = 1e-12, 1e-14
 #: what rounding may leave when iterations no longer gain
-ROUNDING = 1e-8
+STALLED = 1e-8
 #: eigenvalues of the stiffness below this fraction of the largest hold nothing
 LIMP = 1e-12
 #: a step may end with this fraction of the starting power turned against it
@@ -67,20 +67,20 @@ def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
     """The equilibrium close to positions q (loops closed); SolverError when there is none, or the search fails."""
     at = tangent(bench, q)
     best, since = np.inf, 0
-    for iteration in range(MOST):
+    for iteration in range(MOST_MOVES):
         size = float(np.linalg.norm(at.unbalanced))
         largest = max(weight(bench), magnitude(at.Z, at.bias))
         since = 0 if size < 0.5 * best else since + 1
         best = min(best, size)
-        if size <= BALANCED * largest or (since > 3 and size <= ROUNDING * largest):
+        if size <= BALANCED * largest or (since > 3 and size <= STALLED * largest):
             return Equilibrium(at, residual(bench, at), iteration)
         step = _step(bench, at, BALANCED * largest)
-        if float(np.max(np.abs(at.Z @ step) / bench.model.speed_scales)) <= SHORT:
+        if float(np.max(np.abs(at.Z @ step) / bench.model.speed_scales)) <= SHORT_MOVE:
             return Equilibrium(at, residual(bench, at), iteration)
         at = _search(bench, at, step)
     loose = _leading(bench.model, at.Z @ at.unbalanced, at.mass)
     raise SolverError(
-        f"the search for a static equilibrium close to this pose failed in {MOST} iterations: "
+        f"the search for a static equilibrium close to this pose failed in {MOST_MOVES} iterations: "
         f"a force of {residual(bench, at):.3g} N stays unbalanced, most of it at {loose}; "
         "hold that motion by a joint, a drive or a spring"
     )
@@ -107,9 +107,9 @@ def _step(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
     along = np.where(np.abs(force) > negligible / len(k), -force / np.maximum(np.abs(k), floor), 0.0)
     size = bench.model.speed_scales[:, None]
     reach = np.max(np.abs(at.Z @ axes) / size, axis=0)
-    along = np.clip(along, -LONGEST / reach, LONGEST / reach)
+    along = np.clip(along, -LONGEST_MOVE / reach, LONGEST_MOVE / reach)
     step = axes @ along
-    return step * min(1.0, LONGEST / max(float(np.max(np.abs(at.Z @ step) / size[:, 0])), 1e-300))
+    return step * min(1.0, LONGEST_MOVE / max(float(np.max(np.abs(at.Z @ step) / size[:, 0])), 1e-300))
 
 
 def _search(bench: Bench, at: Tangent, step: np.ndarray) -> Tangent:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: poses at which the vibrations are examined
-LOOKS = 8
+RESPONSE_POSES = 8
 #: kinds of quantities by what of the elastic coordinates makes them
 PLACES, RATES, FORCES = ("position", "orientation"), ("velocity", "angular_velocity"), ("force",)
 TURNS = ("orientation", "angular_velocity")
@@ -90,7 +90,7 @@ def response(
         [clearance_response.modal_forces(model, motions, n, b, loads, every)[once] for n, b in bundles.items()]
     )
     joints, responses = constraints(model.mechanism), list[Response]()
-    for row in np.unique(np.linspace(0, len(once) - 1, LOOKS).astype(int)):
+    for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
         assembled = _assembled(model, clearance_response.lever_of(model, joints, poses), poses, bundles)
         if assembled is None:

@@ -21,9 +21,16 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, closed, hold, set_drives
-from flexclear.pipeline.dynamics.linear.equilibrium import BALANCED, LONGEST, SHORT, Equilibrium, descend, residual
+from flexclear.pipeline.dynamics.linear.equilibrium import (
+    BALANCED,
+    LONGEST_MOVE,
+    SHORT_MOVE,
+    Equilibrium,
+    descend,
+    residual,
+)
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, stiffness, tangent
-from flexclear.pipeline.dynamics.linear.vibrations import NOTHING, Vibrations, vibrations
+from flexclear.pipeline.dynamics.linear.vibrations import ZERO_EIGENVALUE, Vibrations, vibrations
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import built_rows
 
 if TYPE_CHECKING:
@@ -32,7 +39,7 @@ if TYPE_CHECKING:
 #: corrections of one pose; each is at most this fraction of the one before, else a stride has to be shorter
 CORRECTIONS, CONTRACTION = 20, 0.5
 #: corrections below this fraction of the mechanism's size, or of a radian, that shrink no more are rounding
-ROUNDED = 1e-8
+STALLED_CORRECTION = 1e-8
 #: shortest stride, as a fraction of the drives' speed: narrow against the way between two critical speeds
 SHORTEST = 1.0 / 256.0
 #: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
@@ -128,9 +135,9 @@ def newton(bench: Bench, q: np.ndarray) -> Equilibrium:
         forces = at.forces * float(np.linalg.norm(np.abs(at.Z).T @ (1.0 / size)))
         step = _correction(bench, at, BALANCED * forces)
         length = float(np.max(np.abs(step) / size, initial=0.0))
-        if length <= SHORT or (length <= ROUNDED and length > CONTRACTION * last):
+        if length <= SHORT_MOVE or (length <= STALLED_CORRECTION and length > CONTRACTION * last):
             return Equilibrium(at, residual(bench, at), iteration)
-        if not length <= min(LONGEST, CONTRACTION * last):
+        if not length <= min(LONGEST_MOVE, CONTRACTION * last):
             break
         at, last = tangent(bench, closed(bench, at.q + at.moves @ step)), length
     raise SolverError(
@@ -148,10 +155,10 @@ def _correction(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
     motions = at.Z @ np.linalg.svd(first)[2].T
     K, error = stiffness(bench, at, motions)
     size, forces = np.linalg.norm(K, axis=0), motions.T @ at.bias
-    firm = size > np.maximum(NOTHING * error, np.finfo(float).tiny)
+    firm = size > np.maximum(ZERO_EIGENVALUE * error, np.finfo(float).tiny)
     along = -np.linalg.lstsq(K[:, firm] / size[firm], forces, rcond=None)[0] / size[firm]
     left = float(np.linalg.norm(forces + K[:, firm] @ along))
-    if left > max(negligible, ROUNDED * float(np.linalg.norm(forces))):
+    if left > max(negligible, STALLED_CORRECTION * float(np.linalg.norm(forces))):
         raise SolverError(
             f"at t = {bench.time:.6g} s: nothing holds a motion against a force of {residual(bench, at):.3g} N"
         )

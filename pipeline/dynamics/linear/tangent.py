@@ -17,7 +17,7 @@ from flexclear.pipeline.dynamics.linear.bench import Bench, acting, balance, bal
 from flexclear.pipeline.dynamics.linear.changes import force_changes
 
 #: singular values of the closures below this fraction of the largest are redundant rows
-RANK = 1e-9
+REDUNDANT_ROW = 1e-9
 #: rounding of a sum of some dozens of terms
 EPSILON = 1e-15
 
@@ -62,11 +62,11 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     rank, free = 0, np.eye(len(b.bias))
     if len(rows):
         _, values, axes = np.linalg.svd(rows)
-        rank = int(np.sum(values > RANK * values[0]))
+        rank = int(np.sum(values > REDUNDANT_ROW * values[0]))
         free = axes[rank:].T
     Z = scipy.linalg.solve_triangular(lower.T, free)
     load = scipy.linalg.solve_triangular(lower, b.bias, lower=True)
-    multipliers = np.linalg.lstsq(spread.T, load, rcond=RANK)[0] if len(spread) else np.zeros(0)
+    multipliers = np.linalg.lstsq(spread.T, load, rcond=REDUNDANT_ROW)[0] if len(spread) else np.zeros(0)
     moves = displacement_map(bench, q)
     redundant = len(b.jacobian) - rank + bench.engine.mobility.redundant
     return Tangent(q, Z, moves, b.bias, b.mass, multipliers, b.slip, redundant, forces)

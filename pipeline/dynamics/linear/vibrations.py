@@ -18,11 +18,11 @@ from flexclear.pipeline.dynamics.linear.bench import Bench
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, damping, stiffness
 
 #: an eigenvalue of the stiffness within this many roundings of zero is zero
-NOTHING = 10.0
+ZERO_EIGENVALUE = 10.0
 #: the same, as a fraction of the largest eigenvalue
 NOTHING_BESIDE = 1e-13
 #: asymmetry below this fraction of the scaled stiffness is rounding
-NEGLIGIBLE = 1e-9
+ASYMMETRY = 1e-9
 #: a motion without stiffness is scaled by this fraction of the highest frequency
 LEAST_SCALE = 1e-6
 #: an eigenvalue with this fraction of imaginary part is real, it decays or grows without vibrating; likewise imaginary
@@ -45,7 +45,9 @@ class Vibrations:
     @property
     def growth(self) -> float:
         """The largest rate at which a motion grows [1/s]; 0 where none does by more than its error."""
-        return float(np.max(np.where(self.value.real > NOTHING * self.doubt, self.value.real, 0.0), initial=0.0))
+        return float(
+            np.max(np.where(self.value.real > ZERO_EIGENVALUE * self.doubt, self.value.real, 0.0), initial=0.0)
+        )
 
     @property
     def stable(self) -> bool:
@@ -63,7 +65,7 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
     D, rate_error = damping(bench, at, motions)
     limp = _limp(K, error)
     least = NOTHING_BESIDE * max(float(np.abs(D).max()), float(np.sqrt(np.abs(np.diag(K)).max())))
-    D[np.abs(D) <= np.maximum(NOTHING * rate_error[None, :], least)] = 0.0
+    D[np.abs(D) <= np.maximum(ZERO_EIGENVALUE * rate_error[None, :], least)] = 0.0
     K[:, limp], K[limp, :] = 0.0, 0.0
     if _is_symmetric(K, error) and not np.any(D):
         k, axes = _principal(_symmetric(K, error), limp)
@@ -78,7 +80,7 @@ def vibrations(bench: Bench, at: Tangent) -> Vibrations:
 def _limp(K: np.ndarray, error: np.ndarray) -> np.ndarray:
     """Which motions have no stiffness as far as rounding shows."""
     own = np.abs(np.diag(K))
-    return own <= np.maximum(NOTHING * error, NOTHING_BESIDE**2 * own.max())
+    return own <= np.maximum(ZERO_EIGENVALUE * error, NOTHING_BESIDE**2 * own.max())
 
 
 def _scale(K: np.ndarray) -> np.ndarray:
@@ -88,7 +90,7 @@ def _scale(K: np.ndarray) -> np.ndarray:
 
 def _is_symmetric(K: np.ndarray, error: np.ndarray) -> bool:
     """Whether K is symmetric within the errors of its columns: then the forces have a potential."""
-    doubt = NOTHING * (error[:, None] + error[None, :]) + NEGLIGIBLE * np.outer(_scale(K), _scale(K))
+    doubt = ZERO_EIGENVALUE * (error[:, None] + error[None, :]) + ASYMMETRY * np.outer(_scale(K), _scale(K))
     return bool(np.all(np.abs(K - K.T) <= doubt))
 
 

@@ -37,7 +37,7 @@ from flexclear.pipeline.dynamics.vectors import (
 )
 
 #: angle^2 below which e is taken from its series; the next term is 1e-13 there
-SMALL = 1e-3
+SERIES_BELOW = 1e-3
 #: square of the angle [rad] from which on there is no torque; 6.2 of 2 pi
 FULL = 6.2**2
 #: where the damping matrix begins among the numbers, and the blocks of a 6x6 matrix
@@ -80,7 +80,7 @@ def continued(v, before):
 def tangent_part(v):
     """Factor e of the inverse tangent."""
     s = dot(v, v)
-    if s < SMALL:
+    if s < SERIES_BELOW:
         return (1.0 + s / 60.0 * (1.0 + s / 42.0 * (1.0 + s / 40.0))) / 12.0
     half = 0.5 * np.sqrt(s)
     return (1.0 - half * np.cos(half) / np.sin(half)) / s

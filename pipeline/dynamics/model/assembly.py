@@ -12,7 +12,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.model import fitting, given_start
 from flexclear.pipeline.dynamics.model.chain import path_positions
-from flexclear.pipeline.dynamics.model.closing import EXACT, close, far_apart, misfit, opposite
+from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY, close, far_apart, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands
 from flexclear.pipeline.dynamics.model.deformation import start_place
 from flexclear.pipeline.dynamics.model.driving import joint_class
@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics.model.placing import assemblies, chosen
 from flexclear.pipeline.dynamics.model.start_table import Given, given_coordinates
 
 #: joints that miss each other by less than this fraction of the mechanism's size are meant to fit
-SLIGHT = 1e-4
+MEANT_TO_FIT = 1e-4
 
 
 def assembled(mechanism: Mechanism, given: Mapping[str, Pieces] = NONE) -> Mechanism:
@@ -176,8 +176,10 @@ def _out_of_reach(mechanism: Mechanism, joints: Sequence[Constraint]) -> InputEr
 def _impossible(mechanism: Mechanism, joints: list[Constraint], poses: list[Placement]) -> InputError:
     left = residuals(joints, poses)
     worst = max(left, key=lambda name: left[name])
-    listed = ", ".join(f"{name} {value:.3g}" for name, value in left.items() if value > EXACT * mechanism.length)
-    slight = misfit(mechanism, joints, poses).worst < SLIGHT
+    listed = ", ".join(
+        f"{name} {value:.3g}" for name, value in left.items() if value > CLOSED_EXACTLY * mechanism.length
+    )
+    slight = misfit(mechanism, joints, poses).worst < MEANT_TO_FIT
     return InputError(
         f"[joint.{worst}.between]",
         f"the mechanism cannot be assembled close to the poses given; residuals there (m, or sines of angles): {listed}"

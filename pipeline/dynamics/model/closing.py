@@ -24,11 +24,11 @@ WORST_GUESS = 0.05
 BARE = 1.0
 #: residuals, in units of the mechanism's size, below which nothing is moved, and with which a closing may end; where
 #: coordinates are large next to the mechanism, so many roundings of them if that is more
-EXACT, CLOSED = 1e-13, 1e-11
+CLOSED_EXACTLY, CLOSED_ENOUGH = 1e-13, 1e-11
 EXACT_ROUNDINGS, CLOSED_ROUNDINGS = 4.0, 100.0
-ITERATIONS = 60
+CLOSING_ITERATIONS = 60
 #: least damping, as a fraction of the mean of the normal matrix: without any, that of redundant joints has no inverse
-ROUNDING = 1e-15
+LEAST_DAMPING = 1e-15
 #: least cosine between axes that a joint keeps parallel
 SAME_WAY = 0.5
 #: radius of gyration, as fraction of the mechanism's size, below which a link resists turning no less
@@ -79,7 +79,7 @@ def close(
     same thing twice (Yamashita & Fukushima 2001, Computing Suppl. 15, 239-249).
     """
     here, grain = list(poses), _rounding(mechanism)
-    exact, closed = max(EXACT, EXACT_ROUNDINGS * grain), max(CLOSED, CLOSED_ROUNDINGS * grain)
+    exact, closed = max(CLOSED_EXACTLY, EXACT_ROUNDINGS * grain), max(CLOSED_ENOUGH, CLOSED_ROUNDINGS * grain)
     now = misfit(mechanism, joints, here)
     if now.worst <= exact:
         return here
@@ -88,11 +88,11 @@ def close(
 
     mobility = diags_array(_mobilities(mechanism, here, still))
     damping = 1.0
-    for _ in range(ITERATIONS):
+    for _ in range(CLOSING_ITERATIONS):
         gradient = now.gradient()
         G = gradient @ mobility
         normal, rows = G @ gradient.T, len(now.values)
-        scale = max(damping * float(np.linalg.norm(now.values)), ROUNDING) * normal.trace() / rows
+        scale = max(damping * float(np.linalg.norm(now.values)), LEAST_DAMPING) * normal.trace() / rows
         step = -G.T @ spsolve((normal + scale * eye_array(rows)).tocsc(), now.values)
         there = _moved(mechanism, here, step)
         then = misfit(mechanism, joints, there)

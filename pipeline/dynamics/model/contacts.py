@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 #: least impact rates where the scene gives none: far below the approach speeds of common machines [m/s or rad/s], and
 #: the fraction of the size of a mechanism of 10 cm that this is [1/s]; in one of micrometres 1 um/s would be fast
-LEAST_RATE, SLOW = 1e-6, 1e-5
+LEAST_RATE, SLOW_IMPACT = 1e-6, 1e-5
 #: wiring of a contact but for the kinds of its laws
 Touching = Sequence[tuple[int, int]]
 
@@ -96,7 +96,7 @@ def _floor(joint: Clearance | End, length: float) -> float:
     """Least impact rate of a contact of a mechanism of that size [m/s or rad/s]."""
     if joint.floor is not None:
         return joint.floor
-    return LEAST_RATE if ends_an_angle(joint) else min(LEAST_RATE, SLOW * length)
+    return LEAST_RATE if ends_an_angle(joint) else min(LEAST_RATE, SLOW_IMPACT * length)
 
 
 def friction_law(name: str, joint: Any) -> Any:

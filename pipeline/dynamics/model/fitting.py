@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 
 #: steps of Newton's method for the frame of a joint, which converge quadratically from what a mesh leaves
-STEPS = 5
+NEWTON_STEPS = 5
 
 
 def fitted(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Placement]) -> Scene | None:
@@ -56,7 +56,7 @@ def fitted(mechanism: Mechanism, joints: list[Constraint], poses: Sequence[Place
 def _met(joint: Constraint, poses: Sequence[Placement], far: bool) -> Placement:
     """The joint's second frame in the world, or its first one, moved by the least that makes the joint fit."""
     A, B = joint.frames(poses)
-    for _ in range(STEPS):
+    for _ in range(NEWTON_STEPS):
         residual, wrench = demands(joint.edge.kind, A, B)
         here = B if far else A
         moment = wrench[:, :3] - wrench[:, 3:] @ skew(here.p).T

@@ -10,7 +10,7 @@ from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode, Rayl
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.interface_basis import (
-    NEGLIGIBLE,
+    NO_COUPLING,
     InterfaceBasis,
     frame_index,
     frame_shapes,
@@ -171,7 +171,7 @@ def _moments(bundle: Labelled) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Nonzero int rho S_ki S_lj, row (3k + l) n + j after row: values, modes i, and per row how many end with it."""
     F = bundle["mode_mode_moment"].values
     n = F.shape[-1]
-    k, l, i, j = np.nonzero(np.abs(F) > NEGLIGIBLE * max(np.abs(F).max(), 1e-300))
+    k, l, i, j = np.nonzero(np.abs(F) > NO_COUPLING * max(np.abs(F).max(), 1e-300))
     row = (3 * k + l) * n + j
     order = np.lexsort((i, row))
     return F[k, l, i, j][order], i[order], np.cumsum(np.bincount(row, minlength=9 * n))

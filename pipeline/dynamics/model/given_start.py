@@ -22,11 +22,11 @@ from flexclear.pipeline.dynamics.model.start_table import Given
 from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
 #: a start further from its drive's law than this, as fraction of the mechanism's size or in rad, is a contradiction
-FAR, FAR_ANGLE = 0.05, 0.1
+FAR_FROM_LAW, FAR_ANGLE = 0.05, 0.1
 #: what is moved by less than this, as fraction of the mechanism's size or in rad, was given as well as it was written
 WRITTEN = 1e-6
 #: most bodies of which a mend is reported one by one
-MOST = 8
+MOST_REPORTED = 8
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ def refuse_far(mechanism: Mechanism, far: Sequence[Miss]) -> None:
     for miss in far:
         if miss.of_path:
             continue
-        limit = FAR_ANGLE if miss.turning else FAR * mechanism.length
+        limit = FAR_ANGLE if miss.turning else FAR_FROM_LAW * mechanism.length
         if miss.size > limit:
             unit = "rad" if miss.turning else "m"
             raise InputError(
@@ -193,5 +193,5 @@ def moved(mechanism: Mechanism, now: Sequence[Placement]) -> list[str]:
     if not corrections:
         return []
     texts = [text for _, text in sorted(corrections, reverse=True)]
-    more = [f"and {len(texts) - MOST} more bodies"] if len(texts) > MOST else []
-    return [f"the start was mended so that joints and drives fit: {'; '.join([*texts[:MOST], *more])}"]
+    more = [f"and {len(texts) - MOST_REPORTED} more bodies"] if len(texts) > MOST_REPORTED else []
+    return [f"the start was mended so that joints and drives fit: {'; '.join([*texts[:MOST_REPORTED], *more])}"]

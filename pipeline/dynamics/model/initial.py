@@ -34,7 +34,7 @@ WRONG = 0.05
 #: combinations of speeds that change rates by less than this fraction of the largest change nothing: redundant closures
 REDUNDANT = 1e-9
 #: a spring shorter than this fraction of the mechanism's size has no direction
-SHORTEST = 1e-9
+SHORTEST_SPRING = 1e-9
 
 
 def start_state(model: Model) -> np.ndarray:
@@ -290,7 +290,7 @@ def check_loads(model: Model, loads: np.ndarray) -> None:
     for (name, _), value in zip(model.loads, loads["value"], strict=True):
         load = model.scene.load[name]
         has_direction = isinstance(load, SpringDamper) and (load.damping > 0.0 or load.free_length)
-        if has_direction and value <= SHORTEST * model.length:
+        if has_direction and value <= SHORTEST_SPRING * model.length:
             raise InputError(
                 f"[load.{name}.between]",
                 "its two ends coincide at the start, so that it pulls in no direction",

@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.model.arrays import Arrays
 
 #: a shape or moment below this fraction of the largest of its kind is rounding, not coupling
-NEGLIGIBLE = 1e-13
+NO_COUPLING = 1e-13
 #: so is a product of inertia of two modes, of unit modal mass, below this: it is a sum over all elements
 UNCOUPLED = 1e-11
 #: singular values of the frames' shapes below this fraction of the largest move nothing
-RANK = 1e-12
+FRAME_RANK = 1e-12
 #: modes are mixed where for each moving shape at least so many are held: fewer save less than mixing takes
-WORTH = 0.5
+WORTH_MIXING = 0.5
 
 
 @dataclass(frozen=True)
@@ -100,10 +100,10 @@ def _family(motions: np.ndarray, stiffness: np.ndarray) -> tuple[np.ndarray, np.
     """Held and moving shapes, columns over the modes of one family."""
     n = len(stiffness)
     _, values, rows = np.linalg.svd(motions, full_matrices=True) if motions.size else (None, np.zeros(0), np.eye(n))
-    rank = int(np.sum(values > RANK * values.max(initial=1e-300)))
+    rank = int(np.sum(values > FRAME_RANK * values.max(initial=1e-300)))
     if rank == 0:
         return np.eye(n), np.zeros((n, 0))
-    if n - rank < WORTH * rank or rank == n:
+    if n - rank < WORTH_MIXING * rank or rank == n:
         return np.zeros((n, 0)), np.eye(n)
     still, moving = rows[rank:].T, rows[:rank].T
     _, axes = np.linalg.eigh(still.T @ (stiffness[:, None] * still))
@@ -126,7 +126,7 @@ def frame_shapes(bundle: Labelled, frame: str) -> tuple[np.ndarray, np.ndarray, 
     for name, shape in zip(("frame_translation_shape", "frame_rotation_shape"), shapes, strict=True):
         # what the reference condition holds still is exactly still
         scale = np.abs(bundle[name].values).max()
-        shape[np.abs(shape) <= NEGLIGIBLE * 1e3 * scale] = 0.0
+        shape[np.abs(shape) <= NO_COUPLING * 1e3 * scale] = 0.0
     return pose, shapes[0], shapes[1]
 
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: fraction of the largest radius of gyration below which the distances of a scene are no size of it
-NOTHING = 1e-9
+NO_SIZE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -358,7 +358,7 @@ def _size(links: Sequence[Link], frames: Mapping[str, Frame], clearances: Sequen
     size = max(size, *clearances, 0.0)
     # of a body held at its centre of mass, only rounding of its position is left
     gyration = max((np.sqrt(np.trace(J) / (2.0 * mass)) for mass, _, J in _inertias(links)), default=0.0)
-    return size if size > NOTHING * gyration else float(gyration) or 1.0
+    return size if size > NO_SIZE * gyration else float(gyration) or 1.0
 
 
 def _inertias(links: Sequence[Link]) -> list[tuple[float, np.ndarray, np.ndarray]]:

@@ -26,13 +26,13 @@ from flexclear.pipeline.dynamics.model.rates import Rates, motions, rates, row_a
 
 #: displacements, in radians and fractions of the mechanism's size, of the poses nearby; how many are searched for, and
 #: how many are enough; fraction of the displacement that such a pose must keep when its loops are closed
-NEARBY, TRIES, ENOUGH, LEFT = (0.03, 0.01), 24, 2, 0.1
+NEARBY, POSE_TRIES, ENOUGH_POSES, LEFT = (0.03, 0.01), 24, 2, 0.1
 #: fraction of a self-stress that a joint must carry for its reaction to count as undetermined
 CARRIES = 1e-6
 #: condition numbers are not distinguished from infinity above this
 INFINITE = 1e15
 #: rows of a locked mechanism that are smaller than this may be no more than misaligned joints
-SLIGHT = 1e-3
+SLIGHT_ROW = 1e-3
 #: a motion has no mass when it has this fraction of what it would have if every body resisted turning about all axes
 #: alike
 WEIGHTLESS = 1e-14
@@ -111,7 +111,7 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
     joints, start = constraints(model.mechanism), [link.start for link in model.links]
     random = np.random.default_rng(0)
     left, stayed, evidence = [(here.rank, start)], [(here.rank, start)], 0
-    for k in range(TRIES):
+    for k in range(POSE_TRIES):
         fraction = random.normal(size=here.free.shape[1])
         motion = here.free @ (fraction / np.linalg.norm(fraction))
         motion *= NEARBY[k % 2] / max(1.0, float(np.linalg.norm(motion)))
@@ -122,7 +122,7 @@ def _regular_poses(model: Model, here: Rates) -> list[Placement] | None:
         away = _distance(start, there, model.length) > LEFT * NEARBY[k % 2]
         (left if away else stayed).append((rates(model, there).rank, there))
         evidence += away
-        if evidence == ENOUGH:
+        if evidence == ENOUGH_POSES:
             break
     rank, poses = max(left if evidence else stayed, key=lambda pose: pose[0])
     return poses if rank > here.rank else None
@@ -200,7 +200,7 @@ def _refuse_locked(model: Model, mobility: Mobility, here: Rates) -> None:
     least = float(np.min(here.values[: here.rank], initial=1.0))
     hardly = (
         f"; one of these rows is only {least:.1g} of its natural size, as of joints whose axes hardly miss each other"
-        if least < SLIGHT
+        if least < SLIGHT_ROW
         else ""
     )
     raise InputError(

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.contact.law import Resolved
 
 #: four roundings of a length, as a fraction of it
-ROUNDED = 8.9e-16
+LENGTH_ROUNDING = 8.9e-16
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ def _symmetric(J: np.ndarray) -> list[float]:
 
 #: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted, up to
 #: which the mass matrix is factored as a matrix: beyond it, articulated inertias take less time (docs/engine.md)
-DEEP = 8.0
+DEEP_TREE = 8.0
 #: tables that follow from links, joints, frames and flexible bodies alone
 WIRED = (
     *(m.LINKS, m.SITES, m.SITE_NUMBERS, m.FLEXES, m.BASIS, m.MOMENTS, m.MOMENT_ROWS, m.PORTS, m.PAIRS, m.KNOWN_PAIRS),
@@ -227,7 +227,7 @@ def _parts(numbering: Numbering, normals: tuple[Resolved, ...], harmonics: bool)
 
 
 def articulated(numbering: Numbering) -> bool:
-    """Return whether the tree is so deep that articulated inertias are faster than the mass matrix (`DEEP`)."""
+    """Return whether the tree is so deep that articulated inertias are faster than the mass matrix (`DEEP_TREE`)."""
     mechanism = numbering.mechanism
     if not mechanism.all_rigid or not numbering.nv:
         return False
@@ -236,7 +236,7 @@ def articulated(numbering: Numbering) -> bool:
         own = [c for c in numbering.coordinates[i] if c < numbering.nv]
         depths += [before[link.branch.parent] + k for k in range(1, len(own) + 1)]
         before[i] = before[link.branch.parent] + len(own)
-    return bool(np.sqrt(np.mean(np.square(depths))) > DEEP)
+    return bool(np.sqrt(np.mean(np.square(depths))) > DEEP_TREE)
 
 
 def _pose_row(placement: Placement) -> np.ndarray:
@@ -320,7 +320,7 @@ def _closure_weights(mechanism: Mechanism, closures: Sequence[Closure | Coupling
     What is small in large surroundings closes no tighter than these round its places.
     """
     L, weights = mechanism.length, list[float]()
-    rounding = ROUNDED * L / mechanism.scene.solver.rtol
+    rounding = LENGTH_ROUNDING * L / mechanism.scene.solver.rtol
     for one in closures:
         sites = (one.a, one.b) if isinstance(one, Closure) else (one.first.a, one.first.b, one.second.a, one.second.b)
         part = mechanism.components.of(*(site.link for site in sites))

@@ -25,9 +25,9 @@ GUESSES = 16
 #: size of random slides, as a fraction of the mechanism's size
 SLIDE = 0.3
 #: assemblies are one if no coordinate differs by more than this, in radians or fractions of the mechanism's size
-SAME = 1e-4
+SAME_ASSEMBLY = 1e-4
 #: a mechanism that can move, and is so close to all hints, is searched for no further
-NEAR = 0.5
+NEAR_HINTS = 0.5
 #: singular values of naturally sized rows below this fraction of the largest leave a motion free
 LOOSE = 1e-6
 
@@ -71,9 +71,12 @@ def assemblies(
         if poses is None or opposite(joints, poses) is not None:
             continue
         made = Assembly(poses, _coordinates(joints, poses))
-        if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME for other in distinct):
+        if all(_distance(mechanism, joints, made.coordinates, other.coordinates) > SAME_ASSEMBLY for other in distinct):
             distinct.append(made)
-        if not _isolated(mechanism, joints, poses) and _distance(mechanism, joints, made.coordinates, hints) < NEAR:
+        if (
+            not _isolated(mechanism, joints, poses)
+            and _distance(mechanism, joints, made.coordinates, hints) < NEAR_HINTS
+        ):
             break  # a mechanism that can move is assembled where it was first searched for
     return sorted(
         distinct,
@@ -93,7 +96,7 @@ def chosen(
         return ""
     hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
     distances = [_distance(mechanism, joints, one.coordinates, hints) for one in candidates]
-    if hints and distances[1] - distances[0] > SAME:
+    if hints and distances[1] - distances[0] > SAME_ASSEMBLY:
         return ""
     units = {(j.name, k): c for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
     differences = {key: abs(first.coordinates[key] - candidates[1].coordinates[key]) for key in first.coordinates}

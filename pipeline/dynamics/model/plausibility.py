@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.ideal import loose
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.variants import loose
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.effects.stops.model import STOP, End
 from flexclear.pipeline.dynamics.model.mechanism import Contact, Mechanism
@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics.model.merge import Placement
 ROUND = ("clearance-revolute", "clearance-spherical")
 #: frames that are closer than this fraction of the mechanism's size are at one point; surfaces that are less deep in
 #: each other than this fraction of their clearance or radius may only touch
-SAME = 1e-3
+SAME_POINT = 1e-3
 
 
 def offsets(mechanism: Mechanism) -> Iterator[tuple[Contact, np.ndarray, Placement]]:
@@ -62,13 +62,13 @@ def refuse_overlap(mechanism: Mechanism) -> None:
         return
     for contact, away, _ in offsets(mechanism):
         depth = float(np.linalg.norm(away)) - contact.joint.clearance
-        if depth > SAME * contact.joint.clearance:
+        if depth > SAME_POINT * contact.joint.clearance:
             refuse_depth(scene, contact, depth)
     for contact in mechanism.contacts:
         if contact.joint.type == "ball-on-plane":
             plane, ball = (mechanism.links[s.link].start.of(s.place) for s in (contact.outer, contact.inner))
             depth = contact.joint.radius - float((ball.p - plane.p) @ plane.R[:, 2])
-            if depth > SAME * contact.joint.radius:
+            if depth > SAME_POINT * contact.joint.radius:
                 refuse_depth(scene, contact, depth)
 
 
@@ -115,7 +115,7 @@ def forgotten(mechanism: Mechanism) -> list[tuple[str, str, str]]:
         links = _links(mechanism, (a, b))
         if links[0] == links[1] or frozenset(links) in connected:
             continue
-        if np.linalg.norm(_position(mechanism, a) - _position(mechanism, b)) <= SAME * mechanism.length:
+        if np.linalg.norm(_position(mechanism, a) - _position(mechanism, b)) <= SAME_POINT * mechanism.length:
             text = f"nothing uses the frames '{a}' and '{b}', which start at the same point: is a joint missing?"
             remedy = f'add a joint with between = ["{a}", "{b}"], or remove the frames'
             result.append((mechanism.frames[a].body, text, remedy))

@@ -39,9 +39,9 @@ LEAST_ARM = 1e-3
 #: sum of some ten products whose factors, frames along a chain, are right to some ten roundings of 1e-16, in all
 #: 1e-14; poses are closed to 1e-13, at worst 1e-11, of the mechanism's size, which is 1e-8 of the least arm.  And it
 #: is below the root of `closures.SINGULAR_PIVOT`, 3e-7, where the kernels no longer solve for a row.
-ZERO = 1e-7
+ZERO_SINGULAR_VALUE = 1e-7
 #: rounds of scaling; each halves the exponents by which rows and columns differ
-ROUNDS = 12
+SCALING_ROUNDS = 12
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Rates:
     @property
     def rank(self) -> int:
         """Number of independent rows."""
-        return int(np.sum(self.values > ZERO))
+        return int(np.sum(self.values > ZERO_SINGULAR_VALUE))
 
     @property
     def free(self) -> np.ndarray:
@@ -100,7 +100,7 @@ class Rates:
     def tied(self) -> np.ndarray:
         """Whether each driven coordinate takes part in what closures demand of driven ones alone; shape (drives,)."""
         left = self.decomposed[0][:, self.rank :].T @ self.known
-        return np.asarray(np.max(np.abs(left), axis=0, initial=0.0) > ZERO)
+        return np.asarray(np.max(np.abs(left), axis=0, initial=0.0) > ZERO_SINGULAR_VALUE)
 
 
 def rates(model: Model, poses: Sequence[Placement]) -> Rates:
@@ -224,7 +224,7 @@ def _frame_motions(model: Model, link: int, frame: str, pose: Placement) -> tupl
 def scales(sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Factors of rows and columns that bring the largest of each to one; empty ones keep the factor one."""
     row, column = np.ones(sizes.shape[0]), np.ones(sizes.shape[1])
-    for _ in range(ROUNDS):
+    for _ in range(SCALING_ROUNDS):
         now = sizes * row[:, None] * column
         row /= _root(np.max(now, axis=1, initial=0.0))
         column /= _root(np.max(now, axis=0, initial=0.0))

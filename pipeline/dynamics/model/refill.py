@@ -18,7 +18,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import pieces_of
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS
-from flexclear.pipeline.dynamics.model.closing import EXACT
+from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY
 from flexclear.pipeline.dynamics.model.driving import Prescribed, prescribed
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, sizes
 from flexclear.pipeline.dynamics.model.merge import rigid_inertia
@@ -39,7 +39,7 @@ CHANGEABLE = {f"{table}.{key}" for table, keys in KEYS.items() for key in keys.s
 CHANGEABLE |= {key for effect in EFFECTS for key in effect.changeable}
 CHANGEABLE |= {"title", "description", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view"}
 #: least principal moment as fraction of the largest with which no motion of a link can be without inertia
-SLENDER = 1e-6
+SLENDER_INERTIA = 1e-6
 
 
 def refilled(model: Model, scene: Scene) -> Model | None:
@@ -119,11 +119,15 @@ def _weighed(mechanism: Mechanism, scene: Scene) -> Mechanism | None:
                 return None
             links[i] = replace(link, inertia=now)
     principal = np.linalg.eigvalsh(np.array([link.inertia.moments for link in links if link.inertia is not None]))
-    if not np.all(principal[:, 0] > SLENDER * principal[:, -1]):
+    if not np.all(principal[:, 0] > SLENDER_INERTIA * principal[:, -1]):
         return None
     placed = [replace(link, start=start) for link, start in zip(links, mechanism.placed, strict=True)]
     length, parts = sizes(scene, placed, mechanism.link_of, mechanism.frames)
-    if not mechanism.start_residual < 0.5 * EXACT * min(1.0, length) or mechanism.choice or mechanism.has_paths:
+    if (
+        not mechanism.start_residual < 0.5 * CLOSED_EXACTLY * min(1.0, length)
+        or mechanism.choice
+        or mechanism.has_paths
+    ):
         return None
     if any(joint.clearance >= min(parts.lengths) for joint in scene.contacts().values()) or not mechanism.all_rigid:
         return None

@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.model.wiring import closure_envelope, threes
 
 #: a row below this fraction of its natural length is rounding: the square root of what rounding leaves of a cancelling
 #: sum, 1e-13 at worst, with some digits to spare
-NOTHING = 1e-6
+ROUNDING_ROW = 1e-6
 
 
 def choose(spread: np.ndarray, scale: np.ndarray, rank: int) -> tuple[np.ndarray, float]:
@@ -55,7 +55,7 @@ def row_scales(model: Model, spread: np.ndarray, natural: np.ndarray) -> np.ndar
         span = slice(line["row0"], line["row0"] + line["n_rows"])
         for kind in (0, 1):
             mine = np.flatnonzero(kinds[span] == kind) + span.start
-            scales[mine] = np.maximum(np.max(lengths[mine], initial=0.0), NOTHING * natural[mine])
+            scales[mine] = np.maximum(np.max(lengths[mine], initial=0.0), ROUNDING_ROW * natural[mine])
     return scales
 
 

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: residuals below these are rounding of a closed mechanism: a fraction of its size, and an angle [rad]
-CLOSED, STRAIGHT = 1e-8, 1e-7
+CLOSED_POSE, STRAIGHT = 1e-8, 1e-7
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _gaps(mechanism: Mechanism, joints: Sequence[Constraint], poses: Sequence[Pl
                     away = away + value * wrench[3:]
                 else:
                     turned = max(turned, float(abs(value)))
-        if np.linalg.norm(away) > CLOSED * mechanism.length or turned > STRAIGHT:
+        if np.linalg.norm(away) > CLOSED_POSE * mechanism.length or turned > STRAIGHT:
             end = B.p + mechanism.origin
             result.append(Gap(joint.name, end - away, end, turned))
     return result

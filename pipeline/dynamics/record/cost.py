@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.horizon.horizon import PerturbedRun
 
 #: an integration is repeated so often, and short ones until they have taken this time together, but no more often than
-#: that: a disturbance of a millisecond is a tenth of some. What has taken LONG is an average by itself [s]
-REPEATS, ENOUGH, MOST, LONG = 3, 0.05, 15, 1.5
+#: that: a disturbance of a millisecond is a tenth of some. What has taken LONG_RUN is an average by itself [s]
+REPEATS, ENOUGH_TIME, MOST_REPEATS, LONG_RUN = 3, 0.05, 15, 1.5
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ def measure(
     record = lambda: dataset(Run(scene, last, trajectory, observed(last, trajectory), None, switched))  # noqa: E731
     recording = (_once(record),) if brief else _repeated(record, 0)
     run = dataset(Run(scene, last, trajectory, seen, perturbed, switched))
-    integration = _repeated(lambda: follow(engine, start, silent, other), MOST, first)
+    integration = _repeated(lambda: follow(engine, start, silent, other), MOST_REPEATS, first)
     return Cost(run, integration, recording, engine.model.length)
 
 
@@ -96,9 +96,9 @@ def _followed(
 def _repeated(task: Callable[[], object], most: int, first: tuple[float, ...] = ()) -> tuple[float, ...]:
     """Processor times [s] of a task, `first` among them: REPEATS, or up to `most` of a short one."""
     seconds = [*first]
-    while not seconds or (sum(seconds) < LONG and len(seconds) < REPEATS):
+    while not seconds or (sum(seconds) < LONG_RUN and len(seconds) < REPEATS):
         seconds.append(_once(task))
-    while len(seconds) < most and sum(seconds) < ENOUGH:
+    while len(seconds) < most and sum(seconds) < ENOUGH_TIME:
         seconds.append(_once(task))
     return tuple(seconds)
 

@@ -26,7 +26,7 @@ from flexclear.pipeline.dynamics.record.motion import Motions, motion_series
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.periods import (
-    SEPARATION,
+    NEIGHBOUR,
     Cursor,
     Period,
     periods,
@@ -93,7 +93,7 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     made = xr.Dataset(variables, coords=coordinates)
     title = f"Sections of the periodic motion of {subject(scene)}"
     return conform(
-        made, SECTIONS, title=title, **attributes(scene), **facts, neighbour_distance=SEPARATION * engine.rtol
+        made, SECTIONS, title=title, **attributes(scene), **facts, neighbour_distance=NEIGHBOUR * engine.rtol
     )
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: components of stress that are held at once; bounds the memory
-AT_ONCE = 10_000_000
+COMPONENTS_AT_ONCE = 10_000_000
 
 
 def factors(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -51,7 +51,7 @@ def largest(field: np.ndarray, factor: np.ndarray, groups: list[np.ndarray]) -> 
     tensor = np.empty((len(factor), len(groups), 6))
     node = np.empty((len(factor), len(groups)), dtype=np.int64)
     flat = np.ascontiguousarray(field.reshape(-1, field.shape[2]).T)
-    step = max(1, AT_ONCE // flat.shape[1])
+    step = max(1, COMPONENTS_AT_ONCE // flat.shape[1])
     for start in range(0, len(factor), step):
         part = slice(start, start + step)
         stress = (factor[part] @ flat).reshape(-1, *field.shape[:2])

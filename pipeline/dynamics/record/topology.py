@@ -17,12 +17,12 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 #: singular values of the selected closure rows below this fraction of the largest count as zero in the rank
-ZERO = 1e-9
+ZERO_ROW = 1e-9
 #: condition numbers below which no row's rank is in doubt, in whatever units, and with which eigenvalues of J J^T, the
 #: squares of the singular values, still have ten of their digits: their roundings are 1e-16 of the largest one
 WELL = 1e3
 #: so many rows are examined together: the matrices of all take longer to get from the system than to work out
-AT_ONCE = 256
+ROWS_AT_ONCE = 256
 
 
 def topology(run: Run) -> tuple[Variables, dict[str, object]]:
@@ -39,7 +39,7 @@ def topology(run: Run) -> tuple[Variables, dict[str, object]]:
         singular_rows = condition[1] > WELL
         if singular_rows.any():
             values = _singular_values(engine, trajectory, seen, closure_rows.natural)[singular_rows]
-            rank[singular_rows] = np.sum(values > ZERO * values[:, :1], axis=1)
+            rank[singular_rows] = np.sum(values > ZERO_ROW * values[:, :1], axis=1)
     variables["rank"] = (("time",), rank)
     variables["mobility"] = (("time",), (nv - rank).astype(np.int32))
     if not indicators.shape[1]:
@@ -61,8 +61,8 @@ def _singular_values(
     for part, selected in trajectory.parts():
         engine.keep(selected)
         stored = seen.jacobian[part]
-        for first in range(0, max(len(stored), 1), AT_ONCE):
-            J = selection.dense(engine.model, engine.h, stored[first : first + AT_ONCE])
+        for first in range(0, max(len(stored), 1), ROWS_AT_ONCE):
+            J = selection.dense(engine.model, engine.h, stored[first : first + ROWS_AT_ONCE])
             parts.append(_values(scale(engine.model, engine.h, J)))
     return np.concatenate(parts)
 

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: singular values below this fraction of the largest are zero
-RANK = 1e-8
+RANK_TOLERANCE = 1e-8
 
 
 def actuated(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, dict[str, Pieces]]:
@@ -135,11 +135,11 @@ def _changed(scene: Scene, update: dict[str, object]) -> Scene:
 def _enough(engine: Engine, scene: Scene, requested: Mapping[str, PathDrive], names: list[str]) -> list[str]:
     """As many of the actuators as there are freedoms; all of them, unless the scene allows for more."""
     nv, drives = engine.model.nv, engine.model.drives
-    free = null_space(_closure_jacobian(engine), rcond=RANK)
+    free = null_space(_closure_jacobian(engine), rcond=RANK_TOLERANCE)
     known = [k for k, name in enumerate(drives) if name.partition(".")[0] in requested]
     held = [k for k in range(len(drives)) if k not in known]
     if held:  # other drives continue as they do
-        free = free @ null_space(free[[nv + k for k in held]], rcond=RANK)
+        free = free @ null_space(free[[nv + k for k in held]], rcond=RANK_TOLERANCE)
     of_path = free[[nv + k for k in known]]
     of_actuators = np.array([_rate(engine, scene, name) @ free for name in names])
     where = f"[drive.{next(iter(requested))}.actuators]"
@@ -164,7 +164,7 @@ def _enough(engine: Engine, scene: Scene, requested: Mapping[str, PathDrive], na
 
 def _rank(matrix: np.ndarray) -> int:
     values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(values > RANK * max(values.max(initial=0.0), 1e-300)))
+    return int(np.sum(values > RANK_TOLERANCE * max(values.max(initial=0.0), 1e-300)))
 
 
 def _closure_jacobian(engine: Engine) -> np.ndarray:
@@ -248,9 +248,9 @@ def _least(
     for t, state, force in zip(time, seen.state, forces, strict=True):
         engine.select_pieces_after(min(t + 1e-9 * (time[-1] - time[0]), 0.5 * (time[-1] + time[-2])))
         closure_rows.evaluate(engine, state, float(t))
-        free = null_space(_closure_jacobian(engine), rcond=RANK)
+        free = null_space(_closure_jacobian(engine), rcond=RANK_TOLERANCE)
         rates = np.array([_rate(engine, scene, name) @ free for name in names])
-        T = rates @ np.linalg.pinv(rates[own], rcond=RANK)
+        T = rates @ np.linalg.pinv(rates[own], rcond=RANK_TOLERANCE)
         least.append(T @ np.linalg.solve(T.T @ T, force))
     return np.array(least)
 

@@ -21,9 +21,9 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 Losses = tuple[str, str, list[tuple[Site, Site]], list[str]]
 Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 #: rounding of the largest energies, which may cancel in the balance
-ROUNDING = 1e-12
+BALANCE_ROUNDING = 1e-12
 #: energies below this are nothing: a billionth of the thermal energy of one degree of freedom, 4e-21 J [J]
-NOTHING = 1e-30
+NO_ENERGY = 1e-30
 #: no contact law is known to a thousandth of its energy; a run of chosen steps that is off by more says something
 #: else. Where more is requested, the balance is better: of three hundred hard cases at rtol 1e-10
 #: (benchmarks/stability) none is off by 1e-6, unless something is wrong; what damps by its order is not distinguished
@@ -36,7 +36,7 @@ DIVERGED = 3e6
 #: what keeps a motion bounded
 REMEDY = "a controller with a smaller gain or a shorter period, or a longer time constant of a load, keeps it bounded"
 #: steps of many vibrations leave up to half of this in the work of forces that swing while the drives' speeds change
-LONG, LONG_PER_RTOL = 2e-2, 50.0
+LONG_STEPS, LONG_PER_RTOL = 2e-2, 50.0
 
 
 def _of_effects(model: Model) -> list[tuple[int, Losses]]:
@@ -105,7 +105,9 @@ def usual(solver: Solver) -> float:
     if INTEGRATORS[solver.integrator].dissipative:
         return CHOSEN
     usual = max(STRICT, min(CHOSEN, PER_RTOL * solver.rtol))
-    return max(usual, min(LONG, LONG_PER_RTOL * solver.rtol)) if INTEGRATORS[solver.integrator].long_steps else usual
+    return (
+        max(usual, min(LONG_STEPS, LONG_PER_RTOL * solver.rtol)) if INTEGRATORS[solver.integrator].long_steps else usual
+    )
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,7 @@ def _balance(model: Model, seen: Observed, component: int | None) -> Balance:
         mechanism = model.mechanism
         body = next(n for n in mechanism.moving_bodies if mechanism.components.of(mechanism.link_of[n]) == component)
         of = f" of body {body} and what it is connected to"
-    return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, max(ROUNDING * largest, NOTHING))
+    return Balance(of, totals, np.abs(totals["energy_error"]), exchanged, max(BALANCE_ROUNDING * largest, NO_ENERGY))
 
 
 def require_closed(model: Model, trajectory: Trajectory, seen: Observed, exchanged: float = 0.0) -> float:

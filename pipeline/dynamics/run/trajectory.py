@@ -374,13 +374,13 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     if engine.mobility.redundant and closure_rows.improve(engine, t, closure_rows.CLEARLY):
         tape.selections.append((t, engine.selected.copy()))
         return True
-    from flexclear.pipeline.dynamics.run.singular_poses.passing import SAME, lay_over
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import EQUAL_TIMES, lay_over
 
     made, passes = lay_over(engine)
     if made is not None:
         tape.collocations.append(made)
         known = tape.passes[-1].time if tape.passes else -np.inf
-        tape.passes += [p for p in passes if p.time - known > SAME * made.span]
+        tape.passes += [p for p in passes if p.time - known > EQUAL_TIMES * made.span]
     return made is not None
 
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: step of reductions, which are smooth functions of their series, as a fraction of the largest change
-SMALL = 1e-6
+REDUCTION_STEP = 1e-6
 #: reductions that a derivative has no use for
 WITHOUT = ("count", "sections")
 
@@ -143,7 +143,7 @@ def _derivative(
     if recorded.reduction == "largest":
         at, value = _of_largest(time, series, change)
         return np.asarray(value if at <= horizon else np.nan)
-    step = SMALL * (np.abs(series).max(initial=0.0) or 1.0) / (np.abs(change).max(initial=0.0) or 1.0)
+    step = REDUCTION_STEP * (np.abs(series).max(initial=0.0) or 1.0) / (np.abs(change).max(initial=0.0) or 1.0)
     ends = [reduced(time, series + sign * step * change, recorded.reduction) for sign in (-1.0, 1.0)]
     result = np.asarray((ends[1] - ends[0]) / (2.0 * step))
     result = result if time[-1] <= horizon else np.full_like(result, np.nan)

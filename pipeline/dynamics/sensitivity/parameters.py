@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 #: relative change of a number by which the assembly, a smooth function of it, is differentiated: the error of central
 #: differences over four points is its fourth power, 1e-12, and starts are closed to 1e-13
-STEP = 1e-3
+NUMBER_STEP = 1e-3
 #: families of parts, and settings, whose numbers the motion depends on
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "start")
 
@@ -72,10 +72,10 @@ class Family:
 
     def direction(self, parameter: Parameter) -> Direction:
         """Return how numbers and start change per unit of a parameter."""
-        around = {k: self.changed(parameter, k * STEP) for k in (-2, -1, 1, 2)}
+        around = {k: self.changed(parameter, k * NUMBER_STEP) for k in (-2, -1, 1, 2)}
         numbers = {k: engine.model.arrays.f for k, engine in around.items()}
         starts = {k: consistent_start(engine) for k, engine in around.items()}
-        return Direction(central(numbers, STEP), central(starts, STEP))
+        return Direction(central(numbers, NUMBER_STEP), central(starts, NUMBER_STEP))
 
 
 def central(values: Mapping[int, np.ndarray], step: float) -> np.ndarray:

@@ -25,7 +25,7 @@ from flexclear.pipeline.dynamics.sensitivity.parameters import Family, Parameter
 
 #: steps along a direction, in its units: powers of ten between these; the widest also as a fraction of the size of
 #: what changes most
-WIDEST, FINEST = 1e-3, 1e-10
+WIDEST_STEP, FINEST = 1e-3, 1e-10
 #: fraction of its depth by which a closed contact moves
 OF_DEPTH = 1e-2
 #: what contacts' normal forces are called among the series
@@ -83,7 +83,7 @@ def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter) ->
     positions = slice(0, model.speeds.stop)
     floors = model.arrays.table(m.FLOORS)["magnitude"][model.arrays.table(m.GROUPS)["group"]]
     size = np.maximum(np.abs(run.trajectory.state), floors)[:, positions]
-    steps = WIDEST / np.maximum(1.0, (changes[:, positions] / size).max(axis=1, initial=0.0))
+    steps = WIDEST_STEP / np.maximum(1.0, (changes[:, positions] / size).max(axis=1, initial=0.0))
     if model.contacts:
         everything, probe = np.arange(len(steps)), float(steps.min()) * 1e-3
         ends = [_look(family.changed(parameter, j * probe), moved(run, k, everything, j * probe)) for j in (-1, 1)]
@@ -93,7 +93,7 @@ def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter) ->
         with np.errstate(divide="ignore", invalid="ignore"):
             allowed = np.where(closed & (change > 0.0), OF_DEPTH * depth / change, np.inf)
         steps = np.minimum(steps, allowed.min(axis=1))
-    return np.clip(steps, FINEST, WIDEST)
+    return np.clip(steps, FINEST, WIDEST_STEP)
 
 
 def _look(engine: Engine, run: Differentiated) -> Observed:

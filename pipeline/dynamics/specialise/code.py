@@ -30,7 +30,7 @@ INTRINSICS = {
     "copysign": "llvm.copysign",
 }
 #: operations of a way that several states compute even where none of them goes it; for how many a call counts
-SHORT, CALL = 12, 40
+SHORT_WAY, CALL = 12, 40
 _NUMBER = ir.IntType(32)
 LIBRARY = {"sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "tanh": "tanh"}
 LIBRARY |= {"arctan2": "atan2", "pow": "pow"}
@@ -219,7 +219,7 @@ class Emitter:
         """Each lane has what its own way gives; a way that no lane goes is skipped if it is long."""
         ways = []
         for way, block in enumerate(branch.blocks, start=1):
-            if size(block, self.uses) <= SHORT:
+            if size(block, self.uses) <= SHORT_WAY:
                 self._block(block)
                 ways.append([self._value(join[way], join[0].kind) for join in joins])
             else:

@@ -19,7 +19,7 @@ from flexclear.pipeline.dynamics.specialise.rules import RULES
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
 
 #: a tangent has at most this many operations per operation of its tape
-LONGEST = 8
+LONGEST_TANGENT = 8
 #: stretches of w, but for the state, whose changes are given
 GIVEN = {m.LAW.place, m.LATCHED}
 #: stretches of w, but for the rates, whose changes are stored
@@ -31,7 +31,7 @@ def tangent(program: Program, longest: int) -> Program:
 
     longest: operations of a program without tangent.  Raises UnsuitedError where the result is too long.
     """
-    forward = _Forward(longest * LONGEST)
+    forward = _Forward(longest * LONGEST_TANGENT)
     forward.block(program.block)
     stores = [(array, forward.value(index), forward.value(value)) for array, index, value in program.stores]
     changes = list[tuple[str, Any, Any]]()

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.ideal import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import Start
+from flexclear.pipeline.core.scene.variants import WITHOUT_CLEARANCE, loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
@@ -37,15 +37,15 @@ if TYPE_CHECKING:
 
 #: a pin has its final position when it is this fraction of the clearance from it; passes in which that is reached, at
 #: most
-THERE, PASSES = 1e-9, 20
+THERE, PIN_PASSES = 1e-9, 20
 #: forces below this fraction of the weight press nothing: the pin stays in the middle
-NOTHING = 1e-9
+NO_FORCE = 1e-9
 #: modal coordinates are those of the loads when a pass changes them by less than this fraction; passes, at most
 SETTLED, LOADINGS = 1e-9, 10
 #: difference of a modal coordinate, as a fraction of the mechanism's size [m sqrt(kg)] of its own mass
-STEP = 1e-7
+MODAL_STEP = 1e-7
 #: singular values below this fraction of the largest are rounding
-RANK = 1e-9
+SINGULAR_ROUNDING = 1e-9
 
 
 def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
@@ -101,7 +101,7 @@ def _loaded(engine: Engine, y: np.ndarray) -> np.ndarray:
     if not speeds or engine.mobility.singular_start:
         return y
     try:
-        state, step = y, STEP * engine.model.length * np.sqrt(sum(link.mass for link in engine.model.links))
+        state, step = y, MODAL_STEP * engine.model.length * np.sqrt(sum(link.mass for link in engine.model.links))
         for _ in range(LOADINGS):
             pulled = _pulled(engine, state, speeds)
             slopes = np.array(
@@ -109,7 +109,7 @@ def _loaded(engine: Engine, y: np.ndarray) -> np.ndarray:
             )
             slopes = (slopes - pulled).T / step
             stiffness = np.maximum(np.abs(np.diag(slopes)), np.finfo(float).tiny)
-            change = np.linalg.lstsq(slopes / stiffness[:, None], -pulled / stiffness, rcond=RANK)[0]
+            change = np.linalg.lstsq(slopes / stiffness[:, None], -pulled / stiffness, rcond=SINGULAR_ROUNDING)[0]
             state = _bent(engine, state, change)
             if np.max(np.abs(change)) <= SETTLED * np.max(np.abs(state[_modes(engine)])):
                 return state
@@ -153,7 +153,7 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
     weight = sum(link.mass for link in model.links) * max(float(np.linalg.norm(model.gravity)), 1.0)
     pins = [contact.name in loose(model.scene) for contact in model.contacts]
     bent = y[_modes(engine)]
-    for _ in range(PASSES):
+    for _ in range(PIN_PASSES):
         closure_rows.evaluate(engine, y, engine.start)
         sites, missing = engine.table(m.SITE_FRAMES), []
         for row, contact, law, pin in zip(contacts, model.contacts, model.laws, pins, strict=True):
@@ -166,7 +166,7 @@ def _pressed(engine: Engine, y: np.ndarray, forces: Mapping[str, np.ndarray]) ->
                 force, offset = force - axis * (axis @ force), offset - axis * (axis @ offset)
             size = float(np.linalg.norm(force))
             depth = (size / law.numbers.stiffness) ** (1.0 / law.numbers.exponent)
-            there = -force / size * (contact.joint.clearance + depth) if size > NOTHING * weight else 0.0 * force
+            there = -force / size * (contact.joint.clearance + depth) if size > NO_FORCE * weight else 0.0 * force
             missing.append(there - offset)
         least = min(joint.clearance for joint in loose(model.scene).values())
         if np.max(np.abs(missing)) <= THERE * least:
@@ -189,11 +189,11 @@ def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray,
     still = rates_at_speeds(engine, y, np.zeros(nv))[:nq]
     ways = np.array([rates_at_speeds(engine, y, unit)[:nq] - still for unit in np.eye(nv)]).T
     jacobian = offset_jacobian(engine, y)[np.repeat(pins, 3)]
-    speeds, _, rank, _ = np.linalg.lstsq(jacobian, offsets, rcond=RANK)
+    speeds, _, rank, _ = np.linalg.lstsq(jacobian, offsets, rcond=SINGULAR_ROUNDING)
     if modes:
         free = np.linalg.svd(jacobian)[2][rank:].T  # speeds that leave the pins where they are
         bending = bent - y[modes] - ways[modes] @ speeds
-        speeds += free @ np.linalg.lstsq(ways[modes] @ free, bending, rcond=RANK)[0]
+        speeds += free @ np.linalg.lstsq(ways[modes] @ free, bending, rcond=SINGULAR_ROUNDING)[0]
     moved = y.copy()
     moved[:nq] += ways @ speeds
     return project(engine, moved)

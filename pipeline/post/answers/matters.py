@@ -68,7 +68,8 @@ def assemble(
 ) -> xr.Dataset:
     """Changes over (effect, quantity) in the quantities' SI units.
 
-    pairs: by effect, `IDEAL` among them where the scene has an ideal counterpart.  words: of the effects.
+    pairs: by effect, `IDEAL` among them where the scene has an ideal counterpart.  words: of the effects; none of
+    one that is not listed.
     undone: effects that the budget did not reach, in words.
     """
     names = list(pairs)
@@ -103,7 +104,7 @@ def assemble(
         "unit": ("quantity", list(units)),
     }
     refused = {name: p.without.refused or p.full.refused for name, p in pairs.items()}
-    text = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why)
+    text = "\n".join(f"without {words[name]}: {why}" for name, why in refused.items() if why and words[name])
     return xr.Dataset(data, coordinates, {"Conventions": "CF-1.11", "refused": text, "undone": undone})
 
 
@@ -205,6 +206,8 @@ def table(result: xr.Dataset) -> Table:
     """Effects as rows, quantities as columns: what is different without the effect."""
     rows = []
     for i, words in enumerate(str(w) for w in result["words"].values):
+        if not words:
+            continue
         cells = [
             written(
                 float(result["dropped"][i, k]),

@@ -69,12 +69,13 @@ def _cause(study: xr.Dataset) -> str:
     if not known:
         return ""
     first = max(known, key=lambda cause: known[cause])
-    others = ", ".join(f"{cause} {value:.0e}" for cause, value in known.items() if cause != first)
+    others = ", ".join(f"{cause} {value:.0e}" for cause, value in known.items() if cause != first and value > 0.0)
     size = f"{known[first]:.0e}" if np.isfinite(known[first]) else "other impacts"
     rest = f"; {others}" if others else ""
     missing = [cause for cause in ("mesh", "modal truncation") if cause not in known and study.attrs["flexible"]]
     unseen = f" Not looked at: {' and '.join(missing)} (flexclear cost --models)." if missing and len(known) else ""
-    return f"The largest cause of error is {first} ({size}{rest}); what helps is {CAUSES[first]}.{unseen}"
+    helps = ", which the root finder bounds" if first == "event location" else f"; what helps is {CAUSES[first]}"
+    return f"The largest cause of error is {first} ({size}{rest}){helps}.{unseen}"
 
 
 def _undone(study: xr.Dataset) -> str:

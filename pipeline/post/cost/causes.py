@@ -52,7 +52,7 @@ def table(split: Mapping[str, Mapping[str, float]], title: str) -> Table:
 
 
 def _cell(error: float) -> str:
-    return "–" if np.isnan(error) else f"{error:.1e}" if np.isfinite(error) else OTHER
+    return "–" if np.isnan(error) else "0" if error == 0.0 else f"{error:.1e}" if np.isfinite(error) else OTHER
 
 
 def dominant(causes: Mapping[str, float]) -> str:

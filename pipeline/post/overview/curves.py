@@ -9,8 +9,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts import quantities
-from flexclear.pipeline.core.numerics.angles import Turning, turning
-from flexclear.pipeline.core.numerics.rotations import first_largest
+from flexclear.pipeline.core.numerics.rotations import Turning, first_largest, turning
 from flexclear.pipeline.core.scene.quantity import KINDS, Quantity
 
 #: factor and unit of smaller and larger values, largest first
@@ -21,7 +20,7 @@ PREFIXES = {
     "N": ((1e-3, "kN"), (1.0, "N"), (1e3, "mN")),
     "s": ((1.0, "s"), (1e3, "ms"), (1e6, "µs"), (1e9, "ns")),
     "Pa": ((1e-6, "MPa"), (1e-3, "kPa"), (1.0, "Pa")),
-    "J": ((1e-3, "kJ"), (1.0, "J"), (1e3, "mJ"), (1e6, "µJ")),
+    "J": ((1e-3, "kJ"), (1.0, "J"), (1e3, "mJ"), (1e6, "µJ"), (1e9, "nJ"), (1e12, "pJ")),
 }
 
 
@@ -58,7 +57,7 @@ def curves(runs: Sequence[xr.Dataset], quantity: Quantity) -> list[Curve | None]
             title,
             quantities.unit(run, quantity),
             run["time"].values,
-            without_noise(_drawn(values, quantity, k), _size(run, quantity)),
+            without_noise(_drawn(values, quantity, k), _noise(run, quantity)),
             NONE,
         )
         for run, values in zip(runs, lines, strict=True)
@@ -102,11 +101,10 @@ def _drawn(values: np.ndarray, quantity: Quantity, component: int) -> np.ndarray
     return values[:, 0] if values.shape[1] == 1 else np.linalg.norm(values, axis=1)
 
 
-def _size(run: xr.Dataset, quantity: Quantity) -> float:
-    """Largest range of such a quantity among all bodies, along any axis; 0 of other kinds, which have no noise."""
+def _noise(run: xr.Dataset, quantity: Quantity) -> float:
+    """What is rounding of such a quantity, by the ranges of all bodies along all axes; 0 of other kinds."""
     kind = KINDS[quantity.kind]
-    noisy = kind.owner in ("body", "frame")
-    return float(np.ptp(run[kind.variable].values, axis=0).max(initial=0.0)) if noisy else 0.0
+    return noise(run, run[kind.variable].values, quantity.unit) if kind.owner in ("body", "frame") else 0.0
 
 
 def _force(run: xr.Dataset, joint: str) -> Curve | None:
@@ -166,6 +164,9 @@ def measured(value: float, error: float, unit: str) -> str:
 CLOSED = 0.9
 #: rounding grows over a run, but stays below this fraction of the largest curve of its kind; integration errors do not
 NOISE = 1e-9
+#: and below these fractions of what the whole motion makes of it (`quantities.natural_size`); a stage may move by 1e-11
+#: of the crane that holds it, and stiff rods magnify the rounding of places into forces
+ROUNDING = {"m": 1e-13, "m/s": 1e-13, "N": 1e-11, "N m": 1e-11}
 
 
 def impacts(count: int, closed: float = 0.0) -> str:
@@ -174,12 +175,17 @@ def impacts(count: int, closed: float = 0.0) -> str:
     return f"{said}; the contact hardly opens ({closed:.0%} of the time closed)" if closed >= CLOSED else said
 
 
-def without_noise(values: np.ndarray, size: float) -> np.ndarray:
-    """The values, or their first one where all that they do is rounding; size: the largest range of such values."""
-    change = float(np.ptp(values)) if values.size else 0.0
-    return (
-        np.full_like(values, 0.0 if abs(values[0]) <= NOISE * size else values[0]) if change <= NOISE * size else values
-    )
+def noise(run: xr.Dataset, values: np.ndarray, unit: str) -> float:
+    """Largest range that is rounding, of a run's values of one kind over time, shape (time, ...) [SI unit]."""
+    largest = float(np.ptp(values, axis=0).max(initial=0.0))
+    return max(NOISE * largest, ROUNDING.get(unit, 0.0) * quantities.natural_size(run, unit))
+
+
+def without_noise(values: np.ndarray, noise: float) -> np.ndarray:
+    """The values, or their first one where they have no larger range than rounding gives them."""
+    if values.size and float(np.ptp(values)) > noise:
+        return values
+    return np.full_like(values, 0.0 if not values.size or abs(values[0]) <= noise else values[0])
 
 
 def by_unit(values: Mapping[str, np.ndarray], unit: str) -> tuple[float, str]:

@@ -12,7 +12,16 @@ from matplotlib.axes import Axes
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.schema import require_complete
 from flexclear.pipeline.core.scene.quantity import OF_CONTACTS, Quantity
-from flexclear.pipeline.post.overview.curves import by_unit, curves, impacts, measured, turned_by, without_noise
+from flexclear.pipeline.post.overview.curves import (
+    NOISE,
+    by_unit,
+    curves,
+    impacts,
+    measured,
+    noise,
+    turned_by,
+    without_noise,
+)
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.single_run.series import derive, parameters
 
@@ -74,7 +83,7 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
     chosen = _chosen(names, first, np.abs(moved).max(axis=(0, 2)), BODIES)
     figure, axes = style.grid(len(chosen), 3, (11.0, 0.9 + 1.75 * len(chosen)), sharex=True)
     time = 1e3 * run["time"].values
-    moved, speed = (_without_noise(values) for values in (moved, speed))
+    moved, speed = _without_noise(run, moved, "m"), _without_noise(run, speed, "m/s")
     for row, k in zip(axes, chosen, strict=True):
         factor, unit = by_unit({"": moved[:, k]}, "m")
         rate, rate_unit = by_unit({"": speed[:, k]}, "m/s")
@@ -82,7 +91,7 @@ def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str
             row[0].plot(time, factor * moved[:, k, i], color=color, label=axis)
             row[1].plot(time, rate * speed[:, k, i], color=color, lw=0.9)
         turned = turned_by(run, names[k])
-        row[2].plot(time, np.degrees(without_noise(turned.angle, 1.0)), color=style.INK)
+        row[2].plot(time, np.degrees(without_noise(turned.angle, NOISE)), color=style.INK)
         for panel, what in zip(
             row, (f"displacement ({unit})", f"velocity ({rate_unit})", f"{turned.title} (°)"), strict=True
         ):
@@ -112,16 +121,16 @@ def _watched(run: xr.Dataset, watched: Sequence[Quantity]) -> dict[str, bytes]:
     return style.files("watched", figure)
 
 
-def _without_noise(values: np.ndarray) -> np.ndarray:
-    """Components (time, body, axis) without those that are rounding of the largest one."""
-    size = float(np.ptp(values, axis=0).max(initial=0.0))
-    series = [without_noise(column, size) for column in values.reshape(len(values), -1).T]
+def _without_noise(run: xr.Dataset, values: np.ndarray, unit: str) -> np.ndarray:
+    """Values (time, ...) without the columns that are rounding."""
+    most = noise(run, values, unit)
+    series = [without_noise(column, most) for column in values.reshape(len(values), -1).T]
     return np.array(series).T.reshape(values.shape)
 
 
 def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
     names = [str(name) for name in post["joint"].values]
-    force = post["reaction"].values
+    force = _without_noise(run, post["reaction"].values, "N")
     drives = [str(name) for name in run["drive"].values] if "drive_force" in run else []
     chosen = _chosen(names, first, force.max(axis=0), JOINTS)
     panels: list[tuple[str, np.ndarray]] = [(f"{names[k]}: force (N)", force[:, k]) for k in chosen]
@@ -188,7 +197,7 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
     The plane is the joint's own: of a pin x and y of its journal, of a slot the same, of a plane x and z; of a
     ball the two axes of the socket along which the centre moves most.
     """
-    offset = 1e3 * run["contact_offset"].values[:, contact]
+    offset = 1e3 * _without_noise(run, run["contact_offset"].values[:, contact], "m")
     i, j = _plane(run, offset, contact)
     radius = 1e3 * clearance
     if _type(run, contact) == "ball-on-plane":  # which has a floor and no socket

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
-from flexclear.pipeline.core.numerics.angles import angle_about_y
+from flexclear.pipeline.core.numerics.rotations import angle_about_y
 
 if TYPE_CHECKING:
     import xarray as xr

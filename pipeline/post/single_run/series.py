@@ -10,8 +10,7 @@ import numpy as np
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled, of
 from flexclear.pipeline.core.artifacts.quantities import IMPACT, SEPARATED
 from flexclear.pipeline.core.artifacts.schema import conformed, require_complete
-from flexclear.pipeline.core.numerics.angles import angle_about_y
-from flexclear.pipeline.core.numerics.rotations import first_largest, rotation_between
+from flexclear.pipeline.core.numerics.rotations import angle_about_y, first_largest, rotation_between
 from flexclear.pipeline.post.single_run.horizon import QUANTILES, Variables, ensemble_statistics, horizon
 from flexclear.pipeline.post.single_run.impacts import impacts, of_kind
 from flexclear.pipeline.post.single_run.schema import POST

@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
-from flexclear.pipeline.dynamics.contact.law import CLOSE, Numbers, Resolved, refuse_linear
+from flexclear.pipeline.dynamics.contact.law import RESTITUTION_ERROR, Numbers, Resolved, refuse_linear
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Hertz:
             )
         exponent = self.exponent if law.exponent is None else law.exponent
         warning = None
-        if law.restitution is not None and 1.0 - law.restitution > CLOSE:
+        if law.restitution is not None and 1.0 - law.restitution > RESTITUTION_ERROR:
             warning = f"'hertz' loses nothing: it delivers a restitution of 1, not of {law.restitution:g}"
         return Resolved("elastic", Numbers(stiffness, exponent, 0.0), None, 1.0, warning)
 

@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 #: rotation [rad] at which a bushing ends a run: at a full turn its rotation vector has no direction
-LARGEST = 6.2
+LARGEST_ANGLE = 6.2
 
 
 def rotations(model: Model, sites: np.ndarray, internal: np.ndarray) -> dict[int, np.ndarray]:
@@ -55,7 +55,7 @@ def explanation(engine: Engine) -> str | None:
     for name, row in _rows(model).items():
         at = first + int(row["internal0"])
         angle = float(np.linalg.norm(y[at : at + 3])) if row["internal0"] >= 0 else 0.0
-        if angle > 0.99 * LARGEST:
+        if angle > 0.99 * LARGEST_ANGLE:
             return (
                 f"bushing {name} has turned by {np.degrees(angle):.0f} deg: it is an elastic mount, whose rotation "
                 "vector loses its direction at a full turn; let a joint carry the turning, with a joint-spring "

@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.run.ledger import REMEDY
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 #: a break is a sample when it is off by no more than this fraction of the period
-NEAR = 1e-6
+AT_A_SAMPLE = 1e-6
 #: a coordinate is out of control at so many times the largest of its reference, its start, a turn or the mechanism
 LOST = 100.0
 
@@ -51,7 +51,7 @@ def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
 
 def _is_due(period: float, elapsed: float) -> bool:
     """Whether a controller samples so long [s] after the start."""
-    return abs(elapsed - period * round(elapsed / period)) <= NEAR * period
+    return abs(elapsed - period * round(elapsed / period)) <= AT_A_SAMPLE * period
 
 
 def require_controlled(model: Model, trajectory: Trajectory, seen: Observed) -> None:

@@ -21,9 +21,9 @@ from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, offset_jacob
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, Direction
 
 #: batches of the exponent's error, and Student's t of their number at 95 %
-BATCHES, STUDENT = 10, 2.262
+EXPONENT_BATCHES, STUDENT = 10, 2.262
 #: change of a state whose motion is compared, as a fraction of what counts as far: its square is rounding
-SMALL = 1e-6
+STATE_CHANGE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -54,15 +54,17 @@ def start_direction(engine: Engine, y: np.ndarray) -> Direction:
         return Direction(nothing, perturbed(engine, y, offset_jacobian(engine, y), offsets) - y)
     end = model.speeds.stop
     change = np.zeros(len(y))
-    change[:end] = SMALL * _far(engine)[:end] * np.sin(1.0 + np.arange(end) * 2.399963)
-    return Direction(nothing, PERTURBATION / SMALL * 0.5 * (project(engine, y + change) - project(engine, y - change)))
+    change[:end] = STATE_CHANGE * _far(engine)[:end] * np.sin(1.0 + np.arange(end) * 2.399963)
+    return Direction(
+        nothing, PERTURBATION / STATE_CHANGE * 0.5 * (project(engine, y + change) - project(engine, y - change))
+    )
 
 
 def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
     """Return how the change along direction k of a run grows."""
     metric, trajectory = Metric(engine), run.trajectory
     changes, end = run.changes[:, k], engine.model.speeds.stop
-    steps = SMALL / np.maximum((np.abs(changes) / _far(engine))[:, :end].max(axis=1, initial=0.0), 1e-300)
+    steps = STATE_CHANGE / np.maximum((np.abs(changes) / _far(engine))[:, :end].max(axis=1, initial=0.0), 1e-300)
     sides = []
     for sign in (-1.0, 1.0):
         rows = trajectory.rows.copy()
@@ -88,6 +90,6 @@ def _slope(time: np.ndarray, logarithm: np.ndarray) -> tuple[float, float]:
 
     Without a first batch, in which the change turns to what grows.
     """
-    ends = np.linspace(time[0], time[-1], BATCHES + 2)[1:]
+    ends = np.linspace(time[0], time[-1], EXPONENT_BATCHES + 2)[1:]
     slopes = np.diff(np.interp(ends, time, logarithm)) / np.diff(ends)
-    return float(slopes.mean()), float(STUDENT * slopes.std(ddof=1) / np.sqrt(BATCHES))
+    return float(slopes.mean()), float(STUDENT * slopes.std(ddof=1) / np.sqrt(EXPONENT_BATCHES))

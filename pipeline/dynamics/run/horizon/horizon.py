@@ -36,7 +36,7 @@ from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
 SAMPLES = 180
 #: a body's motion counts relative to its own largest, but no less than this fraction of the liveliest body's, below
 #: which rounding and the drift of loops move it
-AT_REST = 1e-3
+LEAST_LIVELY = 1e-3
 
 
 @dataclass(frozen=True)
@@ -256,7 +256,7 @@ class Metric:
 
     def distance(self, one: np.ndarray, other: np.ndarray, largest: np.ndarray) -> np.ndarray:
         """Largest separation of a body at each time, as a fraction of its largest motion in the run."""
-        scale = np.maximum(largest, AT_REST * largest.max(initial=0.0))
+        scale = np.maximum(largest, LEAST_LIVELY * largest.max(initial=0.0))
         return np.asarray((self.norms(one - other)[:, scale > 0.0] / scale[scale > 0.0]).max(axis=1, initial=0.0))
 
 

@@ -31,11 +31,11 @@ from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, inte
 #: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together
 WAYPOINTS = 16
 #: the neighbour's distance in units of the relative tolerance: what steps differ by is then a thousandth of it
-SEPARATION = 1e3
+NEIGHBOUR = 1e3
 #: a neighbour that went this many times as far between two waypoints was beyond what is linear; that is reported
-FAR = 1e4
+NOT_LINEAR = 1e4
 #: laws repeat when they end a period as they began it, but for this fraction
-SAME = 1e-6
+EQUAL_LAWS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -119,10 +119,10 @@ def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
             change[1] = 0.0  # a load's rate may jump
         elif drive.dimension == "angle":
             change[0] = (change[0] + np.pi) % (2.0 * np.pi) - np.pi
-        size = np.abs([begin, end]).max(axis=0) + np.array([1.0, 1.0 / period]) * (1.0 if drive is None else SAME)
-        if np.any(np.abs(change) > SAME * size):
+        size = np.abs([begin, end]).max(axis=0) + np.array([1.0, 1.0 / period]) * (1.0 if drive is None else EQUAL_LAWS)
+        if np.any(np.abs(change) > EQUAL_LAWS * size):
             what = f"[drive.{drive.name}]" if drive is not None else "[load]"
-            which = "value" if abs(change[0]) > SAME * size[0] else "rate"
+            which = "value" if abs(change[0]) > EQUAL_LAWS * size[0] else "rate"
             raise InputError(
                 what,
                 f"its law does not repeat after a period of {period:.6g} s: its {which} has changed by "
@@ -149,7 +149,7 @@ def periods(parts: list[Engine], y: np.ndarray, followed: range, begin: Cursor) 
     """
     period = parts[-1].end - parts[0].start
     scales = state_scales(parts[0], period)
-    separation = SEPARATION * parts[0].rtol
+    separation = NEIGHBOUR * parts[0].rtol
     number, here, neighbour = begin.number, begin.here, begin.neighbour
     while True:
         done, growth, lost = list[Trajectory](), 0.0, 0
@@ -258,7 +258,7 @@ def brought_back(
     fraction = separation / distance
     y = _closed(part, here.y + fraction * difference)
     latched = here.latched + fraction * (neighbour.latched - here.latched)
-    return replace(neighbour, y=y, latched=latched), (-float(np.log(fraction)), int(distance > FAR * separation))
+    return replace(neighbour, y=y, latched=latched), (-float(np.log(fraction)), int(distance > NOT_LINEAR * separation))
 
 
 def _closed(part: Engine, y: np.ndarray) -> np.ndarray:

@@ -31,22 +31,24 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
 #: the estimate compares with a run at this fraction of the tolerance
-FINER = 1e-2
+FINER_TOLERANCE = 1e-2
 #: tolerances that are tried lie between these; below, rounding decides
-TIGHTEST, LOOSEST = 1e-14, 1e-2
+TIGHTEST_TOLERANCE, LOOSEST_TOLERANCE = 1e-14, 1e-2
 #: a run is accepted when its error is between these fractions of the requested accuracy: enough, and not wasteful
-ENOUGH, WASTEFUL = 1.0, 1.0 / 3.0
+ACCEPTED, WASTEFUL = 1.0, 1.0 / 3.0
 #: what the next try aims at, between the two
 AIM = 0.6
-TRIES = 12
+TOLERANCE_TRIES = 12
 #: of the evaluations of a run that is accurate enough, what a looser tolerance must be foreseen to save
 SAVED = 0.25
 #: a run that is refused at a looser tolerance than this is tried again at a fraction of it
-REFUSED_FOR_GOOD, TIGHTER = 1e-9, 0.1
-#: an error that does not fall below this fraction when the tolerance falls by FINER has another cause than the steps
+REFUSED_FOR_GOOD, TIGHTER_AFTER_REFUSAL = 1e-9, 0.1
+#: an error that does not fall below this fraction at the FINER_TOLERANCE has another cause than the steps
 STUCK = 0.3
 #: the default request, as a fraction of each quantity's range; it is searched for at so many tolerances at most
 BY_DEFAULT, FEW_TRIES = 1e-3, 3
+#: what is below this fraction of the motion's natural size is rounding, which stiff rods magnify in forces
+ROUNDING_OF_MOTION = 1e-9
 
 
 @dataclass(frozen=True)
@@ -90,9 +92,9 @@ class Search:
     def attempt(self, rtol: float) -> Attempt:
         """The run at a tolerance and its estimated errors."""
         run = self.run(rtol)
-        finer = max(rtol * FINER, TIGHTEST)
+        finer = max(rtol * FINER_TOLERANCE, TIGHTEST_TOLERANCE)
         # the tightest of all can only be compared with a looser one, whose error is the larger
-        other = self.run(finer if finer < rtol else rtol / FINER)
+        other = self.run(finer if finer < rtol else rtol / FINER_TOLERANCE)
         requested = self.requested(other)
         # all tighter runs are witnesses: with impacts, two neighbours may agree by luck
         witnesses = [other, *(r for tolerance, r in self.runs.items() if tolerance <= 0.1 * rtol)]
@@ -110,9 +112,13 @@ class Search:
         How much the two differ is the error of either at most, unless both err alike; runs that are tighter than both
         are asked as well.
         """
-        finer = attempt.rtol * FINER
+        finer = attempt.rtol * FINER_TOLERANCE
         other = self.runs.get(finer)
-        if attempt.fraction > ENOUGH or other is None or other.attrs["evaluations"] >= attempt.run.attrs["evaluations"]:
+        if (
+            attempt.fraction > ACCEPTED
+            or other is None
+            or other.attrs["evaluations"] >= attempt.run.attrs["evaluations"]
+        ):
             return attempt
         tighter = [run for rtol, run in self.runs.items() if rtol < finer]
         if not tighter:
@@ -120,14 +126,14 @@ class Search:
         requested = self.requested(other)
         errors = {q.name: max(attempt.errors[q.name], *(self.error(other, r, q) for r in tighter)) for q in requested}
         fraction = max((errors[q.name] / w for q, w in requested.items()), default=0.0)
-        return Attempt(finer, other, errors, fraction) if fraction <= ENOUGH else attempt
+        return Attempt(finer, other, errors, fraction) if fraction <= ACCEPTED else attempt
 
     def saves(self, rtol: float, looser: float) -> bool:
         """Whether a run at a looser tolerance is foreseen to be so much cheaper that it is worth to be made.
 
         Where stability limits the steps it is not, and it takes two runs to know its error.
         """
-        at = max(rtol * FINER, TIGHTEST)
+        at = max(rtol * FINER_TOLERANCE, TIGHTEST_TOLERANCE)
         before, finer = self.runs[rtol], self.runs.get(at)
         if finer is None or finer is before or finer.attrs["method"] != before.attrs["method"]:
             return True
@@ -143,7 +149,9 @@ class Search:
             quantity = parse(name, self.scene.owners())
             absolute = want.absolute
             if absolute is None:
-                absolute = (want.relative or 0.0) * quantities.scale(run, quantity)
+                size = quantities.scale(run, quantity)
+                rounding = self.predictable and size <= ROUNDING_OF_MOTION * quantities.natural_size(run, quantity.unit)
+                absolute = 0.0 if rounding else (want.relative or 0.0) * size
             if not absolute > 0.0 and self.predictable:
                 continue
             if not absolute > 0.0:
@@ -188,7 +196,7 @@ def by_default(
 def _delivered(search: Search, progress: Progress) -> xr.Dataset:
     best = search.cheapest(_search(search, progress))
     requested = {q.name: w for q, w in search.requested(best.run).items()}
-    met = best.fraction <= ENOUGH
+    met = best.fraction <= ACCEPTED
     verdict = "met" if met else _missed(search, best, requested)
     progress(None, f"accuracy {'met' if met else 'missed: ' + verdict} (relative tolerance {best.rtol:.1e})")
     if "method_reason" in best.run.attrs:
@@ -212,7 +220,7 @@ def _search(search: Search, progress: Progress) -> Attempt:
     enough: Attempt | None = None
     nearest: Attempt | None = None
     too_loose = math.inf
-    for _ in range(FEW_TRIES if search.predictable else TRIES):
+    for _ in range(FEW_TRIES if search.predictable else TOLERANCE_TRIES):
         try:
             now = search.attempt(rtol)
         except SolverError:
@@ -220,18 +228,18 @@ def _search(search: Search, progress: Progress) -> Attempt:
                 raise
             # a tolerance so loose that the run is refused, as its ledger does not close
             too_loose = min(too_loose, rtol)
-            rtol = _next(rtol, 1.0 / TIGHTER, enough, too_loose)
+            rtol = _next(rtol, 1.0 / TIGHTER_AFTER_REFUSAL, enough, too_loose)
             continue
         progress(None, f"tolerance {rtol:.1e}: error {now.fraction:.2g} of the requested accuracy")
         if nearest is None or now.fraction < nearest.fraction:
             nearest = now
-        if now.fraction <= ENOUGH:
+        if now.fraction <= ACCEPTED:
             enough = now if enough is None or now.rtol > enough.rtol else enough
-            if now.fraction >= WASTEFUL or rtol >= LOOSEST or search.predictable:
+            if now.fraction >= WASTEFUL or rtol >= LOOSEST_TOLERANCE or search.predictable:
                 return now
         else:
             too_loose = min(too_loose, rtol)
-            if rtol <= TIGHTEST:
+            if rtol <= TIGHTEST_TOLERANCE:
                 break
         rtol = _next(rtol, now.fraction, enough, too_loose)
         if enough is not None and not search.saves(enough.rtol, rtol):
@@ -246,7 +254,7 @@ def _first(scene: Scene) -> float:
     assert scene.accuracy is not None
     fractions = [want.relative for want in scene.accuracy.quantities.values() if want.relative is not None]
     guess = 0.1 * min(fractions) if fractions else scene.solver.rtol
-    return float(np.clip(guess, 100.0 * TIGHTEST, LOOSEST))
+    return float(np.clip(guess, 100.0 * TIGHTEST_TOLERANCE, LOOSEST_TOLERANCE))
 
 
 def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float) -> float:
@@ -254,7 +262,7 @@ def _next(rtol: float, fraction: float, enough: Attempt | None, too_loose: float
     if enough is not None and too_loose < math.inf:
         return float(f"{math.sqrt(enough.rtol * too_loose):.1e}")
     change = float(np.clip(AIM / max(fraction, 1e-300), 1e-3, 1e3))
-    return float(f"{np.clip(rtol * change, TIGHTEST, LOOSEST):.1e}")
+    return float(f"{np.clip(rtol * change, TIGHTEST_TOLERANCE, LOOSEST_TOLERANCE):.1e}")
 
 
 def _missed(search: Search, best: Attempt, requested: Mapping[str, float]) -> str:

@@ -35,35 +35,35 @@ if TYPE_CHECKING:
 
 #: evaluations of a step of the default method, and how far its region of stability reaches where steps swing about it,
 #: along both axes; the product of rate and step that its error control settles at
-STAGES, REACH = 12.0, 5.0
+STEP_EVALUATIONS, STABILITY_REACH = 12.0, 5.0
 #: an evaluation with the algebra that its method needs, in evaluations of the default method
 DEARER = {DEFAULT: 1.0, VIBRATING: 1.4, STIFF: 2.0}
 #: of a scene with contacts, evaluations of the default method where the modes limit it, as a fraction of what it needs
 #: to be stable: it begins again at each contact, and steps more strictly there (measured: 1.45 and more)
-TOUCHING = 1.5
+CONTACT_FACTOR = 1.5
 #: least and largest power of the tolerance with which evaluations grow, according to two runs
 LEAST_POWER, LARGEST_POWER = 0.02, 0.4
 #: the vibrations must be so much faster than all else, for nothing else limits the exponential method
-SEPARATION = 2.0
+FASTER_VIBRATIONS = 2.0
 #: least that the default method must need before the exponential and the stiff one are tried, and before the stiff one
 #: is taken without any run
-CHEAP, WORTH, CRAWLING = 200.0, 3000.0, 300_000.0
+CHEAP, WORTH_STIFF, CRAWLING = 200.0, 3000.0, 300_000.0
 #: what the stiff method is taken to cost where nothing is known of it, at a tolerance and at looser ones
 UNKNOWN, AT = 20_000.0, 1e-4
 #: how many times dearer than another one a method must be to be given up, as pace and foresight are rough; and where it
 #: is only tried
-CLEARLY, TRIED = 3.0, 1.5
+CLEARLY_DEARER, TRIED = 3.0, 1.5
 #: where a method has used this fraction of what the other one is foreseen to take, it must be twice as many times
 #: dearer, earlier still more: starts may be hasty
-EARLY = 0.1
+EARLY_FRACTION = 0.1
 #: what a method takes for the rest of a motion characterises it where that is more than half
-ENOUGH = 0.5
+CHARACTERISTIC = 0.5
 #: evaluations between two looks, as a fraction of those foreseen, and at least
-LOOK, LEAST_LOOK = 0.02, 200
+LOOK_FRACTION, LEAST_LOOK = 0.02, 200
 #: an integrator that is too dear at a tolerance is taken again at one that is so many times looser
 AGAIN = 10.0
 #: relative step of the differences
-PERTURBATION = 1e-7
+DIFFERENCE_STEP = 1e-7
 
 
 @dataclass(frozen=True)
@@ -96,12 +96,12 @@ class Suit:
     @property
     def by_stability(self) -> float:
         """Evaluations with which the default method is stable."""
-        return STAGES * self.span * self.rates.all / REACH
+        return STEP_EVALUATIONS * self.span * self.rates.all / STABILITY_REACH
 
     @property
     def least(self) -> float:
         """Evaluations that the default method takes at any tolerance."""
-        return (TOUCHING if self.touching else 1.0) * self.by_stability
+        return (CONTACT_FACTOR if self.touching else 1.0) * self.by_stability
 
     def evaluations(self, name: str, rtol: float) -> float:
         """Evaluations at a tolerance, taken over from the run at the nearest other one."""
@@ -131,7 +131,7 @@ class Suit:
             left.remove(VIBRATING)
         others = [self.cost(name, rtol) for name in left if name != STIFF]
         if STIFF in left and STIFF not in self.seen and others:
-            enough = WORTH * self._growth(rtol) if DEFAULT in self.seen else CRAWLING
+            enough = WORTH_STIFF * self._growth(rtol) if DEFAULT in self.seen else CRAWLING
             if not min(others) > enough:
                 left.remove(STIFF)
         return left or [STIFF]
@@ -146,7 +146,7 @@ class Suit:
 
     def _vibrates(self) -> bool:
         """Whether the modes' vibrations alone make the default method dear."""
-        return self.rates.all > SEPARATION * self.rates.held and self.by_stability > CHEAP
+        return self.rates.all > FASTER_VIBRATIONS * self.rates.held and self.by_stability > CHEAP
 
     def best(self, rtol: float) -> str:
         """The integrator to take at a tolerance."""
@@ -204,8 +204,8 @@ class Suit:
             heir, most = self.heir(name, rtol)
             if not heir:
                 continue
-            every = max(int(LOOK * most), LEAST_LOOK)
-            panel[name] = (Judge(every, self._verdict(name, heir, max(most, WORTH))), heir)
+            every = max(int(LOOK_FRACTION * most), LEAST_LOOK)
+            panel[name] = (Judge(every, self._verdict(name, heir, max(most, WORTH_STIFF))), heir)
         return panel
 
     def _verdict(self, name: str, heir: str, most: float) -> Callable[[Engine, Sequence[Look]], str]:
@@ -217,9 +217,9 @@ class Suit:
                 return ""
             # what has been handed on from in this run already was seen to take more than was foreseen
             enough = max(most, DEARER[heir] * self.expected.get(heir, 0.0)) / DEARER[name]
-            whole = pace(looks, CLEARLY * enough) * self.span
+            whole = pace(looks, CLEARLY_DEARER * enough) * self.span
             used = max(looks[-1].evaluations - looks[0].evaluations, 1)
-            if whole < (TRIED if tried else CLEARLY) * (1.0 + EARLY * enough / used) * enough:
+            if whole < (TRIED if tried else CLEARLY_DEARER) * (1.0 + EARLY_FRACTION * enough / used) * enough:
                 return ""
             self.expected[name] = whole
             self.left = looks[-1].evaluations, (looks[-1].time - engine.start) / self.span
@@ -239,7 +239,7 @@ class Suit:
         if run.attrs["method"] != name and not (name == DEFAULT and name in self.expected):
             self.missed[name] = max(rtol, self.missed.get(name, 0.0))
         used, done = self.left if self.expected else (0.0, 0.0)
-        if done < ENOUGH:
+        if done < CHARACTERISTIC:
             rest = (float(run.attrs["evaluations"]) - used) / (1.0 - done)
             self.seen.setdefault(run.attrs["method"], {})[rtol] = max(rest, 1.0)
 
@@ -269,7 +269,7 @@ def rates(engine: Engine, y: np.ndarray) -> Rates:
     J, scales = np.empty((n, n)), model.state_scales
     for k in range(n):
         sides = []
-        step = PERTURBATION * max(abs(y[k]), float(scales[k]))
+        step = DIFFERENCE_STEP * max(abs(y[k]), float(scales[k]))
         for sign in (1.0, -1.0):
             z = y.copy()
             z[k] += sign * step

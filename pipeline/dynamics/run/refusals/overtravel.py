@@ -19,12 +19,12 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project, rates_at_speeds
 
 #: times ahead at which the least depth is searched for
-AHEAD = 60
+TIMES_AHEAD = 60
 #: steps of a search; longest one, as fraction of the mechanism's size or in rad; how often one is halved
-STEPS, LONGEST, HALVINGS = 60, 0.1, 12
+DESCENT_STEPS, LONGEST_STEP, STEP_HALVINGS = 60, 0.1, 12
 #: a depth is the least when a step would take off less than this fraction of it; fraction of what its slope promises
 #: that a step must take off (Armijo)
-LEAST, ENOUGH = 1e-3, 1e-4
+LEAST_GAIN, SUFFICIENT_DECREASE = 1e-3, 1e-4
 
 
 def forced_depth(engine: Engine, contact: int) -> tuple[float, float]:
@@ -37,7 +37,7 @@ def forced_depth(engine: Engine, contact: int) -> tuple[float, float]:
     radius, y = model.contacts[contact].joint.radius, engine.view(m.Y).copy()
     deep = SHALLOW * radius
     try:
-        for time in np.linspace(t, engine.end, AHEAD + 1)[:-1]:
+        for time in np.linspace(t, engine.end, TIMES_AHEAD + 1)[:-1]:
             y, depth = _shallowest(replace(engine, start=float(time)), y, contact, deep)
             if depth > radius:
                 return float(time), depth
@@ -56,15 +56,15 @@ def _shallowest(engine: Engine, y: np.ndarray, contact: int, enough: float) -> t
     y = project(engine, y)
     depth, slope = _depth(engine, y, contact), _slope(engine, y, contact) * scales
     inverse = np.eye(len(slope)) / max(float(np.linalg.norm(slope)), 1e-300)
-    for _ in range(STEPS):
+    for _ in range(DESCENT_STEPS):
         step = -inverse @ slope
-        if depth <= enough or -(slope @ step) < LEAST * depth:
+        if depth <= enough or -(slope @ step) < LEAST_GAIN * depth:
             break
-        step *= min(1.0, LONGEST / float(np.abs(step).max()))
-        for _ in range(HALVINGS):
+        step *= min(1.0, LONGEST_STEP / float(np.abs(step).max()))
+        for _ in range(STEP_HALVINGS):
             there = _moved(engine, y, step * scales)
             less = _depth(engine, there, contact)
-            if less <= depth + ENOUGH * float(slope @ step):
+            if less <= depth + SUFFICIENT_DECREASE * float(slope @ step):
                 break
             step *= 0.5
         else:

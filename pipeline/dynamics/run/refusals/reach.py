@@ -13,9 +13,9 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 #: least singular value of the closures, as fraction of the largest, above which a pose is not yet at the end of reach;
 #: and above which it is not singular
-NEAR, SINGULAR = 0.1, 1e-3
+END_OF_REACH, SINGULAR = 0.1, 1e-3
 #: a rest: fraction of a row in what depends, and speeds as fraction of the largest before
-FRACTION, DYING = 0.1, 0.1
+REST_FRACTION, DYING = 0.1, 0.1
 #: at the end of reach speeds grow beyond bounds: so much faster than the drives' a loop does not move elsewhere
 FASTER = 40.0
 
@@ -82,7 +82,7 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
     J = closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN))
     where = closure_rows.diagnosis(engine) if J.size else ""
     U, values, _ = np.linalg.svd(J) if J.size else (np.eye(1), np.ones(1), None)
-    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > FRACTION)
+    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > REST_FRACTION)
     engine.w[:], engine.n[:] = saved
     if not J.size or values[-1] > SINGULAR * values[0]:
         return ""
@@ -133,7 +133,7 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     along = closure_rows.built_rows(model, engine.h) == 0
     pulled = engine.view(m.RESIDUAL_RATE)[selection.kept_places(model, engine.h)]
     pulled = np.where(along, pulled / model.length, pulled)
-    if values[-1] > NEAR * values[0]:
+    if values[-1] > END_OF_REACH * values[0]:
         return ""
     if not abs(U[:, len(values) - 1] @ pulled) > FASTER * values[-1] * np.linalg.norm(pulled) > 0.0:
         return ""

@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 #: displacement of a point in its body frame, as fraction of the body's length, above which linear modes are doubted
 BENT = 0.05
 #: rotation of a section in the body frame [rad] above which they are doubted
-TURNED = 0.15
+SECTION_ROTATION = 0.15
 #: speed of turning, as fraction of the first frequency, above which a body without stiffening is doubted
 SPIN = 0.2
 #: rows whose shapes are added up at a time
@@ -108,12 +108,12 @@ def _judged(body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: n
                 f"{bent / body.length:.2g} of its length; linear modes hold below {BENT:g}: divide it into several "
                 "bodies joined by fixed joints, or make it stiffer"
             )
-    row, turned = largest(body.rotations, q, TURNED)
-    if turned > TURNED:
+    row, turned = largest(body.rotations, q, SECTION_ROTATION)
+    if turned > SECTION_ROTATION:
         yield (
             f"{body.name}: at t = {time[row]:.6g} s a section of it is turned by {turned:.3g} rad by its deformation; "
-            f"linear modes hold below {TURNED:g} rad: divide it into several bodies joined by fixed joints, or make it "
-            "stiffer"
+            f"linear modes hold below {SECTION_ROTATION:g} rad: divide it into several bodies joined by fixed "
+            "joints, or make it stiffer"
         )
 
 

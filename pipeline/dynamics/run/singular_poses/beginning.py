@@ -24,14 +24,14 @@ from flexclear.pipeline.dynamics.run.singular_poses.branches import Direction
 from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation, Lead, Sampler, collocate
 
 #: the way is first as long as the fastest coordinate takes for this fraction of its unit, then half of that, and so on
-FIRST, HALVINGS = 0.3, 9
+FIRST_WAY, WAY_HALVINGS = 0.3, 9
 #: velocities may differ from those of a branch by this fraction: they are given with some digits
-SAME = 1e-6
+EQUAL_VELOCITIES = 1e-6
 #: directions that were searched for are good to some hundredths
 ANY = 0.5
 #: changes of a coordinate on two branches, which are known to some hundredths, that differ by less than this fraction
 #: are alike
-ALIKE = 0.05
+EQUAL_CHANGES = 0.05
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def start_motion(engine: Engine, y: np.ndarray) -> StartMotion:
     """
     choices = engine.model.scene.start.branch if engine.model.scene.start is not None else ()
     if np.any(y[engine.model.speeds] != 0.0) and not choices:
-        motions, turn = [branches.by_speeds(engine, y)], SAME
+        motions, turn = [branches.by_speeds(engine, y)], EQUAL_VELOCITIES
     else:
         motions, turn = _chosen(engine, branches.directions(engine, y), choices), ANY
     way = _along(engine, motions[0], turn) if motions else None
@@ -69,8 +69,8 @@ def _along(engine: Engine, way: Direction, turn: float) -> StartMotion | None:
     if not way.moves:
         return None
     engine.control[m.END] = engine.breaks[1]
-    for k in range(HALVINGS):
-        span = min(way.reaching(FIRST * 0.5**k), engine.breaks[1] - engine.start)
+    for k in range(WAY_HALVINGS):
+        span = min(way.reaching(FIRST_WAY * 0.5**k), engine.breaks[1] - engine.start)
         closure_rows.select_rows(engine, way.state(engine.start + span), engine.start + span)
         saved, sampler = engine.selected.copy(), Sampler(engine)
         lead = Lead(way.state, turn if way.at_speed else 0.0)
@@ -95,7 +95,7 @@ def _chosen(engine: Engine, ways: list[Direction], choices: tuple[Branch, ...]) 
             scene = engine.model.scene
             joint, k, _ = coordinate_of(scene, choice.joint, choice.coordinate, path)
             requested = [choice.sign * change[label(joint, scene.joint[joint].type, k)] for change in changes]
-            best_ways = [max(requested) - value <= ALIKE * max(map(abs, requested)) for value in requested]
+            best_ways = [max(requested) - value <= EQUAL_CHANGES * max(map(abs, requested)) for value in requested]
             ways = [way for way, best in zip(ways, best_ways, strict=True) if best]
             changes = [change for change, best in zip(changes, best_ways, strict=True) if best]
         if len(ways) > 1:

@@ -20,15 +20,15 @@ from flexclear.pipeline.dynamics.run.evaluation.start import start_motions
 from flexclear.pipeline.dynamics.run.singular_poses.collocation import Sampler
 
 #: way off, in units of the coordinates, and singular values below this fraction of the largest, which are zero
-WAY, ZERO = 1e-2, 1e-6
+WAY, ZERO_SINGULAR = 1e-2, 1e-6
 #: directions in which nothing of second order is said, to this fraction, are not those of a branch
 SILENT = 1e-3
 #: most directions among which branches are searched for, starts of the search for each, its steps, and what is the same
-MOST, STARTS, STEPS, SAME = 6, 60, 40, 1e-3
+MOST_DIRECTIONS, SEARCH_STARTS, SEARCH_STEPS, EQUAL_DIRECTIONS = 6, 60, 40, 1e-3
 #: fraction of the time since the start over which a rate is taken
-A_LITTLE = 1e-4
+RATE_INTERVAL = 1e-4
 #: halvings of the time in which the drives go the way
-HALVINGS = 60
+TIME_HALVINGS = 60
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ class Direction:
         progress = self.progress(t)
         if self.at_speed or t == self.begin:
             return np.asarray(self.start + progress * self.way)
-        back = A_LITTLE * (t - self.begin)
+        back = RATE_INTERVAL * (t - self.begin)
         rate = (progress - self.progress(t - back)) / back
         return np.asarray(self.start + progress * self.way + rate * self.speeds)
 
@@ -100,7 +100,7 @@ class _Pose:
         self.asked = initial.velocity_equations(engine.model, start_motions(engine), self.rest)
         self.J = self.asked.matrix[self.asked.n_given :]
         U, values, _ = np.linalg.svd(self.J)
-        rank = int(np.sum(values > ZERO * values[0])) if len(values) else 0
+        rank = int(np.sum(values > ZERO_SINGULAR * values[0])) if len(values) else 0
         self.left = U[:, rank:]
         self.rates = np.array([self._rate(k) for k in range(self.nv)]).reshape(self.nv, engine.model.nq)
 
@@ -127,9 +127,9 @@ class _Pose:
     def directions(self) -> list[Direction]:
         """By speeds that are asked for, by where the drives go from rest, or by forces from rest."""
         rows, target = self.asked.matrix, self.asked.target
-        speeds, *_ = np.linalg.lstsq(rows, target, rcond=ZERO)
+        speeds, *_ = np.linalg.lstsq(rows, target, rcond=ZERO_SINGULAR)
         fastest = float(np.max(np.abs(speeds), initial=0.0))
-        if fastest > ZERO * float(np.max(np.abs(target), initial=0.0)) > 0.0:
+        if fastest > ZERO_SINGULAR * float(np.max(np.abs(target), initial=0.0)) > 0.0:
             span = WAY / fastest
             steps = self._tangents(span * speeds, _null(rows), self.engine.start + span)
             return [_steady(self.engine, self._with(step / span), self._slope(step / span)) for step in steps]
@@ -138,7 +138,7 @@ class _Pose:
             return [d for step in self._tangents(np.zeros(self.nv), _null(self.J), None) for d in self._fall(step)]
         t = self.engine.start + until
         went = self.residual(np.zeros(self.nv), t)
-        base, *_ = np.linalg.lstsq(self.J, -went, rcond=ZERO)
+        base, *_ = np.linalg.lstsq(self.J, -went, rcond=ZERO_SINGULAR)
         return [self._driven(step, float(np.linalg.norm(went))) for step in self._tangents(base, _null(self.J), t)]
 
     def _with(self, speeds: np.ndarray) -> np.ndarray:
@@ -159,9 +159,9 @@ class _Pose:
             return float(np.linalg.norm(self.residual(np.zeros(self.nv), begin + span)))
 
         span = end - begin
-        if opened(span) < ZERO and opened(0.5 * span) < ZERO:
+        if opened(span) < ZERO_SINGULAR and opened(0.5 * span) < ZERO_SINGULAR:
             return None
-        for _ in range(HALVINGS):
+        for _ in range(TIME_HALVINGS):
             if opened(span) <= WAY:
                 break
             span *= 0.5
@@ -176,7 +176,7 @@ class _Pose:
 
         def reaching(requested: float) -> float:
             span = float(self.engine.breaks[1]) - self.engine.start
-            for _ in range(HALVINGS):
+            for _ in range(TIME_HALVINGS):
                 if progress(self.engine.start + span) * size <= requested:
                     break
                 span *= 0.8
@@ -212,7 +212,7 @@ class _Pose:
 
         forms = _quadratic(open_by, len(free))
         heard = _heard(forms, free)
-        if not len(heard) or len(heard) > MOST:
+        if not len(heard) or len(heard) > MOST_DIRECTIONS:
             return []
         forms = _quadratic(lambda beta: open_by(beta @ heard), len(heard))
         roots = _roots(forms, homogeneous)
@@ -222,7 +222,7 @@ class _Pose:
 def _null(rows: np.ndarray) -> np.ndarray:
     """Directions (k, nv) in which rows say nothing, orthonormal."""
     _, values, Vt = np.linalg.svd(rows)
-    rank = int(np.sum(values > ZERO * values[0])) if len(values) and values[0] > 0.0 else 0
+    rank = int(np.sum(values > ZERO_SINGULAR * values[0])) if len(values) and values[0] > 0.0 else 0
     return np.asarray(Vt[rank:])
 
 
@@ -267,15 +267,17 @@ def _roots(forms: _Forms, homogeneous: bool) -> list[np.ndarray]:
     """Zeros of the forms; of homogeneous ones those of unit length.  Gauss-Newton from starts of a fixed seed."""
     k, roots = forms.B.shape[1], list[np.ndarray]()
     size = max(float(np.max(np.abs(forms.A), initial=0.0)), float(np.max(np.abs(forms.B), initial=0.0)))
-    for start in np.random.default_rng(0).normal(size=(STARTS * k, k)):
+    for start in np.random.default_rng(0).normal(size=(SEARCH_STARTS * k, k)):
         a = start / (np.linalg.norm(start) if homogeneous else 1.0)
-        for _ in range(STEPS):
+        for _ in range(SEARCH_STEPS):
             value, gradient = forms.value(a), forms.gradient(a)
             if homogeneous:
                 value, gradient = np.append(value, size * (a @ a - 1.0)), np.vstack([gradient, 2.0 * size * a])
             step, *_ = np.linalg.lstsq(gradient, -value, rcond=1e-10)
             a = a + step
         left = np.linalg.norm(np.append(forms.value(a), size * (a @ a - 1.0) if homogeneous else 0.0))
-        if left <= SAME * size and not any(np.linalg.norm(a - b) <= SAME * (1.0 + np.linalg.norm(b)) for b in roots):
+        if left <= EQUAL_DIRECTIONS * size and not any(
+            np.linalg.norm(a - b) <= EQUAL_DIRECTIONS * (1.0 + np.linalg.norm(b)) for b in roots
+        ):
             roots.append(a)
     return roots

@@ -29,31 +29,31 @@ from flexclear.pipeline.dynamics.run.evaluation.observation import observe_with
 POINTS = m.COLLOCATION_ROWS - 1
 NODES = 0.5 * (1.0 - np.cos(np.pi * np.arange(1, POINTS + 1) / POINTS))
 #: points where a closure row has less than this fraction of the independence that it has at the best one are left out;
-#: or less than the second where the first would leave out more than MANY: a slow motion is long close to the pose
-LEAST, SLOW_LEAST, MANY = 0.05, 0.005, 2
+#: or less than the second where the first leaves out more than MANY_POINTS: a slow motion is long close to the pose
+LEAST_INDEPENDENCE, LEAST_WHERE_SLOW, MANY_POINTS = 0.05, 0.005, 2
 #: so many must be left
-FEWEST = 6
+FEWEST_POINTS = 6
 #: out of a singular pose slopes of so many points lead on; so often the speeds there are made those of the branch
-LED, TURNS = 2, 4
-#: iterations, each of which leaves a fraction of the error; below ROUNDING they end, below NOISE when they do not help
-ROUNDS, HELPS, ROUNDING, NOISE = 40, 0.3, 1e-13, 1e-10
+LED, SPEED_CORRECTIONS = 2, 4
+#: iterations, each of which leaves a fraction of the error; below CONVERGED they end, below STAGNATED if they are idle
+RELAXATIONS, HELPS, CONVERGED, STAGNATED = 40, 0.3, 1e-13, 1e-10
 #: iterations are given up when one is so much worse than the last, and, after so many, when what the points leave
 #: unresolved does not fall
-WORSE, EARLY = 10.0, 6
+WORSE, EARLY_ITERATIONS = 10.0, 6
 #: what the polynomial may be off, in units of the coordinates and in fractions of the mechanism's size; and how much
 #: its end may change without one of the points, which is at least ten times what it is off
-EXACT, SENSITIVE = 1e-10, 1e-9
+POLYNOMIAL_ERROR, SENSITIVE = 1e-10, 1e-9
 #: all of that may be so much more out of a pose in which the motion begins at rest: it is long close to the pose then
-SLOWLY = 100.0
+SLOW_START = 100.0
 #: and where the polynomial is so short that a row has less than this fraction left at its ends, by the square of that
-NEAR = 0.03
+SHORT_FRACTION = 0.03
 
 #: pivot ratios of the closures at which the equations hold eight digits of accelerations where loops are closed to
 #: 1e-14, and six, with which a row must do in whose own pose they hold nothing
 CLEAR, NEARLY_CLEAR = 1e-4, 1e-6
 #: first distance in time from a singular pose, as fraction of the polynomial over it, its factor from try to try, and
 #: how many tries there are
-NEAREST, WIDER, TRIES = 1e-4, 2.0, 11
+FIRST_DISTANCE, WIDER, DISTANCE_TRIES = 1e-4, 2.0, 11
 #: where the state is evaluated, in units of the distance, and the weights there of the limit between: exact for
 #: quintics
 SIDES, WEIGHTS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([1.0, -6.0, 15.0, 15.0, -6.0, 1.0]) / 20.0
@@ -160,14 +160,14 @@ def collocate(
     """
     began = sampler.evaluations
     samples = _march(sampler, t, y, span, slope, lead)
-    used = _far_from_singular(samples, LEAST)
-    if slope is not None and used.sum() < POINTS - MANY:
-        used = _far_from_singular(samples, SLOW_LEAST)
-    if used.sum() < FEWEST:
+    used = _far_from_singular(samples, LEAST_INDEPENDENCE)
+    if slope is not None and used.sum() < POINTS - MANY_POINTS:
+        used = _far_from_singular(samples, LEAST_WHERE_SLOW)
+    if used.sum() < FEWEST_POINTS:
         return None
     evaluated, nodes = [s for s, far in zip(samples, used, strict=True) if far], NODES[used]
-    blur = SLOWLY if lead is not None and lead.turn == 0.0 else max(1.0, (NEAR / fraction) ** 2)
-    for _ in range(TURNS if lead is not None and lead.turn > 0.0 else 1):
+    blur = SLOW_START if lead is not None and lead.turn == 0.0 else max(1.0, (SHORT_FRACTION / fraction) ** 2)
+    for _ in range(SPEED_CORRECTIONS if lead is not None and lead.turn > 0.0 else 1):
         size = _sizes(sampler.engine, y, [s.slope for s in evaluated])
         iterated = _iterate(sampler, t, y, span, nodes, evaluated, blur * size)
         if iterated is None:
@@ -182,7 +182,9 @@ def collocate(
     series = _series(nodes, slopes, y, span)
     made = Collocation(t, span, series, evaluated[-1].independence, sampler.evaluations - began)
     unresolved = _sensitivity(nodes, slopes, span, blur * size)
-    sound = left <= EXACT and unresolved <= SENSITIVE and _open(sampler, made, nodes) <= blur * EXACT
+    sound = (
+        left <= POLYNOMIAL_ERROR and unresolved <= SENSITIVE and _open(sampler, made, nodes) <= blur * POLYNOMIAL_ERROR
+    )
     return made if sound else None
 
 
@@ -193,7 +195,7 @@ def _iterate(
     slopes = np.array([s.slope for s in evaluated])
     weights, last, rough = _integrals(nodes, nodes), np.inf, np.inf
     states = y + span * weights @ slopes
-    for k in range(ROUNDS):
+    for k in range(RELAXATIONS):
         evaluated = [sampler.sample(t + x * span, state) for x, state in zip(nodes, states, strict=True)]
         if not all(s.sound for s in evaluated):
             return None
@@ -201,10 +203,12 @@ def _iterate(
         left = float(np.max(np.abs([s.y for s in evaluated] - states) / size))
         before, states = states, y + span * weights @ slopes
         change = float(np.max(np.abs(states - before) / size))
-        if change <= ROUNDING or (change <= NOISE and change > HELPS * last):
+        if change <= CONVERGED or (change <= STAGNATED and change > HELPS * last):
             return evaluated, slopes, left
         unresolved = _sensitivity(nodes, slopes, span, size)
-        if not change <= WORSE * last or (k >= EARLY and unresolved > SENSITIVE and unresolved > HELPS * rough):
+        if not change <= WORSE * last or (
+            k >= EARLY_ITERATIONS and unresolved > SENSITIVE and unresolved > HELPS * rough
+        ):
             return None
         last, rough = change, unresolved
     return None
@@ -239,7 +243,7 @@ def _march(
         else:
             state = y + span * (_integrals(np.array(nodes), np.array([x]))[0] @ np.array(slopes))
         samples.append(sampler.sample(t + x * span, state))
-        if samples[-1].sound and _share(samples[-1], samples) >= LEAST:
+        if samples[-1].sound and _share(samples[-1], samples) >= LEAST_INDEPENDENCE:
             nodes.append(x)
             slopes.append(samples[-1].slope)
     return samples
@@ -323,10 +327,10 @@ def observe_around(engine: Engine, row: np.ndarray, motion: Collocation, clear: 
     clear: pivot ratio of the closures that the sides must have.
     """
     pieces = np.tile(engine.pieces[engine.segments(0.5 * (motion.start + motion.end), after=True)], (len(SIDES), 1))
-    for k in range(TRIES):
+    for k in range(DISTANCE_TRIES):
         rows = np.tile(row, (len(SIDES), 1))
         rows_around = m.record(rows, len(engine.model.contacts))
-        rows_around.time[:] += NEAREST * motion.span * WIDER**k * SIDES
+        rows_around.time[:] += FIRST_DISTANCE * motion.span * WIDER**k * SIDES
         rows_around.state[:] = motion.states(rows_around.time)
         if not any(blurred(engine, side, clear) for side in rows):
             seen = observe_with(engine, rows, pieces, CLOSED)

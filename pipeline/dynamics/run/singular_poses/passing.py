@@ -18,25 +18,25 @@ from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocati
 
 #: where no pose is foreseen the polynomial is first as long as the fastest coordinate takes for this fraction of its
 #: unit, then half of that, and so on
-REACH, HALVINGS = 0.3, 10
+FIRST_REACH, REACH_HALVINGS = 0.3, 10
 #: fraction of its unit that the fastest coordinate goes back for the rate of the rows' independence
-A_LITTLE = 1e-4
+BACKWARD_STEP = 1e-4
 #: least fraction of a row with which a polynomial may begin: where other motions are fast it must be short
-NEAREST = 3e-4
+LEAST_FRACTION = 3e-4
 #: speeds in a pose that a polynomial led to may be off by this fraction of the fastest
-TURN = 1e-6
+TURNING_BACK = 1e-6
 #: where no polynomial was found and a row has less than this fraction left, it is asked whether a loop's reach ends
 OBVIOUS = 0.02
 #: what is left of a segment after the polynomial, in fractions of its length, that belongs to it
 REMAINDER = 1e-3
 #: looks at a polynomial for the poses that it passes; singular values below this fraction of the largest vanish there
-LOOKS, VANISHED = 32, 1e-6
+SAMPLED_TIMES, VANISHED = 32, 1e-6
 #: fractions of the polynomial to which a pose is found, and at which it is examined from both sides
-NEAR, NEARLY = 1e-7, 1e-4
+POSE_TOLERANCE, SIDE_DISTANCE = 1e-7, 1e-4
 #: two looks that find a pose at times which differ by less than this fraction of the polynomial have found the same one
-SAME = 1e-6
+EQUAL_TIMES = 1e-6
 #: a loop whose speeds in the pose are below this fraction of those next to it is at rest
-AT_REST = 1e-5
+LOOP_AT_REST = 1e-5
 
 
 @dataclass(frozen=True)
@@ -94,16 +94,16 @@ def foresee_at_start(engine: Engine) -> bool:
     t, sampler = float(control[m.TIME]), Sampler(engine)
     here = sampler.sample(t, engine.view(m.Y).copy())
     fastest = float(np.max(np.abs(here.slope / model.state_scales)[: model.nq], initial=0.0))
-    back = A_LITTLE / fastest if fastest > 0.0 else np.inf
+    back = BACKWARD_STEP / fastest if fastest > 0.0 else np.inf
     before = sampler.sample(t - back, here.y - back * here.slope) if here.sound and fastest > 0.0 else here
     sampler.restore()
     engine.n[m.EVALUATIONS] += sampler.evaluations
     fall = before.independence - here.independence
     falling = fall > 0.0
     ahead = back * float(np.min(here.independence[falling] / fall[falling], initial=np.inf))
-    if not before.sound or not ahead * fastest < REACH:
+    if not before.sound or not ahead * fastest < FIRST_REACH:
         return False
-    control[[m.PASS_TIME, m.REACH, m.LEFT]] = t + ahead, REACH / fastest, ahead * fastest
+    control[[m.PASS_TIME, m.REACH, m.LEFT]] = t + ahead, FIRST_REACH / fastest, ahead * fastest
     return True
 
 
@@ -114,7 +114,7 @@ def _over(sampler: Sampler, t: float, y: np.ndarray, slope: np.ndarray) -> tuple
     """
     control = sampler.engine.control
     ahead, reach, fraction = float(control[m.PASS_TIME]) - t, float(control[m.REACH]), float(control[m.LEFT])
-    nearest = NEAREST / fraction * ahead
+    nearest = LEAST_FRACTION / fraction * ahead
     while reach >= max(ahead, nearest):
         made = collocate(sampler, t, y, _within(sampler, t, ahead + reach), slope, fraction=fraction * reach / ahead)
         if made is not None:
@@ -129,9 +129,9 @@ def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
     sampler.attempt(t, y)
     rate = np.append(sampler.slope()[:nq], np.zeros(len(y) - nq))
     fastest = float(np.max(np.abs(rate / sampler.engine.model.state_scales), initial=0.0))
-    lead = Lead(lambda at: y + (at - t) * rate, TURN)
-    for k in range(HALVINGS if fastest > 0.0 else 0):
-        made = collocate(sampler, t, y, _within(sampler, t, REACH / fastest * 0.5**k), None, lead)
+    lead = Lead(lambda at: y + (at - t) * rate, TURNING_BACK)
+    for k in range(REACH_HALVINGS if fastest > 0.0 else 0):
+        made = collocate(sampler, t, y, _within(sampler, t, FIRST_REACH / fastest * 0.5**k), None, lead)
         if made is not None:
             return made
     return None
@@ -150,7 +150,7 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
     """The singular poses on a polynomial; SolverError where the mechanism comes to rest in one."""
     from scipy.optimize import minimize_scalar  # slow to import, and most runs pass nothing
 
-    engine, times = sampler.engine, np.linspace(made.start, made.end, LOOKS + 1)
+    engine, times = sampler.engine, np.linspace(made.start, made.end, SAMPLED_TIMES + 1)
 
     def least(t: float) -> float:
         """The least singular value of all closures, whichever of them are solved for."""
@@ -163,10 +163,14 @@ def passes_of(sampler: Sampler, made: Collocation) -> tuple[Pass, ...]:
     low, times_of_passes = np.array([least(t) for t in times]), list[float]()
     bounded = np.concatenate([[np.inf], low, [np.inf]])
     for k in np.flatnonzero((low <= bounded[:-2]) & (low <= bounded[2:])):
-        bracket = float(times[max(int(k) - 1, 0)]), float(times[min(int(k) + 1, LOOKS)])
-        t = float(minimize_scalar(least, bounds=bracket, method="bounded", options={"xatol": NEAR * made.span}).x)
-        t = _between(least, float(min((t, *bracket), key=least)), NEARLY * made.span, bracket)
-        if least(t) < VANISHED * np.max(low) and not (times_of_passes and t - times_of_passes[-1] < SAME * made.span):
+        bracket = float(times[max(int(k) - 1, 0)]), float(times[min(int(k) + 1, SAMPLED_TIMES)])
+        t = float(
+            minimize_scalar(least, bounds=bracket, method="bounded", options={"xatol": POSE_TOLERANCE * made.span}).x
+        )
+        t = _between(least, float(min((t, *bracket), key=least)), SIDE_DISTANCE * made.span, bracket)
+        if least(t) < VANISHED * np.max(low) and not (
+            times_of_passes and t - times_of_passes[-1] < EQUAL_TIMES * made.span
+        ):
             times_of_passes.append(t)
     engine.keep(saved)
     return tuple(_pass(sampler, made, t) for t in times_of_passes)
@@ -196,7 +200,7 @@ def _refuse_rest(engine: Engine, made: Collocation, one: Pass, left: np.ndarray)
     """SolverError where the coordinates of the dependent closures do not move in the pose."""
     moving = selection.coordinates_of_rows(engine.model, engine.h, np.max(np.abs(left), axis=1) > 0.1)
     speeds = engine.model.speeds
-    times = np.append(np.linspace(made.start, made.end, LOOKS + 1), one.time)
+    times = np.append(np.linspace(made.start, made.end, SAMPLED_TIMES + 1), one.time)
     rates = np.max(np.abs(made.states(times)[:, speeds] / engine.model.speed_scales)[:, moving], axis=1, initial=0.0)
-    if rates[-1] <= AT_REST * np.max(rates):
+    if rates[-1] <= LOOP_AT_REST * np.max(rates):
         raise SolverError(rest(one.time, f"joint {one.joint}, condition number {one.condition:.3g}"))
