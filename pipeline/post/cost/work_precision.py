@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
@@ -146,7 +147,7 @@ def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
     return SOFT, "xd+*"[list(others).index(curve) % 4] if curve in others else "x"
 
 
-def _legend(figure: object, own: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
+def _legend(figure: Figure, own: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
     handles: list[Artist] = []
     for curve in (*own, *others):
         color, mark = look(curve, others)
@@ -156,7 +157,7 @@ def _legend(figure: object, own: list[Curve], others: Sequence[Curve], marks: tu
     handles.append(Line2D([], [], color=SOFT, linewidth=0.9, linestyle=":", label="recording, the same for all"))
     if marks:
         handles.append(Line2D([], [], color=INK, marker="*", linestyle="none", label="marked single runs"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4), fontsize=8.4)  # type: ignore[attr-defined]
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4), fontsize=8.4)
 
 
 def _subtitle(study: xr.Dataset) -> str:
