@@ -55,7 +55,7 @@ def children(process: int) -> list[psutil.Process]:
     Python's own tracker of semaphores is left out: without it nothing is lost, but Python prints tracebacks at its end.
     So are processes that still have their parent's command line: any of them may become the tracker.
     """
-    found = list[psutil.Process]()
+    running = list[psutil.Process]()
     with suppress(psutil.Error):
         parent = psutil.Process(process)
         own = parent.cmdline()
@@ -63,8 +63,8 @@ def children(process: int) -> list[psutil.Process]:
             with suppress(psutil.Error):
                 line = child.cmdline()
                 if line not in ([], own) and "resource_tracker" not in " ".join(line):
-                    found.append(child)
-    return found
+                    running.append(child)
+    return running
 
 
 def seconds_of(process: psutil.Process) -> float:

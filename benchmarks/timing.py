@@ -63,13 +63,13 @@ def interleaved(tasks: Mapping[str, Callable[[], float]], rounds: int) -> dict[s
 
 def in_turn(tasks: Mapping[str, Callable[[], T]], rounds: int) -> dict[str, tuple[T, ...]]:
     """What each task returns, once per round, one after the other; a first round, which compiles, does not count."""
-    found: dict[str, list[T]] = {name: [] for name in tasks}
+    results: dict[str, list[T]] = {name: [] for name in tasks}
     for number in range(rounds + 1):
         for name, task in tasks.items():
             made = task()
             if number:
-                found[name].append(made)
-    return {name: tuple(made) for name, made in found.items()}
+                results[name].append(made)
+    return {name: tuple(made) for name, made in results.items()}
 
 
 def slope(x: Sequence[float], y: Sequence[float]) -> float:

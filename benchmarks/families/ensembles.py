@@ -99,8 +99,8 @@ def _alone() -> Iterator[None]:
 
 def _in_turn(tasks: Mapping[str, Callable[[], tuple[float, float]]]) -> dict[str, tuple[Times, Times]]:
     """Wall and processor times of each task."""
-    found = {name: list(zip(*pairs, strict=True)) for name, pairs in in_turn(tasks, ROUNDS).items()}
-    return {name: (Times(wall), Times(cpu)) for name, (wall, cpu) in found.items()}
+    pairs_of = {name: list(zip(*pairs, strict=True)) for name, pairs in in_turn(tasks, ROUNDS).items()}
+    return {name: (Times(wall), Times(cpu)) for name, (wall, cpu) in pairs_of.items()}
 
 
 def show(records: list[Record]) -> str:

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Callable
 from functools import partial
 
 from benchmarks.page import DOCS
-from benchmarks.site import datasets, index, keys, python, quantities
+from benchmarks.site import datasets, keys, python, quantities
+from flexclear.pipeline.core.workflow.fingerprint import TREE
+
+
+def readme() -> str:
+    """The README as the first page, with its links as from docs/."""
+    page = (TREE / "README.md").read_text(encoding="utf-8")
+    return re.sub(r"\]\((docs/)?(?!http)([^)]+)\)", lambda m: f"]({'' if m[1] else '../'}{m[2]})", page)
+
 
 #: page below docs/ -> what makes its text
 PAGES: dict[str, Callable[[], str]] = {
-    "index.md": index.text,
+    "index.md": readme,
     "reference/python.md": python.text,
     "datasets.md": datasets.text,
     "reference/quantities.md": quantities.text,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from flexclear.papers.wang_wang_2019.discrepancies import DISCREPANCIES
 from flexclear.papers.wang_wang_2019.published import CITATION
@@ -14,6 +14,13 @@ from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html
 #: the table with a verdict on each statement, and its words
 VERDICTS = "table_verdicts"
 GOOD, BAD = ("holds",), ("does not hold",)
+#: heading of what the page shows of each of the project's own pages
+DOCUMENTS = {
+    "accuracy": "Accuracy against time",
+    "stability": "Stability: hard cases, and what became of each",
+    "chaos": "Periodic or chaotic",
+    "conditions": "Reference conditions of the modes",
+}
 #: tables that print what the paper gives, the others compare results with it
 GIVEN = ("table01", "table02", "table03", "table04", "table05", "table06")
 
@@ -22,36 +29,29 @@ GIVEN = ("table01", "table02", "table03", "table04", "table05", "table06")
 class Content:
     """All that the page shows."""
 
-    figures: tuple[str, ...]  #: names with a PNG
     tables: Mapping[str, Table]
     assumptions: Mapping[str, tuple[str, tuple[str, ...]]]  #: place -> (text, scenes)
-    images: Mapping[str, bytes] = field(default_factory=dict)  #: PNG of each figure, by name
-    film: tuple[str, bytes] | None = None  #: file name and content
-    still: bytes | None = None
-    views: str = ""  #: HTML of the views that can be turned
-    links: Mapping[str, str] = field(default_factory=dict)  #: text -> path
-    facts: Mapping[str, Mapping[str, str]] = field(default_factory=dict)  #: scene -> run attributes
-    documents: Mapping[str, str] = field(default_factory=dict)  #: accuracy, stability, chaos, conditions -> HTML
-    variants: Sequence[tuple[str, str]] = ()  #: scene and title
+    images: Mapping[str, bytes]  #: PNG of each figure, by name
+    film: tuple[str, bytes] | None  #: file name and content
+    still: bytes | None
+    views: str  #: HTML of the views that can be turned
+    facts: Mapping[str, Mapping[str, str]]  #: scene -> run attributes
+    documents: Mapping[str, str]  #: of DOCUMENTS -> HTML
+    variants: Sequence[tuple[str, str]]  #: scene and title
 
 
-def html_page(content: Content, drawn: Sequence[tuple[str, str]], assumptions: Sequence[tuple[str, str, str]]) -> str:
-    """The whole page; `drawn` are names and captions of the figures there are."""
-    figures = "".join(
-        media(f"{name}.png", content.images[name], title) for name, title in drawn if name in content.images
-    )
+def html_page(content: Content, captions: Mapping[str, str], assumptions: Sequence[tuple[str, str, str]]) -> str:
+    """The whole page; captions: of the figures there are, by name."""
+    figures = "".join(media(f"{name}.png", png, captions[name]) for name, png in content.images.items())
     results = [table for name, table in content.tables.items() if name not in (*GIVEN, VERDICTS)]
     given = [content.tables[name] for name in GIVEN if name in content.tables]
-    documents = content.documents
+    files = {f"{name}.csv": as_csv(table).encode() for name, table in content.tables.items()}
     parts = [
         Part("verdicts", "The verdict on every statement", _verdicts(content.tables.get(VERDICTS))),
         Part("film", "The mechanism moving", _film(content)),
         Part("figures", "Figures", figures),
         Part("tables", "Tables", "".join(as_html(table) for table in results)),
-        Part("accuracy", "Accuracy against time", documents.get("accuracy", "")),
-        Part("stability", "Stability: hard cases, and what became of each", documents.get("stability", "")),
-        Part("chaos", "Periodic or chaotic", documents.get("chaos", "")),
-        Part("conditions", "Reference conditions of the modes", documents.get("conditions", "")),
+        *(Part(key, heading, content.documents.get(key, "")) for key, heading in DOCUMENTS.items()),
         Part("parameters", "Parameters, as the paper prints them and as they are here", "".join(map(as_html, given))),
         Part("variants", "Variants", prose(("scene", "what it is"), content.variants)),
         Part(
@@ -65,7 +65,7 @@ def html_page(content: Content, drawn: Sequence[tuple[str, str]], assumptions: S
             prose(("place", "matter", "here"), DISCREPANCIES),
         ),
         Part("versions", "How it was computed, and by which versions", _versions(content)),
-        Part("downloads", "Downloads", _downloads(content)),
+        Part("downloads", "Downloads", downloads(files)),
     ]
     title = "Rod flexibility and joint clearance: the paper, reproduced"
     return page(title, CITATION, parts, _answer(content)).decode()
@@ -105,22 +105,15 @@ def _verdicts(table: Table | None) -> str:
 
 
 def _film(content: Content) -> str:
-    parts = []
-    caption = "Flexible rod and clearance at A1"
+    shown, caption = "", "Flexible rod and clearance at A1"
     if content.film is not None:
-        parts.append(media(content.film[0], content.film[1], caption, f"Film of the mechanism: {caption}"))
+        shown = media(*content.film, caption, f"Film of the mechanism: {caption}")
     elif content.still is not None:
-        parts.append(media("mechanism.png", content.still, "The mechanism"))
-    return "".join(parts) + content.views
+        shown = media("mechanism.png", content.still, "The mechanism")
+    return shown + content.views
 
 
 def _versions(content: Content) -> str:
     keys = list(dict.fromkeys(key for facts in content.facts.values() for key in facts))
     rows = [(f"`{scene}`", *(facts.get(key, "") for key in keys)) for scene, facts in content.facts.items()]
     return prose(("scene", *keys), rows)
-
-
-def _downloads(content: Content) -> str:
-    files = {f"{name}.csv": as_csv(table).encode() for name, table in content.tables.items()}
-    links = "".join(f"<li><a href='{path}'>{html.escape(text)}</a></li>" for text, path in content.links.items())
-    return downloads(files) + (f"<ul>{links}</ul>\n" if links else "")

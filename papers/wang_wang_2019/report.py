@@ -64,16 +64,14 @@ def collect(
         for path in sorted((results / "tables").glob("table*.md"))
     }
     images = {name: results / "figures" / f"{name}.png" for name in figures.NAMES}
-    drawn = {name: path.read_bytes() for name, path in images.items() if path.is_file()}
     folder = results / "runs" / rendered
     films = [path for path in (folder / "film.mp4", folder / "film.gif") if path.is_file()]
     still = folder / "mechanism.png"
     pages = [path for path in (folder / "motion.html", folder / "modes.html") if path.is_file()]
     return Content(
-        figures=tuple(drawn),
         tables=tables,
         assumptions=merged_assumptions(attributes),
-        images=drawn,
+        images={name: path.read_bytes() for name, path in images.items() if path.is_file()},
         film=(films[0].name, films[0].read_bytes()) if films else None,
         still=still.read_bytes() if still.is_file() else None,
         views="".join(figures_of(path.read_text(encoding="utf-8")) for path in pages),
@@ -121,9 +119,8 @@ def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[s
 
 def page(content: Content) -> bytes:
     """The report, results/report/index.html: one page, images and film inside."""
-    return html_page(
-        content, [(name, figures.figure(name).title) for name in content.figures], assumption_rows(content)
-    ).encode()
+    captions = {name: figures.figure(name).title for name in content.images}
+    return html_page(content, captions, assumption_rows(content)).encode()
 
 
 def paper_markdown(content: Content) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -11,17 +9,8 @@ import xarray as xr
 from flexclear.pipeline.structure.fe.solid.elements import shape_functions
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
+from tests.analytic.clouds import Cloud, same_energy, same_integrals
 from tests.analytic.solid_models import build, gauss, rod
-from tests.properties.test_bundle_integrals import kinetic
-
-
-@dataclass(frozen=True)
-class Cloud:
-    """Mass points [kg] (p,), their places [m] (3, p) and their shapes per modal coordinate (3, p, n)."""
-
-    mass: np.ndarray
-    place: np.ndarray
-    shape: np.ndarray
 
 
 @pytest.fixture(scope="module", params=["rigid", "mean"])
@@ -60,37 +49,12 @@ def cloud(mesh: xr.Dataset, u: np.ndarray) -> Cloud:
     return Cloud(mass.ravel(), place.reshape(3, -1), shape.reshape(3, mass.size, -1))
 
 
-def close(found: np.ndarray, expected: np.ndarray, scale: float) -> None:
-    # sums of some thousand terms: eps * sqrt(1e4) of the largest, with a margin
-    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * scale)
+def test_integrals_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
+    same_integrals(*body, 0.04)
 
 
-def test_invariants_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
-    data, points = body
-    mass, X, S = points.mass, points.place, points.shape
-    weighted = S * mass[:, None]
-    total = float(mass.sum())
-    # Cauchy-Schwarz: a mass-normalised shape has int rho S <= sqrt(m), int rho X S <= sqrt(int rho X^2)
-    size = np.sqrt(total)
-    close(data["mass"].values, total, total)
-    close(data["first_moment"].values, X @ mass, total * 0.04)
-    close(data["second_moment"].values, (X * mass) @ X.T, total * 0.04**2)
-    close(data["modal_first_moment"].values, weighted.sum(axis=1), size)
-    close(data["position_mode_moment"].values, np.einsum("kp,lpj->klj", X, weighted), size * 0.04)
-    close(data["mode_mode_moment"].values, np.einsum("kpi,lpj->klij", S, weighted, optimize=True), 1.0)
-
-
-def test_kinetic_energy_of_any_motion_is_that_of_the_cloud(body: tuple[xr.Dataset, Cloud]) -> None:
-    data, points = body
-    n = data.sizes["mode"]
-    random = np.random.default_rng(20190702)
-    for _ in range(5):
-        v, omega = random.normal(size=3), 10.0 * random.normal(size=3)
-        q, rate = 1e-3 * random.normal(size=n), random.normal(size=n)
-        r = points.place + points.shape @ q
-        velocity = v[:, None] + np.cross(omega, r, axisb=0, axisc=0) + points.shape @ rate
-        expected = 0.5 * float(points.mass @ (velocity**2).sum(axis=0))
-        assert kinetic(data, v, omega, q, rate) == pytest.approx(expected, rel=1e-10)
+def test_kinetic_energy_of_any_motion_is_that_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
+    same_energy(*body)
 
 
 def test_frames_move_as_their_nodes_do(body: tuple[xr.Dataset, Cloud]) -> None:

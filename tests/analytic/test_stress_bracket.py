@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import skfem
 import xarray as xr
-from skfem.helpers import ddot, sym_grad, trace
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix, von_mises
@@ -19,7 +18,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.analytic.solid_models import build
-from tests.analytic.test_stress_solid import continued, everywhere, nodes_of
+from tests.analytic.test_stress_solid import continued, everywhere, nodes_of, stiffness
 
 E, NU, RHO, G = 70e9, 0.33, 2700.0, 9.81
 LAME, SHEAR = E * NU / ((1.0 + NU) * (1.0 - 2.0 * NU)), E / (2.0 * (1.0 + NU))
@@ -36,17 +35,12 @@ def held_by_scikit_fem(mesh: xr.Dataset) -> np.ndarray:
     made = skfem.MeshHex(nodes[used].T, local.reshape(len(cells), 8).T[[0, 3, 4, 1, 7, 2, 5, 6]])
     basis = skfem.Basis(made, skfem.ElementVector(skfem.ElementHexS2()), intorder=6)
 
-    @skfem.BilinearForm
-    def stiffness(u: Any, v: Any, w: Any) -> Any:
-        strain = sym_grad(u)
-        return LAME * trace(strain) * trace(sym_grad(v)) + 2.0 * SHEAR * ddot(strain, sym_grad(v))
-
     @skfem.LinearForm
     def weight(v: Any, w: Any) -> Any:
         return -RHO * G * v[1]
 
     held = np.flatnonzero(np.abs(basis.doflocs[1] - 0.12) < 1e-9)
-    u = skfem.solve(*skfem.condense(stiffness.assemble(basis), weight.assemble(basis), D=held))
+    u = skfem.solve(*skfem.condense(stiffness(LAME, SHEAR).assemble(basis), weight.assemble(basis), D=held))
     return continued(nodes, cells, made, basis, u, True, (LAME, SHEAR))
 
 

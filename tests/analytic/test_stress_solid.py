@@ -110,19 +110,25 @@ def by_scikit_fem(mesh: xr.Dataset) -> np.ndarray:
     basis = skfem.Basis(made, skfem.ElementVector(kind), intorder=4)
     lame, shear = E * NU / ((1.0 + NU) * (1.0 - 2.0 * NU)), E / (2.0 * (1.0 + NU))
 
-    @skfem.BilinearForm
-    def stiffness(u: Any, v: Any, w: Any) -> Any:
-        strain = sym_grad(u)
-        return lame * trace(strain) * trace(sym_grad(v)) + 2.0 * shear * ddot(strain, sym_grad(v))
-
     @skfem.LinearForm
     def traction(v: Any, w: Any) -> Any:
         return sum(f * v[k] for k, f in enumerate(FORCE)) / (SIZE[1] * SIZE[2])
 
     end = skfem.FacetBasis(made, basis.elem, facets=made.facets_satisfying(lambda x: x[0] > SIZE[0] - 1e-9), intorder=4)
     held = np.flatnonzero(np.abs(basis.doflocs[0]) < 1e-9)
-    u = skfem.solve(*skfem.condense(stiffness.assemble(basis), traction.assemble(end), D=held))
+    u = skfem.solve(*skfem.condense(stiffness(lame, shear).assemble(basis), traction.assemble(end), D=held))
     return continued(nodes, cells, made, basis, u, hexes, (lame, shear))
+
+
+def stiffness(lame: float, shear: float) -> skfem.BilinearForm:
+    """The form of linear elasticity."""
+
+    @skfem.BilinearForm
+    def form(u: Any, v: Any, w: Any) -> Any:
+        strain = sym_grad(u)
+        return lame * trace(strain) * trace(sym_grad(v)) + 2.0 * shear * ddot(strain, sym_grad(v))
+
+    return form
 
 
 def continued(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,7 @@ from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
+from tests.analytic.clouds import Cloud, same_energy, same_integrals
 
 MESHES = Path(__file__).parents[2] / "meshes"
 CASES = [
@@ -23,15 +23,6 @@ CASES = [
     ("actuated_rod_square_inertia", "free-free", 7),
     ("actuated_rod_square_inertia", "craig-bampton", 13),
 ]
-
-
-@dataclass(frozen=True)
-class Cloud:
-    """Mass points [kg] (p,), their places [m] (3, p) and their shapes per modal coordinate (3, p, n)."""
-
-    mass: np.ndarray
-    place: np.ndarray
-    shape: np.ndarray
 
 
 def circle_points(radius: float) -> tuple[np.ndarray, np.ndarray]:
@@ -90,56 +81,12 @@ def body(request: pytest.FixtureRequest) -> tuple[xr.Dataset, Cloud]:
     return data, cloud(rod, data)
 
 
-def close(found: np.ndarray, expected: np.ndarray, scale: np.ndarray | float) -> None:
-    # both sums add some thousand terms: eps * sqrt(1e4) of the largest, with a margin
-    np.testing.assert_array_less(np.abs(found - expected), 1e-12 * np.broadcast_to(scale, expected.shape))
-
-
-def test_rigid_integrals_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
-    data, points = body
-    mass = points.mass.sum()
-    close(data["mass"].values, mass, mass)
-    close(data["first_moment"].values, points.place @ points.mass, mass * 0.24)
-    close(data["second_moment"].values, (points.place * points.mass) @ points.place.T, mass * 0.24**2)
-
-
-def test_modal_integrals_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
-    data, points = body
-    mass, X, S = points.mass, points.place, points.shape
-    weighted = S * mass[:, None]
-    # Cauchy-Schwarz: a mass-normalised shape has int rho S <= sqrt(m), int rho X S <= sqrt(int rho X^2)
-    size = np.sqrt(mass.sum())
-    close(data["modal_first_moment"].values, weighted.sum(axis=1), size)
-    close(data["position_mode_moment"].values, np.einsum("kp,lpj->klj", X, weighted), size * 0.24)
-    close(data["mode_mode_moment"].values, np.einsum("kpi,lpj->klij", S, weighted, optimize=True), 1.0)
+def test_integrals_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
+    same_integrals(*body, 0.24)
 
 
 def test_kinetic_energy_of_any_motion_is_that_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
-    """Velocity, spin, deformation and its rate at random; every coupling term of the body is in it."""
-    data, points = body
-    n = data.sizes["mode"]
-    random = np.random.default_rng(20190702)
-    for _ in range(5):
-        v, omega = random.normal(size=3), 10.0 * random.normal(size=3)
-        q, rate = 1e-3 * random.normal(size=n), random.normal(size=n)
-        r = points.place + points.shape @ q
-        velocity = v[:, None] + np.cross(omega, r, axisb=0, axisc=0) + points.shape @ rate
-        expected = 0.5 * float(points.mass @ (velocity**2).sum(axis=0))
-        assert kinetic(data, v, omega, q, rate) == pytest.approx(expected, rel=1e-10)
-
-
-def kinetic(data: xr.Dataset, v: np.ndarray, omega: np.ndarray, q: np.ndarray, rate: np.ndarray) -> float:
-    """Kinetic energy from the bundle alone, body axes."""
-    P, F = data["position_mode_moment"].values, data["mode_mode_moment"].values
-    first = data["first_moment"].values + data["modal_first_moment"].values @ q
-    first_rate = data["modal_first_moment"].values @ rate
-    second = data["second_moment"].values + P @ q + (P @ q).T + np.einsum("klij,i,j->kl", F, q, q)
-    # int rho r_k rdot_l
-    mixed = P @ rate + np.einsum("klij,i,j->kl", F, q, rate)
-    inertia = np.trace(second) * np.eye(3) - second
-    spin = np.array([mixed[1, 2] - mixed[2, 1], mixed[2, 0] - mixed[0, 2], mixed[0, 1] - mixed[1, 0]])
-    energy = 0.5 * float(data["mass"]) * v @ v + v @ np.cross(omega, first) + v @ first_rate
-    return float(energy + 0.5 * omega @ inertia @ omega + omega @ spin + 0.5 * rate @ data["modal_mass"].values @ rate)
+    same_energy(*body)
 
 
 def test_modal_mass_is_one_and_the_trace_of_the_moments(body: tuple[xr.Dataset, Cloud]) -> None:

@@ -92,8 +92,10 @@ def test_what_stands_beside_a_page_is_that_of_the_log(root: Path, name: str):
 
 
 @pytest.mark.parametrize("name", [name for name, family in FAMILIES.items() if family.quick])
-def test_the_smallest_case_runs_from_end_to_end(root: Path, name: str, tmp_path: Path):
+def test_the_smallest_case_runs_from_end_to_end(root: Path, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     family = FAMILIES[name]
+    module, _, _ = families.NAMES[name].partition(":")
+    monkeypatch.setattr(f"benchmarks.families.{module}.ROUNDS", 2, raising=False)
     assert main([name, "--only", family.quick, "--into", str(tmp_path)]) == 0
     (session,) = log.read(tmp_path / "log" / f"{name}.jsonl")
     assert session.cpu == log.today().cpu

@@ -64,8 +64,8 @@ class Figure:
 
 def figure(name: str) -> Figure:
     """The figure or table of a name, its module imported now, and with it the plotting libraries."""
-    found: Figure = lookup(__name__, name, where="figures")
-    return found
+    described: Figure = lookup(__name__, name, where="figures")
+    return described
 
 
 def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

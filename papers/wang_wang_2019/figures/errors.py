@@ -1,4 +1,4 @@
-"""Tables 7-9: largest deviations from the ideal model, ours next to the paper's, and how far apart they are."""
+"""Tables 7-9: largest deviations from the ideal model, ours next to the paper's, and how much they differ."""
 
 from __future__ import annotations
 

@@ -10,12 +10,13 @@ import numpy as np
 import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.post.cost.study import GROUPS, MARGIN, recording, resolved
-from flexclear.pipeline.post.plotting.style import GRID, INK, SOFT, files, grid, heading, plain, scale_of, style
+from flexclear.pipeline.post.plotting.style import GRID, INK, SOFT, files, heading, panels, plain, scale_of, style
 
 COLOURS = ("#0072B2", "#56B4E9", "#CC79A7", "#E69F00", "#D55E00", "#009E73", "#000000")
 MARKS = ("o", "s", "D", "P", "v", "^", "X", "<", ">")
@@ -50,16 +51,13 @@ def make(
     """``<name>.png`` and ``.svg``. others: curves of other programs, which take no part in the Pareto front."""
     chosen = [str(q) for q in study["quantity"].values]
     drawn = curves(study)
-    rows, recorded = -(-len(chosen) // COLUMNS), recording(study)
+    recorded = recording(study)
     with style():
-        figure, axes = grid(rows, COLUMNS, (10.5, 1.1 + 2.7 * rows))
-        for k, ax in enumerate(axes.ravel()):
-            if k < len(chosen):
-                bound = MARGIN * float(study["reference_uncertainty"].values[k])
-                _panel(ax, chosen[k], k, (drawn, others), marks, bound)
-                _mark_recording(ax, recorded)
-            else:
-                ax.set_visible(False)
+        figure, axes = panels(len(chosen), COLUMNS, 10.5, 1.1, 2.7)
+        for k, ax in enumerate(axes):
+            _panel(ax, chosen[k], k, (drawn, others), marks, MARGIN * float(study["reference_uncertainty"].values[k]))
+            if np.isfinite(recorded):  # a line where the record of a run would stand, whatever the integration took
+                ax.axvline(recorded, color=SOFT, linewidth=0.9, linestyle=":", zorder=0)
         _legend(figure, drawn, others, marks)
         heading(figure, title, _subtitle(study))
         return files(name, figure)
@@ -142,12 +140,6 @@ def _panel(
     ax.set_ylabel("relative error")
 
 
-def _mark_recording(ax: Axes, seconds: float) -> None:
-    """A line where the record of a run would stand: it costs that whatever the integration took."""
-    if np.isfinite(seconds):
-        ax.axvline(seconds, color=SOFT, linewidth=0.9, linestyle=":", zorder=0)
-
-
 def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
     """Colour and mark of a curve; grey ones for other programs."""
     if curve.name in LOOKS:
@@ -155,7 +147,7 @@ def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:
     return SOFT, "xd+*"[list(others).index(curve) % 4] if curve in others else "x"
 
 
-def _legend(figure: object, own: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
+def _legend(figure: Figure, own: list[Curve], others: Sequence[Curve], marks: tuple[Mark, ...]) -> None:
     handles: list[Artist] = []
     for curve in (*own, *others):
         color, mark = look(curve, others)
@@ -165,7 +157,7 @@ def _legend(figure: object, own: list[Curve], others: Sequence[Curve], marks: tu
     handles.append(Line2D([], [], color=SOFT, linewidth=0.9, linestyle=":", label="recording, the same for all"))
     if marks:
         handles.append(Line2D([], [], color=INK, marker="*", linestyle="none", label="marked single runs"))
-    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4), fontsize=8.4)  # type: ignore[attr-defined]
+    figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4), fontsize=8.4)
 
 
 def _subtitle(study: xr.Dataset) -> str:

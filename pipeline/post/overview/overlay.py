@@ -125,13 +125,10 @@ def _orbits(name: str, runs: Mapping[str, xr.Dataset]) -> dict[str, bytes]:
     if not orbits:
         return {}
     columns = min(len(orbits), 4)
-    rows = -(-len(orbits) // columns)
-    figure, axes = style.grid(rows, columns, (max(4.0, 2.75 * columns), 0.6 + 3.0 * rows))
-    for panel, (label, run, k) in zip(axes.flat, orbits, strict=False):
+    figure, panels = style.panels(len(orbits), columns, max(4.0, 2.75 * columns), 0.6, 3.0)
+    for panel, (label, run, k) in zip(panels, orbits, strict=True):
         orbit(panel, run, float(derive(run)["clearance"].values[k]), k)
         panel.set_title(f"{run['contact'].values[k]}: {label}\n{centre(run, k)}")
-    for panel in axes.flat[len(orbits) :]:
-        panel.set_visible(False)
     return style.files(name, figure)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection
-from math import ceil
 from pathlib import PurePath
 
 import numpy as np
@@ -13,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from flexclear.pipeline.post.plotting.style import INK, SOFT, files, grid, heading, plain, style
+from flexclear.pipeline.post.plotting.style import INK, SOFT, files, heading, panels, plain, style
 
 COLUMNS = 2
 LINE, REFUSED = "#0072B2", "#D55E00"
@@ -32,26 +31,23 @@ def figures(sweep: xr.Dataset) -> dict[str, bytes]:
     # values may stand in any order in a sweep; along an axis they go up
     sweep = sweep.sortby([name for name in parameters if name in sweep.coords and sweep[name].dtype.kind in "fiu"])
     draw = _drawn(sweep, parameters)
-    panels = _panels(sweep, sections=draw is _curve)
-    if draw is None or not panels or not (sweep["status"] == 0).any():
+    shown = _panels(sweep, sections=draw is _curve)
+    if draw is None or not shown or not (sweep["status"] == 0).any():
         return {}
-    columns = min(COLUMNS, len(panels))
-    rows = ceil(len(panels) / columns)
+    columns = min(COLUMNS, len(shown))
     with style():
-        figure, axes = grid(rows, columns, (9.6, 1.0 + (2.9 if columns > 1 else 4.2) * rows))
-        for ax, name in zip(axes.ravel(), panels, strict=False):
-            draw(figure, ax, panels[name], name)
+        figure, axes = panels(len(shown), columns, 9.6, 1.0, 2.9 if columns > 1 else 4.2)
+        for ax, name in zip(axes, shown, strict=True):
+            draw(figure, ax, shown[name], name)
             ax.set_title(name)
-        for ax in axes.ravel()[len(panels) :]:
-            ax.set_visible(False)
         refused = int((sweep["status"] == 1).sum())
         missing = int((sweep["status"] == 2).sum())
         sentences = [f"{sweep['status'].size} points of {sweep.attrs['scene']}"]
         sentences += [f"{refused} refused"] if refused else []
         sentences += [f"{missing} not run"] if missing else []
-        sentences += _still(sweep, panels)
+        sentences += _still(sweep, shown)
         if draw is _curve:
-            sentences += [text for end, text in BANDS.items() if any(f"{name}{end}" in sweep for name in panels)][:1]
+            sentences += [text for end, text in BANDS.items() if any(f"{name}{end}" in sweep for name in shown)][:1]
         heading(figure, sweep.attrs.get("title", sweep.attrs["sweep"]), ", ".join(sentences))
         return files(NAME, figure)
 

@@ -12,6 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 
 from flexclear.pipeline.post.plotting.style import INK
+from flexclear.pipeline.post.shapes.rod_shape import circle
 
 #: direction of the light, seen by the observer: from above his left shoulder
 LIGHT = np.array([-0.35, 0.65, 0.68])
@@ -99,11 +100,7 @@ def _outwards(rings: np.ndarray, normal: np.ndarray, corners: np.ndarray) -> flo
 
 def tube(start: np.ndarray, end: np.ndarray, radius: float, around: int = 24) -> np.ndarray:
     """Rings of a straight round bar with flat ends, for `shell`, shape (4, around + 1, 3)."""
-    axis = (end - start) / np.linalg.norm(end - start)
-    side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    side /= np.linalg.norm(side)
-    phi = np.linspace(0.0, 2.0 * np.pi, around + 1)
-    ring = radius * (np.outer(np.cos(phi), side) + np.outer(np.sin(phi), np.cross(axis, side)))
+    ring = radius * circle(end - start, around)
     return np.stack([start + 0.0 * ring, start + ring, end + ring, end + 0.0 * ring])
 
 

@@ -63,19 +63,17 @@ def _pixels(figure: Figure) -> np.ndarray:
 
 def _sheet(body: str, bundle: xr.Dataset, seen: View, fraction: float) -> Figure:
     count = bundle.sizes["mode"]
-    rows = -(-count // COLUMNS)
     rest, _ = surface(bundle, np.zeros(count))
     places = seen.project(rest)
     span = np.ptp(places, axis=0)
     ratio = float(np.clip((span[1] + 2.2 * FRACTION * span.max()) / (span[0] + 0.1 * span.max()), 0.25, 1.6))
     width = 11.0
-    figure, axes = style.grid(rows, COLUMNS, (width, 1.1 + rows * (0.35 + ratio * width / COLUMNS * 0.92)))
-    for k, panel in enumerate(axes.flat):
-        if k < count:
-            _mode(panel, bundle, seen, k, fraction, rest)
-        else:
-            panel.set_visible(False)
-    bar = figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), "viridis"), ax=axes, shrink=0.6, pad=0.01, aspect=30)
+    figure, axes = style.panels(count, COLUMNS, width, 1.1, 0.35 + ratio * width / COLUMNS * 0.92)
+    for k, panel in enumerate(axes):
+        _mode(panel, bundle, seen, k, fraction, rest)
+    bar = figure.colorbar(
+        ScalarMappable(Normalize(0.0, 1.0), "viridis"), ax=figure.axes, shrink=0.6, pad=0.01, aspect=30
+    )
     bar.set_label("displacement, largest = 1")
     style.heading(
         figure,

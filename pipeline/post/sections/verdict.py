@@ -54,18 +54,15 @@ VERDICT: Schema = {
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a motion is, and why in words; numbers as in the schema VERDICT."""
+    """What a motion is, and why in words.
+
+    numbers: as in the schema VERDICT.  principal: states along their directions of largest variance, (n, components).
+    """
 
     kind: Kind
     reasons: tuple[str, ...]
-    exponent: chaos.Interval
-    least: float
-    zero_one: float
-    returns_after: int
-    return_distance: float
-    contraction: float
-    few_lines: float
-    principal: np.ndarray  #: states along their directions of largest variance, shape (n, components)
+    numbers: dict[str, float]
+    principal: np.ndarray
 
 
 def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) -> Verdict:
@@ -84,9 +81,18 @@ def judge(states: np.ndarray, growth: np.ndarray, period: float, size: float) ->
     kind, reasons = _rule(rate, least, after, distance, zero_one, discrete)
     if len(states) < ENOUGH and kind != "periodic":
         kind, reasons = "undecided", (f"{len(states)} sections are too few, {ENOUGH} are needed", *reasons)
-    return Verdict(
-        kind, reasons, rate, least, zero_one, after, distance, chaos.contraction(states, after or 1), discrete, shown
-    )
+    numbers = {
+        "exponent": rate.mean,
+        "exponent_low": rate.low,
+        "exponent_high": rate.high,
+        "least_exponent": least,
+        "zero_one": zero_one,
+        "returns_after": after,
+        "return_distance": distance,
+        "contraction": chaos.contraction(states, after or 1),
+        "few_lines": discrete,
+    }
+    return Verdict(kind, reasons, numbers, shown)
 
 
 def _rule(
@@ -114,19 +120,8 @@ def derive(sections: xr.Dataset) -> xr.Dataset:
     verdict = judge(states, sections.growth.values, period, size)
     shown = verdict.principal
     lines = [chaos.spectrum(component) for component in shown.T]
-    scalars = {
-        "exponent": verdict.exponent.mean,
-        "exponent_low": verdict.exponent.low,
-        "exponent_high": verdict.exponent.high,
-        "least_exponent": verdict.least,
-        "zero_one": verdict.zero_one,
-        "returns_after": verdict.returns_after,
-        "return_distance": verdict.return_distance,
-        "contraction": verdict.contraction,
-        "few_lines": verdict.few_lines,
-    }
     data: dict[str, tuple[tuple[str, ...], np.ndarray]] = {
-        name: ((), np.array(value)) for name, value in scalars.items() if np.isfinite(value)
+        name: ((), np.array(value)) for name, value in verdict.numbers.items() if np.isfinite(value)
     }
     data["principal"] = (("section", "component"), shown)
     data["power"] = (("frequency", "component"), np.stack([power for _, power in lines], axis=1))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 
 import xarray as xr
 
-from flexclear.pipeline.post.plotting.table import pipe_table
+from flexclear.pipeline.post.plotting.table import Table, as_csv, pipe_table
 
 INTRODUCTION = """# Periodic, quasi-periodic or chaotic
 
@@ -54,13 +52,16 @@ def markdown(verdicts: Mapping[str, xr.Dataset], sections: Mapping[str, xr.Datas
 
 def csv_text(verdicts: Mapping[str, xr.Dataset]) -> str:
     """The verdicts and their exponents [1/s] for programs: columns `COLUMNS`, a line for each scene."""
-    text = io.StringIO()
-    lines = csv.writer(text, lineterminator="\n")
-    lines.writerow(COLUMNS)
-    for name, verdict in verdicts.items():
-        exponents = (f"{float(verdict[column]):.3g}" for column in COLUMNS[3:])
-        lines.writerow([name, verdict.attrs["verdict"], verdict.sizes["section"], *exponents])
-    return text.getvalue()
+    rows = [
+        (
+            name,
+            verdict.attrs["verdict"],
+            str(verdict.sizes["section"]),
+            *(f"{float(verdict[c]):.3g}" for c in COLUMNS[3:]),
+        )
+        for name, verdict in verdicts.items()
+    ]
+    return as_csv(Table("Verdicts", COLUMNS, tuple(rows)))
 
 
 def row(name: str, verdict: xr.Dataset) -> tuple[str, ...]:

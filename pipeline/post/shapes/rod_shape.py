@@ -50,13 +50,16 @@ def _spokes(bundle: xr.Dataset, points: np.ndarray) -> np.ndarray:
     """From the centre line to the outline of each cell [m], shape (cell, around, 3)."""
     if "outline" in bundle:
         return np.asarray(bundle["outline"].values)
-    axis = points[-1] - points[0]
-    axis /= np.linalg.norm(axis)
+    return np.asarray(bundle.radius.values[:, None, None] * circle(points[-1] - points[0]))
+
+
+def circle(axis: np.ndarray, around: int = AROUND) -> np.ndarray:
+    """Points around an axis, at the distance one from it, the last one the first, shape (around + 1, 3)."""
+    axis = axis / np.linalg.norm(axis)
     side = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
     side /= np.linalg.norm(side)
-    phi = np.linspace(0.0, 2.0 * np.pi, AROUND + 1)
-    circle = np.outer(np.cos(phi), side) + np.outer(np.sin(phi), np.cross(axis, side))
-    return np.asarray(bundle.radius.values[:, None, None] * circle)
+    phi = np.linspace(0.0, 2.0 * np.pi, around + 1)
+    return np.outer(np.cos(phi), side) + np.outer(np.sin(phi), np.cross(axis, side))
 
 
 def scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:

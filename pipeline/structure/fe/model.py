@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -76,14 +75,10 @@ class Drawn:
     rotation: sp.csr_array
     outline: np.ndarray | None = None
 
-    def variables(self) -> dict[str, Any]:
-        """What is drawn of the body at rest, as variables of a bundle."""
-        shown: dict[str, Any] = {
-            "node_position": (("node", "axis"), self.position),
-            "cell_node": (("cell", "corner"), self.cell),
-            "radius": (("cell",), self.radius),
-        }
-        return shown | ({} if self.outline is None else {"outline": (("cell", "around", "axis"), self.outline)})
+    def at_rest(self) -> dict[str, np.ndarray]:
+        """What is drawn of the body at rest, by names of schema BUNDLE."""
+        shown = {"node_position": self.position, "cell_node": self.cell, "radius": self.radius}
+        return shown if self.outline is None else shown | {"outline": self.outline}
 
 
 @dataclass(frozen=True)
@@ -111,6 +106,13 @@ class Model:
     def size(self) -> int:
         """Number of degrees of freedom."""
         return self.mass.shape[0]
+
+    def frames(self) -> dict[str, np.ndarray]:
+        """Places of the named frames at rest, by names of schema BUNDLE."""
+        return {
+            "frame_position": np.stack([frame.position for frame in self.interfaces]),
+            "frame_rotation": np.stack([frame.rotation for frame in self.interfaces]),
+        }
 
 
 def rigid_motions(positions: np.ndarray, component: np.ndarray, about: np.ndarray) -> np.ndarray:

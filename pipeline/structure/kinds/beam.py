@@ -10,10 +10,9 @@ from flexclear.pipeline.structure.closed_form import comparison
 from flexclear.pipeline.structure.fe import beam as beams
 from flexclear.pipeline.structure.fe import beam_mesh
 from flexclear.pipeline.structure.fe.beam import N_DOFS, Beam
-from flexclear.pipeline.structure.fe.inertia_integrals import integrate
 from flexclear.pipeline.structure.fe.model import Drawn, Families, Interface, Model
 from flexclear.pipeline.structure.fe.section import rectangle_torsion
-from flexclear.pipeline.structure.fe.slices import slices
+from flexclear.pipeline.structure.fe.slices import integrate, slices
 from flexclear.pipeline.structure.kinds.kind import Kind
 
 #: components along the rod's axes by family, the one that decides the sign first

@@ -13,8 +13,8 @@ import xarray as xr
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.structure.fe.exchange import lumped
 from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS
-from flexclear.pipeline.structure.fe.inertia_integrals import integrate
 from flexclear.pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions
+from flexclear.pipeline.structure.fe.slices import integrate
 from flexclear.pipeline.structure.fe.solid import ties
 from flexclear.pipeline.structure.fe.solid.model import FAMILIES, MEMBER, integrals
 from flexclear.pipeline.structure.sparse.multifrontal import cholesky
