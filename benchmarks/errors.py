@@ -16,9 +16,8 @@ from flexclear.pipeline.core.scene.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import frames
-from flexclear.pipeline.dynamics.run.evaluation.specialised import specialise
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
@@ -154,7 +153,7 @@ def ladder(here: Mechanism, body: str, reference: Reference, enough: Callable[[E
 
 
 def _rung(mine: Mechanism, run: xr.Dataset, body: str, reference: Reference) -> Rung:
-    engine = mine.engine()
+    engine = mine.general_engine()
     start, what = consistent_start(engine), mine.scene.solver
     error = reference.error(_regular(run, body, reference.sampling))
 
@@ -167,9 +166,7 @@ def _rung(mine: Mechanism, run: xr.Dataset, body: str, reference: Reference) -> 
 
     @cache
     def straight() -> Engine:
-        made = another(engine)
-        specialise(made)
-        return made
+        return mine.engine()
 
     return Rung(
         what.integrator,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,9 +19,8 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised, straight_code
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.specialised import specialise
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
@@ -44,6 +43,14 @@ class Mechanism:
     def engine(self) -> Engine:
         """Its compiled engine."""
         return engine_of(self.scene, self.bundles, silent)
+
+    def general_engine(self) -> Engine:
+        """Its engine that evaluates with the kernels for all wirings, as what is too long for straight code does."""
+        proper, straight_code.suited = straight_code.suited, lambda model: False
+        try:
+            return self.engine()
+        finally:
+            straight_code.suited = proper
 
     def with_scene(self, name: str, scene: Scene) -> Mechanism:
         """The same bundles under an edited scene."""
@@ -123,22 +130,19 @@ def set_state(engine: Engine, state: State) -> None:
     engine.select_pieces_after(state.t)
 
 
-def evaluation_time(engine: Engine, state: State, repeat: int, *, straight: bool = False) -> float:
-    """Processor time of one evaluation of the right-hand side [s], from `repeat` of them in compiled code.
-
-    straight: by the code for this wiring alone, as in ensembles, sections, sweeps and long runs.
-    """
+def evaluation_time(engine: Engine, state: State, repeat: int) -> float:
+    """Processor time of one evaluation of the right-hand side [s] as steps call it, from `repeat` of them in compiled
+    code."""
     set_state(engine, state)
-    with _straight(engine) if straight else nullcontext():
+    with _as_steps(engine):
         return once(lambda: closure_rows.evaluate(engine, state.y, state.t, repeat)) / repeat
 
 
 @contextmanager
-def _straight(engine: Engine) -> Iterator[None]:
+def _as_steps(engine: Engine) -> Iterator[None]:
     """Let evaluations that Python asks for be those of the steps."""
-    specialise(engine)
-    before = engine.h[m.EVALUATE]
-    engine.h[m.EVALUATE] = engine.h[m.RATES]
+    specialised.settle(engine, silent)
+    before, engine.h[m.EVALUATE] = int(engine.h[m.EVALUATE]), engine.h[m.RATES]
     try:
         yield
     finally:

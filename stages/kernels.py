@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.core.system.progress import Progress
+    from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 
 
 def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
@@ -34,7 +35,8 @@ def task(scene: Scene, bundles: Mapping[str, Task]) -> Task:
 
 
 def shared(scene: Scene) -> tuple[str, ...]:
-    """Equal for scenes that run on the same kernels: numbers and wiring are not compiled."""
+    """Equal for scenes that run on the same kernels: numbers are not compiled, and code for one wiring is left to
+    the runs, a second of the processor each."""
     return simulation.modules(scene)
 
 
@@ -57,11 +59,14 @@ def processor_time() -> float:
     return sum(os.times()[:4])
 
 
-def warm(scene: Scene, reduced: Mapping[str, Labelled], progress: Progress) -> None:
-    """Compile or fetch the kernels and call them, so that no measurement contains it."""
+def warm(scene: Scene, reduced: Mapping[str, Labelled], progress: Progress) -> Engine:
+    """Compile or fetch what a run calls and call it, so that no measurement contains it; the engine."""
+    from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
     from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
     from flexclear.pipeline.dynamics.run.run import engine_of
 
     engine = engine_of(scene, reduced, progress)
     engine.entry.complete()
     consistent_start(engine)
+    settle(engine, progress)
+    return engine

@@ -22,14 +22,13 @@ EVALUATIONS, SOLUTIONS, ROUNDS = 2000, 30, 25
 def _scene(case: Case) -> list[Record]:
     """Both in turns in one process, the ratio the median of the ratios of neighbours."""
     here = mechanism(case.name)
-    engine = here.engine()
+    engines = {"": here.general_engine(), ", straight": here.engine()}
     system = maximal.assemble(here.scene, here.bundles)
     tasks: dict[str, Callable[[], float]] = {"dgesv": dgesv_time(system)}
-    for label, state in states(engine, trajectory(engine)).items():
-        for straight in (False, True):
-            tasks[f"{label}, straight" if straight else label] = partial(
-                evaluation_time, engine, state, EVALUATIONS, straight=straight
-            )
+    straight = engines[", straight"]
+    for label, state in states(straight, trajectory(straight)).items():
+        for way, engine in engines.items():
+            tasks[f"{label}{way}"] = partial(evaluation_time, engine, state, EVALUATIONS)
     times = interleaved(tasks, ROUNDS)
     dense = times.pop("dgesv")
     ours = {label: found.record("us") | {"ratio": dense.over(found)} for label, found in times.items()}

@@ -25,7 +25,6 @@ from flexclear.pipeline.core.system.errors import FlexclearError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.specialised import specialise
 
 LOOPS = (5, 10, 20, 40, 80)
 #: of the flexible rod, of whose Craig-Bampton modes six are static; none cuts a pair of equal frequencies
@@ -75,7 +74,7 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 def _absent(effect: str) -> Record:
     full, without = mechanism("far_csj_cb"), mechanism(ABSENT[effect])
-    engines = {"stripped": stripped(full, effect).engine(), "without": without.engine()}
+    engines = {"stripped": stripped(full, effect).general_engine(), "without": without.general_engine()}
     times = interleaved({label: _evaluation(engine, EVALUATIONS) for label, engine in engines.items()}, ROUNDS)
     return {
         "scene": without.name,
@@ -104,7 +103,7 @@ def _loops(cases: Sequence[Case]) -> Measured:
     tasks = {}
     for case in cases:
         try:
-            engine = Mechanism(case.name, four_bars(case.of), {}).engine()
+            engine = Mechanism(case.name, four_bars(case.of), {}).general_engine()
             tasks[case.name] = _evaluation(engine, max(EVALUATIONS // case.of, 10))
         except FlexclearError as error:
             yield case, [{"loops": case.of, "verdict": REFUSED, "reason": str(error)}]
@@ -116,35 +115,35 @@ def _loops(cases: Sequence[Case]) -> Measured:
 
 def _modes(cases: Sequence[Case]) -> Measured:
     """Evaluations by the kernels and, where there is such, by straight code."""
-    known, engines, full = dict[str, Record](), dict[str, Engine](), mechanism(FLEXIBLE)
+    known, grown, full = dict[str, Record](), dict[str, Mechanism](), mechanism(FLEXIBLE)
     for case in cases:
-        engine = engines[case.name] = with_modes(full, case.of).engine()
-        arrays = engine.model.arrays
+        grown[case.name] = with_modes(full, case.of)
+        arrays = grown[case.name].engine().model.arrays
         known[case.name] = {
             "modes": case.of,
             "held": int(arrays.table(m.FLEXES)["n_held"][0]),
             "products": len(arrays.table(m.MOMENTS)),
         }
-    for case, measured in _both_ways(cases, engines):
+    for case, measured in _both_ways(cases, grown):
         yield case, [known[case.name] | measured]
 
 
 def _parts(made: Callable[[int], Mechanism], what: str, cases: Sequence[Case]) -> Measured:
     """Evaluations with so many parts of a kind, in free flight."""
     mine = [case for case in cases if case.name.endswith(what)]
-    for case, measured in _both_ways(mine, {case.name: made(case.of).engine() for case in mine}):
+    for case, measured in _both_ways(mine, {case.name: made(case.of) for case in mine}):
         yield case, [{what: case.of, **measured}]
 
 
-def _both_ways(cases: Sequence[Case], engines: Mapping[str, Engine]) -> Iterator[tuple[Case, Record]]:
+def _both_ways(cases: Sequence[Case], grown: Mapping[str, Mechanism]) -> Iterator[tuple[Case, Record]]:
     """Times of evaluations by the kernels and, where there is such, by straight code."""
     tasks = dict[str, Callable[[], float]]()
-    for name, engine in engines.items():
+    for name, here in grown.items():
+        general, engine = here.general_engine(), here.engine()
         state = states(engine, trajectory(engine))["free"]
-        tasks[name] = partial(evaluation_time, engine, state, EVALUATIONS // 4)
-        specialise(engine)
-        if engine.h[m.RATES] != engine.h[m.EVALUATE]:
-            tasks[f"{name}, straight"] = partial(evaluation_time, engine, state, EVALUATIONS // 4, straight=True)
+        tasks[name] = partial(evaluation_time, general, state, EVALUATIONS // 4)
+        if engine.has_straight_code:
+            tasks[f"{name}, straight"] = partial(evaluation_time, engine, state, EVALUATIONS // 4)
     times = interleaved(tasks, ROUNDS)
     for case in cases:
         straight = times.get(f"{case.name}, straight")

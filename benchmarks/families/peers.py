@@ -21,7 +21,6 @@ from benchmarks.timing import interleaved, slope
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
-from flexclear.pipeline.dynamics.run.evaluation.specialised import specialise
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
@@ -39,7 +38,8 @@ def cases() -> list[Case]:
 
 def _of_chain(name: str, links: int) -> Record:
     """Evaluations of an open chain, by the kernels and, where there is such, by straight code; and those of its run."""
-    peer, engine = CHAINS[name](links), Mechanism(name, hinged(links), {}).engine()
+    peer, mine = CHAINS[name](links), Mechanism(name, hinged(links), {})
+    engine, straight = mine.general_engine(), mine.engine()
     start, order = consistent_start(engine), [hinge.start for hinge in engine.model.numbering.coordinates[1:]]
     integrate(engine, start, silent)
     evaluations, y, nq = int(engine.n[m.EVALUATIONS]), start.copy(), engine.model.nq
@@ -50,9 +50,8 @@ def _of_chain(name: str, links: int) -> Record:
     ours, theirs = closure_rows.evaluate(engine, y, state.t)[engine.model.speeds][order], peer.hinges()
     repeat = max(EVALUATIONS // links, 10)
     tasks = {"theirs": partial(peer.time, repeat), "ours": partial(evaluation_time, engine, state, repeat)}
-    specialise(engine)
-    if engine.h[m.RATES] != engine.h[m.EVALUATE]:
-        tasks["straight"] = partial(evaluation_time, engine, state, repeat, straight=True)
+    if straight.has_straight_code:
+        tasks["straight"] = partial(evaluation_time, straight, state, repeat)
     times = interleaved(tasks, ROUNDS)
     return {
         "by": name,
@@ -67,15 +66,16 @@ def _of_chain(name: str, links: int) -> Record:
 
 
 def _record(name: str, loops: int) -> Record:
-    peer, engine = PEERS[name](loops), Mechanism(name, four_bars(loops, LEAN), {}).engine()
+    peer, mine = PEERS[name](loops), Mechanism(name, four_bars(loops, LEAN), {})
+    engine = mine.general_engine()
     state = State(engine.start, np.zeros(0), np.zeros(0), consistent_start(engine))
     links, numbering = engine.model.links, engine.model.numbering
     uprights = [numbering.coordinates[i][0] for i, link in enumerate(links) if i and link.kind == "revolute"]
     ours = np.sort(closure_rows.evaluate(engine, state.y, state.t)[engine.model.speeds][uprights])
     repeat = max(EVALUATIONS // loops, 10)
     tasks: dict[str, Callable[[], float]] = {"theirs": partial(peer.time, repeat)}
-    for label, straight in (("ours", False), ("straight", True)):
-        tasks[label] = partial(evaluation_time, engine, state, repeat, straight=straight)
+    for label, one in (("ours", engine), ("straight", mine.engine())):
+        tasks[label] = partial(evaluation_time, one, state, repeat)
     times = interleaved(tasks, ROUNDS)
     apart = np.abs(np.sort(peer.hinges()) - ours).max() / np.abs(ours).max()
     return {

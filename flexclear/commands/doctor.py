@@ -218,7 +218,7 @@ def compiled_for(names: list[str], workplace: Workplace) -> list[str]:
 
     For an image, a cluster, or before a lesson: nothing is compiled behind a user's back, since a process that stays
     after its command would take a laptop's battery, be billed or killed by a scheduler, and write into a folder that a
-    container is about to throw away. Code for one wiring is left to the runs that are long enough for it.
+    container is about to throw away.
     """
     if names:
         return _compiled(scenes.graphs(names), workplace)
@@ -248,8 +248,8 @@ def _compile(scene: Scene, reduced: Mapping[str, xr.Dataset], progress: Progress
     """What a scene's methods call, and those that may take over."""
     from flexclear.pipeline.dynamics.compile import functions
     from flexclear.pipeline.dynamics.effects import schemes
-    from flexclear.pipeline.dynamics.run.run import engine_of
+    from flexclear.stages.kernels import warm
 
-    model = engine_of(scene, reduced, progress).model
+    model = warm(scene, reduced, progress).model
     for scheme in schemes(scene):
         functions.entry(model.parts, scheme, lambda text: progress(None, text)).complete()

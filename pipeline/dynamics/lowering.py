@@ -154,11 +154,29 @@ class WholeLowering(PartLowering):
     library_class = Whole
 
 
+#: passes for what no kernel has: comprehensions, blocks `with`, functions within functions, arrays as operands
+NEEDLESS = {
+    "WithLifting",
+    "InlineClosureLikes",
+    "InlineInlinables",
+    "InlineOverloads",
+    "RewriteDynamicRaises",
+    "MakeFunctionToJitFunction",
+    "FindLiterallyCalls",
+    "LiteralUnroll",
+    "LiteralPropagationSubPipelinePass",
+    "NopythonRewrites",
+    "NoPythonSupportedFeatureValidation",
+    "DumpParforDiagnostics",
+}
+
+
 def _pipeline(state: Any, lowering: type[NativeLowering]) -> list[PassManager]:
-    """Numba's pipeline with another lowering; there is no object mode to fall back to."""
+    """Numba's pipeline with another lowering, less what kernels need not; there is no object mode to fall back to."""
     manager = PassManager(lowering.__name__)
     for step, what in DefaultPassBuilder.define_nopython_pipeline(state).passes:
-        manager.add_pass(lowering if step is NativeLowering else step, what)
+        if step.__name__ not in NEEDLESS:
+            manager.add_pass(lowering if step is NativeLowering else step, what)
     manager.finalize()
     return [manager]
 

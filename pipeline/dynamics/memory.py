@@ -153,8 +153,8 @@ class Room:
 # fmt: on
 _named(SIZES, " ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
-#: RATES: of what the steps evaluate with, EVALUATE's or code for this wiring alone (`specialise`)
-EVALUATE, PROJECT, RETRACT, RATES = ADDRESSES = _places(4)
+#: RATES: of what the steps evaluate with, EVALUATE's or what leaves only what they read (`specialise`)
+EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RATES = ADDRESSES = _places(6)
 
 # Wiring in h ---------------------------------------------------------------------------------------------------------
 #: inboard_port: port of a flexible link's inboard frame or -1; carried_by: port of the parent that carries it or -1;
@@ -284,6 +284,9 @@ LAST_PIVOT, WANTED_PIVOT = _floats(PIVOT, "last_pivot wanted_pivot")
 PIVOT_SIZE = 2
 #: what a contact does now; bent: what the bristles store
 TOUCH = work("gap rate normal_force friction_power damping_power stored bent slip force:3 offset:3 point:3")
+#: on the closures' second bodies; of an independent mechanism its kinetic energy, potential energy of gravity, and
+#: what bodies, springs and contacts store [J]
+CLOSURE_WRENCH, ENERGY = work("moment:3 force:3"), work("kinetic potential elastic")
 LAW = work("value rate second_rate")
 #: what a load does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
 #: energy, power that it brings in, power that it loses

@@ -18,7 +18,15 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow import fingerprint
 from flexclear.pipeline.dynamics import loads
 from flexclear.pipeline.dynamics.compile import functions
-from flexclear.pipeline.dynamics.compile.sources import imported, sources, specialised
+from flexclear.pipeline.dynamics.compile.sources import (
+    DESCRIBED,
+    abreast,
+    along,
+    imported,
+    kernels,
+    sources,
+    straight,
+)
 from flexclear.pipeline.dynamics.effects import JOINTS, LOADS, Parts, Scheme, scheme_of
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS as DECLARED
 from flexclear.pipeline.dynamics.effects.effect import PACKAGE
@@ -209,10 +217,15 @@ CASES: dict[str, tuple[Parts, set[str]]] = {
 }
 
 
+def generated(parts: Parts, scheme: Scheme = SCHEME) -> dict[str, str]:
+    """Files of a mechanism whose wiring has no code of its own."""
+    return sources(parts, scheme) | kernels(parts)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_the_entry_names_and_reaches_the_effects_present_and_no_other(case: str) -> None:
     found, present = CASES[case]
-    texts = sources(found, SCHEME)
+    texts = generated(found)
     modules, source = reached(texts), "".join(texts.values())
     for effect, (word, module) in EFFECTS.items():
         assert (word in source) == (effect in present), effect
@@ -223,7 +236,7 @@ def test_the_entry_names_and_reaches_the_effects_present_and_no_other(case: str)
 def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     """An edit of a part that a scene does not use leaves its machine code alone."""
     found, present = CASES[case]
-    modules = reached(sources(found, SCHEME))
+    modules = reached(generated(found))
     requested = {module_of(JOINTS, n) for n in found.joints}
     requested.add("flexclear.pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
     if "contact" in present:
@@ -244,12 +257,13 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
 def test_lines_of_generated_files_tell_all_that_they_import(case: str) -> None:
     """As Python's own parser finds it."""
     parts, _ = CASES[case]
-    for text in (*sources(parts, SCHEME).values(), specialised(parts, ((1, 2),)), specialised(parts, (), lanes=2)):
+    alone = straight(parts, ((1, 2),)), straight(parts, (), DESCRIBED), abreast(parts, (), 2), along(parts, ())
+    for text in (*generated(parts).values(), *alone):
         assert imported(text) == fingerprint.imported(text.encode(), "entry", package=False)[0]
 
 
 def test_frictionless_clearance_reaches_no_friction_law() -> None:
-    modules = reached(sources(CASES["smooth clearance"][0], SCHEME))
+    modules = reached(generated(CASES["smooth clearance"][0]))
     assert below(modules, ("flexclear.pipeline.dynamics.contact.friction",)) == set()
 
 
@@ -257,7 +271,7 @@ def test_frictionless_clearance_reaches_no_friction_law() -> None:
 
 
 def digests(found: Parts, scheme: Scheme) -> dict[str, str]:
-    return {name: functions.digest(text) for name, text in sources(found, scheme).items()}
+    return {name: functions.digest(text) for name, text in generated(found, scheme).items()}
 
 
 def test_the_tables_of_all_effects_are_part_of_the_key() -> None:
@@ -371,7 +385,7 @@ def test_mechanisms_share_the_code_in_which_they_are_alike() -> None:
     """Steps know neither joints nor bodies nor laws; what is recorded and the equations know no integrator."""
     one, whole = CASES["clearance"][0], CASES["everything"][0]
     mine, theirs = digests(one, SCHEME), digests(whole, SCHEME)
-    assert [name for name in mine if mine[name] == theirs[name]] == ["advance"]
+    assert [name for name in mine if mine[name] == theirs[name]] == ["observe", "advance"]
     # they end on guards, whatever these watch: sliding in joints or along coordinates
     hinges, springs = CASES["rubbing hinges"][0], replace(CASES["springs"][0], closures=True, load_kinks=True)
     assert digests(hinges, SCHEME)["advance"] == digests(springs, SCHEME)["advance"] != mine["advance"]

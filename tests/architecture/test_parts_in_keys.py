@@ -12,7 +12,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.dynamics import effects
 from flexclear.pipeline.dynamics.compile import functions
-from flexclear.pipeline.dynamics.compile.sources import modules, sources
+from flexclear.pipeline.dynamics.compile.sources import kernels, modules, sources
 from flexclear.pipeline.dynamics.effects import Parts, Scheme
 
 BALL = {"type": "rigid", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "frames": {"F": {}}}
@@ -65,7 +65,8 @@ COMPILED = [f for f in families() if f[:2] in CODE and f != (effects.LOADS, "NAM
 def test_what_a_part_compiles_reaches_its_module(package: str, table: str, name: str) -> None:
     """The digest of a compiled function changes with the sources of its parts."""
     parts = CODE[package, table](name)
-    reached = {found for text in sources(parts, Scheme("dop853")).values() for found in functions.reached(text)}
+    texts = (sources(parts, Scheme("dop853")) | kernels(parts)).values()
+    reached = {found for text in texts for found in functions.reached(text)}
     assert module_of(package, table, name) in reached
 
 
@@ -95,7 +96,8 @@ def test_the_key_of_a_run_holds_all_modules_that_its_code_can_reach(root: Path, 
     part = next(value for value in vars(declared).values() if hasattr(value, "COORDINATES"))
     possible = {name, "free", *(() if len(part.COORDINATES) < 2 else {c.part for c in part.COORDINATES} | {"fixed"})}
     for scheme in effects.schemes(scene):
-        texts = sources(Parts(tuple(sorted(possible)), closures=True), scheme).values()
+        parts = Parts(tuple(sorted(possible)), closures=True)
+        texts = (sources(parts, scheme) | kernels(parts)).values()
         assert {found for text in texts for found in functions.reached(text)} <= set(known)
 
 
@@ -134,7 +136,7 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
     tables, parts, module = BESIDE[family]
     if family == "stop":
         tables["stop"]["end"]["coordinate"] = "rotation"
-    texts = sources(parts, Scheme("dop853")).values()
+    texts = (sources(parts, Scheme("dop853")) | kernels(parts)).values()
     reached = {found for text in texts for found in functions.reached(text)}
     scene = scene_with({"type": "cylindrical"}, **tables)
     known = Sources(root).closure(["flexclear.stages.simulation", *modules(scene)]).keys()

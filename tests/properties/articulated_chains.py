@@ -10,7 +10,6 @@ import pytest
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import sources
-from flexclear.pipeline.dynamics.effects import Scheme
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model import model as modelling
 from flexclear.pipeline.dynamics.model.arrays import WorkSpace
@@ -91,7 +90,7 @@ def tabulated(monkeypatch: pytest.MonkeyPatch, scene: Scene, articulated: bool) 
 def right_hand_side(model: Model) -> Any:
     """The kernel of the right-hand side that is compiled for a model."""
     scope: dict[str, Any] = {}
-    exec(sources.sources(model.parts, Scheme("dop853"))["evaluate"].partition("@calls")[0], scope)
+    exec(sources.kernels(model.parts)["evaluate"].partition("@calls")[0], scope)
     return scope["right_hand_side"]
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from functools import cache
+from itertools import pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -15,18 +16,18 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.compile import sources
+from flexclear.pipeline.dynamics.compile import compiler_process, files, functions, sources
 from flexclear.pipeline.dynamics.model import initial, selection
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.mobility import analyse
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows, straight_code
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.specialised import specialise
+from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
-from flexclear.pipeline.dynamics.run.run import engine_of
+from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.dynamics.specialise import straight as straight_code
+from flexclear.pipeline.dynamics.specialise import straight as tracing
 from flexclear.pipeline.dynamics.specialise.code import Emitter
 from flexclear.pipeline.dynamics.specialise.straight import program
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
@@ -44,7 +45,7 @@ ROUNDING = 1e-9
 def rates_kernel(model: Model) -> Any:
     """The kernel that the straight code is made from."""
     scope: dict[str, Any] = {}
-    exec(sources.specialised(model.parts, ()).partition("WIRING")[0], scope)
+    exec(sources.straight(model.parts, ()).partition("WIRING")[0], scope)
     return scope["rates"]
 
 
@@ -71,72 +72,127 @@ def apart(model: Model, one: np.ndarray, other: np.ndarray) -> float:
 
 def test_what_would_be_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     model = tabulate(build(load_scene(TREE / "scenes/checks/pendulum.toml"), {}))
-    monkeypatch.setattr(straight_code, "LONGEST", 10)
+    monkeypatch.setattr(tracing, "LONGEST", 10)
     with pytest.raises(UnsuitedError, match="too long"):
         program(rates_kernel(model), wiring(model.arrays, model.arrays.work_space(lambda _: m.Room(2, 0, 0)).h))
 
 
+def description_kernel(model: Model) -> Any:
+    """The kernel of what is recorded of an evaluation."""
+    scope: dict[str, Any] = {}
+    exec(sources.straight(model.parts, (), sources.DESCRIBED).partition("WIRING")[0], scope)
+    return scope["description"]
+
+
+def largest_difference(h: np.ndarray, one: np.ndarray, other: np.ndarray) -> float:
+    """Of two work spaces, as share of the largest number of a stretch."""
+    stretches, worst = [*m.STRETCHES.values(), *(table.place for table in m.TABLES["w"])], 0.0
+    for begin, end in pairwise(sorted({int(h[index]) for index in stretches} | {len(one)})):
+        a, b = one[begin:end], other[begin:end]
+        worst = max(worst, float(np.abs(a - b).max(initial=0.0)) / max(1.0, float(np.abs(a).max(initial=0.0))))
+    return worst
+
+
 @pytest.mark.parametrize("path", RIGID, ids=lambda path: path.stem)
 @pytest.mark.filterwarnings("ignore:divide by zero", "ignore:invalid value")
-def test_every_scene_is_evaluated_alike(path: Path) -> None:
-    """Both without a compiler: kernels on numbers, and what they wrote on the tape; contacts open and closed."""
+def test_every_scene_is_evaluated_alike(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Both without a compiler: kernels on numbers, and what they wrote on the tape; contacts open and closed.
+
+    What steps read, all of the work space, and with what is recorded; also of what would be too long.
+    """
+    monkeypatch.setattr(tracing, "LONGEST", 200_000)
     model = tabulate(build(load_scene(path), {}))
     space, f = model.arrays.work_space(lambda _: m.Room(2, 0, 0)), model.arrays.f
     h, y, dy = space.h, int(space.h[m.Y]), int(space.h[m.SLOPES])
-    kernel, start = rates_kernel(model), initial.start_state(model)
+    kernel, described, start = rates_kernel(model), description_kernel(model), initial.start_state(model)
     space.w[y : y + model.ny] = start
     keep_independent(model, h, y, dy, space.w.copy(), space.n.copy(), kernel)
-    made = program(kernel, wiring(model.arrays, h))
+    wired = wiring(model.arrays, h)
+    tape, whole = program(kernel, wired), program(kernel, wired, whole=True)
+    record = program(described, wired, describes=True)
     start[model.speeds] += 0.1 * np.random.default_rng(1).normal(size=model.nv)
     for closed in (0, 1):
-        ways = []
-        for straight in (False, True):
+
+        def begun(modes: int = closed) -> dict[str, np.ndarray]:
             w, n = space.w.copy(), space.n.copy()
-            n[n[m.MODE] :], w[y : y + model.ny] = closed, start
+            n[n[m.MODE] :], w[y : y + model.ny] = modes, start
             w[h[m.LATCHED] : h[m.LATCHED] + len(model.contacts)] = 0.1
-            if straight:
-                tapes.run(made, h, {"f": f, "w": w, "n": n}, y, dy)
-            else:
-                Trace(0).plain(kernel)(h.tolist(), f, w, n, y, dy)
-            ways.append((w[dy : dy + model.ny], w[h[m.TOUCH.place] :][: m.TOUCH.size * len(model.contacts)]))
-            assert n[m.EVALUATION] == m.OK
-            assert n[m.ABRIDGED] == straight
-        assert apart(model, ways[0][0], ways[1][0]) < ROUNDING
-        assert ways[1][1] == pytest.approx(ways[0][1], rel=ROUNDING, abs=ROUNDING * np.abs(ways[0][1]).max(initial=1.0))
+            return {"f": f, "w": w, "n": n}
+
+        by_kernels, by_tape, by_whole = begun(), begun(), begun()
+        Trace(0).plain(kernel)(h.tolist(), f, by_kernels["w"], by_kernels["n"], y, dy)
+        tapes.run(tape, h, by_tape, y, dy)
+        tapes.run(whole, h, by_whole, y, dy)
+        assert [arrays["n"][m.ABRIDGED] for arrays in (by_kernels, by_tape, by_whole)] == [0, 1, 0]
+        assert all(arrays["n"][m.EVALUATION] == m.OK for arrays in (by_kernels, by_tape, by_whole))
+        rates, touch = (
+            slice(dy, dy + model.ny),
+            slice(h[m.TOUCH.place], h[m.TOUCH.place] + m.TOUCH.size * len(model.contacts)),
+        )
+        one, other = by_kernels["w"], by_tape["w"]
+        assert apart(model, one[rates], other[rates]) < ROUNDING
+        assert other[touch] == pytest.approx(
+            one[touch], rel=ROUNDING, abs=ROUNDING * np.abs(one[touch]).max(initial=1.0)
+        )
+        assert largest_difference(h, one, by_whole["w"]) < ROUNDING
+        Trace(0).plain(described)(h.tolist(), f, by_kernels["w"], by_kernels["n"])
+        tapes.run(record, h, by_whole, y, dy)
+        assert largest_difference(h, one, by_whole["w"]) < ROUNDING
 
 
-@cache
 def engine(integrator: str = "dop853") -> Engine:
     return engine_of(load_scene(TREE / "scenes/sps4/csj.toml", {"solver.integrator": integrator}), {}, silent)
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "exponential"])  # that reads more of some evaluations than the rates
-def test_compiled_code_runs_as_the_kernels_do(integrator: str) -> None:
-    """A stroke with impacts, as exactly as its own tolerance tells, with equal events."""
-    one = engine(integrator)
-    kernels = integrate(one, consistent_start(one), silent)
-    specialise(one)
-    assert one.h[m.RATES] != one.h[m.EVALUATE]
-    straight = integrate(one, consistent_start(one), silent)
+def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stroke with impacts, as exactly as its own tolerance tells, with equal events; so for what is too long."""
+    alone = engine(integrator)
+    with monkeypatch.context() as patch:
+        patch.setattr(straight_code, "suited", lambda model: False)
+        general = engine(integrator)
+    assert (alone.has_straight_code, general.has_straight_code) == (True, False)
+    straight, kernels = (integrate(one, consistent_start(one), silent) for one in (alone, general))
+    assert alone.h[m.RATES] != alone.h[m.EVALUATE]
     assert straight.events["kind"].tolist() == kernels.events["kind"].tolist()
     # before the first impact, whose instants differ by rounding; each of those that follow magnifies it
     first = float(kernels.events["time"][0]) - 1e-9
-    before = [run.state[run.time <= first][:, : one.model.nq] for run in (kernels, straight)]
+    before = [run.state[run.time <= first][:, : alone.model.nq] for run in (kernels, straight)]
     assert np.abs(before[0] - before[1]).max() < 1e-9
     for k in (0, len(kernels.rows) // 2):
-        y = kernels.state[k]
-        one.select_pieces_after(kernels.time[k])
-        generic = closure_rows.evaluate(one, y, kernels.time[k])
-        one.h[m.EVALUATE], before_it = one.h[m.RATES], one.h[m.EVALUATE]
-        found = closure_rows.evaluate(one, y, kernels.time[k])
-        one.h[m.EVALUATE] = before_it
-        assert apart(one.model, generic, found) < ROUNDING
+        rates = []
+        for one, address in ((general, m.EVALUATE), (alone, m.EVALUATE), (alone, m.RATES)):
+            one.select_pieces_after(kernels.time[k])
+            one.h[m.EVALUATE], before_it = one.h[address], one.h[m.EVALUATE]
+            rates.append(closure_rows.evaluate(one, kernels.state[k], kernels.time[k]))
+            one.h[m.EVALUATE] = before_it
+        assert all(apart(alone.model, rates[0], other) < ROUNDING for other in rates[1:])
+    seen = [observed(one, kernels) for one in (general, alone)]
+    for name in ("link_wrenches", "closure_wrenches", "drive_force", "energy"):
+        a, b = (getattr(one, name) for one in seen)
+        fields = a.dtype.names or [...]
+        assert all(np.abs(a[k] - b[k]).max() <= 1e-6 * np.abs(a[k]).max() for k in fields), name
 
 
-def test_other_closure_rows_are_solved_for_by_the_kernels() -> None:
+def test_what_is_too_long_is_evaluated_by_the_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tracing, "LONGEST", 10)
+    monkeypatch.setattr(straight_code, "_known", {})
+    scene = edited(load_scene(TREE / "scenes/checks/pendulum.toml"), {"time.end": 0.01})
+    with monkeypatch.context() as patch, TemporaryDirectory() as folder:
+        patch.setenv("FLEXCLEAR_KERNELS", folder)
+        patch.setattr(compiler_process, "requested", lambda: False)  # it would compile what this process refuses
+        patch.setattr(files, "loaded", {})
+        patch.setattr(functions, "loaded", files.loaded)
+        one = engine_of(scene, {}, silent)
+        assert not one.has_straight_code
+        assert integrate(one, consistent_start(one), silent).time[-1] == 0.01
+
+
+def test_other_closure_rows_are_solved_for_with_what_leaves_all() -> None:
     one = engine()
-    specialise(one)
+    settle(one, silent)
     straight, kept = int(one.h[m.RATES]), one.selected.copy()
+    assert straight != one.h[m.EVALUATE]
     fewer = kept.copy()
     fewer[-1] = False
     one.keep(fewer)
@@ -147,7 +203,7 @@ def test_other_closure_rows_are_solved_for_by_the_kernels() -> None:
 
 def source(scene: Scene) -> str:
     model = tabulate(build(scene, {}))
-    return sources.specialised(model.parts, wiring(model.arrays, model.arrays.h))
+    return sources.straight(model.parts, wiring(model.arrays, model.arrays.h))
 
 
 @pytest.mark.parametrize(

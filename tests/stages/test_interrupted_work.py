@@ -18,13 +18,11 @@ from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError, StoppedError
-from flexclear.pipeline.core.system.progress import Progress, silent
+from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow import cores, journal, schedule, stopping
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.dynamics.run import pieces, progress_rate, trajectory
-from flexclear.pipeline.dynamics.run.evaluation import specialised
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.post import derive
 from flexclear.pipeline.post.overview import comparison
@@ -131,22 +129,12 @@ def test_a_killed_run_goes_on_to_the_same_bits_whatever_it_has(
 
 
 @pytest.mark.usefixtures("often")
-@pytest.mark.parametrize("straight_from", [specialised.MANY, 500], ids=["kernels", "straight code"])
 def test_a_run_that_is_killed_before_and_after_it_was_handed_over_goes_on_to_the_same_bits(
-    straight_from: int, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A rolling ball: dop853 hands over to radau at 1000 evaluations, in a contact; its twin does so, too."""
     monkeypatch.setattr(progress_rate, "TRIAL", 1000)
     monkeypatch.setattr(progress_rate, "HOPELESS", 1100)
-    monkeypatch.setattr(specialised, "MANY", straight_from)
-    made: list[bool] = []
-    proper = specialised._make
-
-    def noted(engine: Engine, progress: Progress) -> None:
-        proper(engine, progress)
-        made.append(bool(engine.straight.addresses) and all(engine.straight.addresses.values()))
-
-    monkeypatch.setattr(specialised, "_make", noted)
     scene = check(root, "socket_rolling", **{"time.end": 3e-3})
     whole = dynamics.simulate(scene, {}, silent)
     assert (whole.attrs["method"], bool(whole.attrs["switched"])) == ("radau", True)
@@ -154,8 +142,6 @@ def test_a_run_that_is_killed_before_and_after_it_was_handed_over_goes_on_to_the
     found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, 9)
     assert kills >= 4
     assert found.identical(whole)
-    assert bool(made) is (straight_from == 500)
-    assert all(made) or config.DISABLE_JIT
 
 
 #: five closure rows of six, and others of them from 1.2 s on: code is made for both choices
@@ -166,7 +152,6 @@ CHANGING = {"time.end": 1.4, "solver.rtol": 1e-8}
 def test_a_killed_run_goes_on_with_the_straight_code_that_it_had(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(specialised, "MANY", 100)
     scene = check(root, "bricard", **CHANGING)
     whole = dynamics.simulate(scene, {}, silent)
     found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, 3)
@@ -178,7 +163,6 @@ def test_a_killed_run_goes_on_with_the_straight_code_that_it_had(
 def test_what_an_engine_has_met_before_changes_no_bit(root: Path) -> None:
     """Sections and sweeps run again and again on one engine, and an earlier attempt may have done the first of them."""
     engine = engine_with(check(root, "bricard", **CHANGING))
-    engine.straight.requested = True
     start = consistent_start(engine)
     once, again = (trajectory.integrate(engine, start, silent) for _ in range(2))
     assert len(engine.straight.rows) == 2 or config.DISABLE_JIT

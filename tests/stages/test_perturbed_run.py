@@ -21,7 +21,6 @@ from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow import cores, journal, stopping
 from flexclear.pipeline.dynamics.run import progress_rate, trajectory
-from flexclear.pipeline.dynamics.run.evaluation import specialised
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon import horizon
@@ -110,12 +109,10 @@ def test_a_twin_that_has_parted_is_followed_no_further(root: Path, monkeypatch: 
 
 
 @pytest.mark.usefixtures("two")
-@pytest.mark.parametrize("straight_from", [specialised.MANY, 500], ids=["kernels", "straight code"])
 def test_a_run_and_its_twin_that_are_both_handed_over_are_the_same_side_by_side(
-    straight_from: int, root: Path, monkeypatch: pytest.MonkeyPatch
+    root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A rolling ball: dop853 hands over to radau at 1000 evaluations, in a contact.  Only one thread tells of it."""
-    monkeypatch.setattr(specialised, "MANY", straight_from)
     monkeypatch.setattr(progress_rate, "TRIAL", 1000)
     monkeypatch.setattr(progress_rate, "HOPELESS", 1100)
     monkeypatch.setattr(trajectory, "SLICE", 100)

@@ -25,13 +25,15 @@ _TABLES = (_INTEGERS, _FLOATS, _FLOATS, _INTEGERS)
 _FLOAT, _INTEGER = types.float64, types.int64
 _TABLE = (_FLOATS, _INTEGER, _INTEGER)  #: a table of floats: its first entry, rows, columns
 #: C signatures. Of what compiled code calls: (h, f, w, n, t, y, dy), with tolerance; (h, f, w, n, y, retractment, out,
-#: total). Of what Python calls (`functions`): (h, f, w, n, rows, pieces with rows and columns, tolerance, out with its
-#: length); (h, f, w, n, t, repeat, outputs with their number, rows, events);
+#: total); (h, f, w, n, t); (h, f, w, n). Of what Python calls (`functions`): (h, f, w, n, rows, pieces with rows and
+#: columns, tolerance, out with its length); (h, f, w, n, t, repeat, outputs with their number, rows, events);
 #: (table, places, numbers)
 SIGNATURES = {
     "evaluate": types.int64(*_TABLES, types.float64, _PLACE, _PLACE),
     "project": types.int64(*_TABLES, types.float64, _PLACE, _PLACE, types.float64),
     "retract": types.int64(*_TABLES, _PLACE, _PLACE, _PLACE, _PLACE),
+    "prescribe": types.int64(*_TABLES, _FLOAT),
+    "describe": types.int64(*_TABLES),
     "observe": types.int64(*_TABLES, *_TABLE, _INTEGERS, _INTEGER, _INTEGER, _FLOAT, _FLOATS, _INTEGER),
     "advance": types.int64(*_TABLES, _FLOAT, _INTEGER, _FLOATS, _INTEGER, *_TABLE, *_TABLE),
     "lanes": types.int64(_INTEGERS, _INTEGERS, _FLOATS),
@@ -78,6 +80,18 @@ if INTERPRETED:  # for debugging: the same calls between functions of Python, wh
 def evaluate(h, f, w, n, t, y, dy):
     """The right-hand side: `equations.right_hand_side`."""
     call(h[m.EVALUATE], (h, f, w, n, float(t), y, dy))
+
+
+@kernel
+def laws(h, f, w, n, t):
+    """The laws of time: `equations.prescribed_motion`."""
+    call(h[m.PRESCRIBE], (h, f, w, n, float(t)))
+
+
+@kernel
+def describe(h, f, w, n):
+    """What is recorded of an evaluation: `equations.observation`."""
+    call(h[m.DESCRIBE], (h, f, w, n))
 
 
 @kernel

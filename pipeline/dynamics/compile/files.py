@@ -14,12 +14,14 @@ import hashlib
 import os
 from collections.abc import Callable, Collection, Iterator
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from flexclear.pipeline.core.artifacts.disk import checked, locked, publish, read_checked
 from flexclear.pipeline.dynamics.compile import machine_code
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
+from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
 
 #: told the file that has to be compiled, or waited for
 Tell = Callable[[Path], None]
@@ -123,6 +125,18 @@ def compiles(compiler: Callable[[Callable], Any]) -> Callable[[Callable], int]:
     return compiled_function
 
 
+def assembles(name: str, function: str, code: Callable[[], str], level: int) -> None:
+    """Make the function of a generated file of LLVM's text for it; there is none where that is not suited.
+
+    name: of the file.  level: as of `machine_code.assembled`.
+    """
+    try:
+        image = machine_code.stored(function, *machine_code.assembled(code(), level, optimised=False))
+    except UnsuitedError:
+        image = machine_code.NOTHING
+    loaded[name] = replace(machine_code.load(image), image=image)
+
+
 def _compile(path: Path) -> None:
     """Compile a file and leave its code on disk."""
     try:
@@ -130,7 +144,8 @@ def _compile(path: Path) -> None:
             # the source itself: Python would keep bytecode of it, and take that without looking
             exec(compile(path.read_bytes(), str(path), "exec"), {"__name__": path.stem, "__file__": str(path)})
         if not INTERPRETED:
-            publish(path.with_suffix(CODE), machine_code.image(loaded[path.stem].keeper))
+            made = loaded[path.stem]
+            publish(path.with_suffix(CODE), made.image or machine_code.image(made.keeper))
             publish(path.with_suffix(".sum"), checked(_digests(path)))
     except BaseException:  # interrupted, or no room on the disk: not to be taken for whole later
         loaded.pop(path.stem, None)

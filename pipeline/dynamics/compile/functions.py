@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from threading import Lock
+from types import MappingProxyType
 from typing import Any
 from weakref import finalize
 
@@ -30,9 +31,9 @@ from flexclear.pipeline.dynamics.compile import sources
 from flexclear.pipeline.dynamics.compile.compiler_process import second_process
 from flexclear.pipeline.dynamics.compile.files import bring, compiled, interpreted, loaded
 from flexclear.pipeline.dynamics.compile.folder import prune, writable
+from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, SPECIALISED, WHOLE
 from flexclear.pipeline.dynamics.effects import Parts, Scheme
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
-from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
 SOURCES = sources_of(TREE)
 #: what the functions are to who waits for them
@@ -42,14 +43,25 @@ WORDS = {
     "retract": "retractions",
     "observe": "recorded quantities",
     "advance": "integrator",
-    "specialised": "equations of motion of this mechanism alone",
+    "prescribe": "laws of time",
+    "describe": "recorded quantities",
+    SPECIALISED: "equations of motion of this mechanism alone",
+    WHOLE: "equations of motion of this mechanism alone",
+    DESCRIBED: "recorded quantities of this mechanism alone",
 }
-SPECIALISED = "specialised"
-#: what others call, and where the header keeps its address
-ADDRESSES = {"evaluate": m.EVALUATE, "project": m.PROJECT, "retract": m.RETRACT}
-#: in this order this process compiles, and in the opposite one the second, so that they meet in the middle; the last
-#: two have most kernels in common, which each process compiles once
-ORDER = ("advance", "project", "retract", "observe", "evaluate", SPECIALISED)
+#: what is compiled where there is no straight code
+KERNELS = ("evaluate", "describe")
+#: what others call, and where the header keeps its address; of straight code that depends on the rows solved for
+ADDRESSES = {
+    "evaluate": m.EVALUATE,
+    "describe": m.DESCRIBE,
+    "project": m.PROJECT,
+    "retract": m.RETRACT,
+    "prescribe": m.PRESCRIBE,
+}
+#: in this order this process compiles, and in the opposite one the second, so that they meet in the middle; the
+#: kernels have most kernels in common, which each process compiles once
+ORDER = ("advance", "prescribe", "project", "retract", "observe", *KERNELS, DESCRIBED, WHOLE, SPECIALISED)
 #: what is called first when a run has come to its end: without waiting where the second process is at it
 LATE = "observe"
 #: where the code of kernels is, and what they number by
@@ -88,7 +100,6 @@ class Entry:
         """Write into the header where this process has put the functions that others call."""
         for name, where in ADDRESSES.items():
             h[where] = self.addresses.get(name, 0)
-        h[m.RATES] = h[m.EVALUATE]
 
     def evaluate(self, h: np.ndarray, f: np.ndarray, w: np.ndarray, n: np.ndarray, t: float, repeat: int = 1) -> None:
         """Slope of the state in Y at time t, into the first row of SLOPES."""
@@ -179,10 +190,16 @@ class Late:
         return loaded[self._path.stem].address
 
 
-def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
-    """The compiled functions for these parts; `tell` receives what has to be compiled."""
+def entry(
+    parts: Parts, scheme: Scheme, tell: Callable[[str], None], equations: Mapping[str, str] = MappingProxyType({})
+) -> Entry:
+    """The compiled functions for these parts; `tell` receives what has to be compiled.
+
+    equations: sources by name of KERNELS, or of straight code. Where there is none, kernels are compiled instead.
+    """
     folder, began = writable(kernel_root(), tell), time.monotonic()
-    files = {name: _file(folder, name, source) for name, source in sources.sources(parts, scheme).items()}
+    texts = {**sources.sources(parts, scheme), **equations}
+    files = {name: _file(folder, name, source) for name, source in texts.items()}
     with ExitStack() as helpers:
         late = files[LATE]
 
@@ -191,22 +208,21 @@ def entry(parts: Parts, scheme: Scheme, tell: Callable[[str], None]) -> Entry:
                 _bring(folder, {LATE: late}, tell, began, more)
 
         _bring(folder, files, tell, began, helpers, {late})
+        if not all(loaded[files[name].stem].address for name in (WHOLE, DESCRIBED) if name in files):
+            kernels = {name: _file(folder, name, source) for name, source in sources.kernels(parts).items()}
+            _bring(folder, kernels, tell, began, helpers)
+            files |= kernels
         left = Late(late, bring_late, helpers.pop_all())
     return Entry({name: loaded[path.stem].address for name, path in files.items() if path != late}, left)
 
 
-def specialised(
-    parts: Parts, wiring: Wiring, tell: Callable[[str], None], lanes: int = 0, *, changes: bool = False
-) -> int:
-    """Address of the right-hand side for one wiring; UnsuitedError when there is none.
-
-    lanes, changes: see `sources.specialised`; of several lanes that of what lets as many steppers proceed
-    (`compile.lanes`).
-    """
+def straight(name: str, source: str, tell: Callable[[str], None]) -> int:
+    """Address of code for one wiring, whose name and source are of `sources`; 0 when there is none, UnsuitedError when
+    there is none of several lanes or with changes."""
     folder, began = writable(kernel_root(), tell), time.monotonic()
-    path = _file(folder, SPECIALISED, sources.specialised(parts, wiring, lanes, changes=changes))
+    path = _file(folder, name, source)
     with ExitStack() as helpers:
-        _bring(folder, {SPECIALISED: path}, tell, began, helpers)
+        _bring(folder, {name: path}, tell, began, helpers)
     return loaded[path.stem].address
 
 

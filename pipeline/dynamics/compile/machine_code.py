@@ -30,10 +30,18 @@ NEVER_REACHED = {
 
 @dataclass(frozen=True)
 class Code:
-    """A C function: where it is [address], and whatever keeps it there."""
+    """A C function: where it is [address], 0 where there is none, and whatever keeps it there.
+
+    image: of one that Numba has not compiled.
+    """
 
     address: int
     keeper: Any
+    image: bytes = b""
+
+
+#: image of a function that there is not
+NOTHING = b"{}\n"
 
 
 def image(function: Any) -> bytes:
@@ -41,22 +49,36 @@ def image(function: Any) -> bytes:
     try:  # what Numba has made, where it keeps that in the release that this was written with
         module, binary = function._library._final_module, bytes(function._library._get_compiled_object())
     except (AttributeError, TypeError, ValueError, RuntimeError):
-        module, binary = _assembled(function.inspect_llvm())
+        module, binary = assembled(function.inspect_llvm())
+    return stored(function.native_name, module, binary)
+
+
+def stored(name: str, module: Any, binary: bytes) -> bytes:
+    """The image of a function, given by its name, LLVM's module and its object file."""
     foreign = [used.name for used in (*module.functions, *module.global_variables) if used.is_declaration]
     facts = {
-        "name": function.native_name,
+        "name": name,
         "foreign": sorted(name for name in foreign if not name.startswith("llvm.")),
         "sha256": hashlib.sha256(binary).hexdigest(),
     }
     return json.dumps(facts, sort_keys=True).encode() + b"\n" + binary
 
 
-def _assembled(code: str) -> tuple[Any, bytes]:
-    """LLVM's module of a text, and its object file for this processor."""
+def assembled(code: str, level: int = 3, *, optimised: bool = True) -> tuple[Any, bytes]:
+    """LLVM's module of a text, and its object file for this processor.
+
+    level: of what is done for speed, 0 to 3.  optimised: whether the text is already.
+    """
     import llvmlite.binding as llvm
 
     module, features = llvm.parse_assembly(code), llvm.get_host_cpu_features().flatten()
-    machine = _target().create_target_machine(llvm.get_host_cpu_name(), features, opt=3, jit=True)
+    machine = _target().create_target_machine(llvm.get_host_cpu_name(), features, opt=level, jit=True)
+    if level and not optimised:
+        module.data_layout = str(machine.target_data)
+        options = llvm.create_pipeline_tuning_options(level)
+        options.loop_vectorization = options.slp_vectorization = False
+        passes = llvm.create_pass_builder(machine, options)
+        passes.getModulePassManager().run(module, passes)
     return module, bytes(machine.emit_object(module))
 
 
@@ -66,6 +88,8 @@ def load(stored: bytes) -> Code:
 
     line, _, binary = stored.partition(b"\n")
     facts = json.loads(line)
+    if not facts:
+        return Code(0, None)
     if facts["sha256"] != hashlib.sha256(binary).hexdigest():  # LLVM does not outlive what is no object file
         raise ValueError("names and code are not of one function")
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target().create_target_machine(jit=True))

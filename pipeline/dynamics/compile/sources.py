@@ -40,8 +40,11 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.specialise.wiring import Wiring
 
 DYNAMICS = "flexclear.pipeline.dynamics"
-#: what others are called by
-CALLS = (f"{DYNAMICS}.compile", "calls")
+#: what others are called by, and what takes LLVM's text
+CALLS, FILES = (f"{DYNAMICS}.compile", "calls"), (f"{DYNAMICS}.compile", "files")
+#: straight code: the right-hand side as steps call it, the same with all that it leaves, and what is recorded
+SPECIALISED, WHOLE, DESCRIBED = "specialised", "whole", "described"
+PRESCRIBED = f"{DYNAMICS}.equations.prescribed_motion"
 
 
 @dataclass
@@ -91,13 +94,18 @@ class Composition:
 
 
 def sources(parts: Parts, scheme: Scheme) -> dict[str, str]:
-    """Source by name of what it compiles, in the order of which calls which."""
-    by_name = {"evaluate": _evaluate(parts)}
+    """Source by name of what it compiles besides the right-hand side, in the order of which calls which."""
+    by_name = {"prescribe": _prescribe(parts)}
     if parts.closures:
         by_name["project"] = _project(parts)
     if integrators.INTEGRATORS[scheme.integrator].retracts:
         by_name["retract"] = _retract(parts)
     return by_name | {"observe": _observe(parts), "advance": _advance(parts, scheme)}
+
+
+def kernels(parts: Parts) -> dict[str, str]:
+    """Source by name of what a mechanism of these parts calls whose wiring has no code of its own."""
+    return {"evaluate": _evaluate(parts), "describe": _text(*_description(parts), DESCRIBE, _formulas(parts))}
 
 
 def modules(scene: Scene) -> tuple[str, ...]:
@@ -116,8 +124,8 @@ def modules(scene: Scene) -> tuple[str, ...]:
 @cache
 def _composed(parts: Parts, scheme: Scheme) -> frozenset[str]:
     """Modules that the generated files of some parts import; many scenes share them, and each command asks of each."""
-    texts = [*sources(parts, scheme).values(), specialised(parts, ()), specialised(parts, (), lanes=2)]
-    texts.append(specialised(parts, (), changes=True))
+    texts = [*sources(parts, scheme).values(), *kernels(parts).values(), straight(parts, ())]
+    texts += [abreast(parts, (), lanes=2), along(parts, ())]
     return frozenset().union(*map(_reached, texts))
 
 
@@ -133,50 +141,76 @@ def imported(source: str) -> set[str]:
     return {name for module, part in lines for name in (module, f"{module}.{part}")}
 
 
-def specialised(parts: Parts, wiring: Wiring, lanes: int = 0, *, changes: bool = False) -> str:
-    """Source of the right-hand side for one wiring.
+def straight(parts: Parts, wiring: Wiring, name: str = SPECIALISED, *, exact: bool = False) -> str:
+    """Source of straight code for one wiring.
 
-    lanes: 0 for runs; of members of ensembles how many are evaluated at once, with equal bits whatever their number.
-    changes: with its tangent, of one state.
+    name: of the right-hand side as steps call it, of the same with all that it leaves, or of what is recorded.
+    exact: with the bits that it gives to each of several lanes.
     """
-    file = _rates(parts)
-    maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_rates")
-    file.take(f"{DYNAMICS}.equations.prescribed_motion", "make_laws")
-    function = LANES if lanes > 1 else SPECIALISED
-    for name in (["exactly"] if lanes else []) + ["abreast" if lanes > 1 else "along" if changes else "straight"]:
-        file.take(f"{DYNAMICS}.specialise.straight", name)
-    if lanes > 1:
-        file.take(f"{DYNAMICS}.compile.lanes", "make_lanes")
-    harmonics = _harmonics(file)
-    laws = f"exactly(make_laws({harmonics}))" if lanes else f"make_laws({harmonics})"
-    what = f"right-hand side of {', '.join(parts.joints)}, for one wiring"
-    law_changes = ""
-    if changes:
-        function = CHANGES
-        file.take(f"{DYNAMICS}.equations.prescribed_motion", "make_law_changes")
-        file.take(f"{DYNAMICS}.fields", "data")
-        change = file.take(f"{DYNAMICS}.drives.oscillation", "change_oscillation") if parts.harmonics else ""
-        law_changes = f"make_law_changes({change})"
-    wired = "".join(f"    {row},\n" for row in wiring)
-    values = {"laws": laws, "wiring": wired, "lanes": lanes, "exact": bool(lanes), "law_changes": law_changes}
-    return _text(file, what, "rates", maker, function.format(**values), _formulas(parts))
+    file, what, kernel, maker = _description(parts) if name == DESCRIBED else _equations(parts)
+    for taken in ("straight", "NAME"):
+        file.take(f"{DYNAMICS}.specialise.straight", taken)
+    options = {SPECIALISED: f"exact={exact}", WHOLE: "whole=True", DESCRIBED: "describes=True"}[name]
+    function = STRAIGHT.format(
+        wiring=_rows(wiring), kernel=kernel, options=options, level=3 if name == SPECIALISED else 0
+    )
+    return _text(file, f"{what}, for one wiring", kernel, maker, function, _formulas(parts), using=FILES)
+
+
+def abreast(parts: Parts, wiring: Wiring, lanes: int) -> str:
+    """Source of what lets so many steppers of one wiring proceed (`compile.lanes`)."""
+    file, what, kernel, maker = _equations(parts)
+    file.take(f"{DYNAMICS}.specialise", "abreast")
+    file.take(f"{DYNAMICS}.compile.lanes", "make_lanes")
+    function = LANES.format(wiring=_rows(wiring), lanes=lanes)
+    return _text(file, f"{what}, for one wiring", kernel, maker, function, _formulas(parts))
+
+
+def along(parts: Parts, wiring: Wiring) -> str:
+    """Source of the right-hand side for one wiring with its tangent."""
+    file, what, kernel, maker = _equations(parts)
+    file.take(f"{DYNAMICS}.specialise", "abreast")
+    file.take(f"{DYNAMICS}.fields", "data")
+    change = file.take(f"{DYNAMICS}.drives.oscillation", "change_oscillation") if parts.harmonics else ""
+    law_changes = f"{file.take(PRESCRIBED, 'make_law_changes')}({change})"
+    function = CHANGES.format(wiring=_rows(wiring), law_changes=law_changes)
+    return _text(file, f"{what}, for one wiring", kernel, maker, function, _formulas(parts))
+
+
+def _rows(wiring: Wiring) -> str:
+    return "".join(f"    {row},\n" for row in wiring)
 
 
 def rates(parts: Parts) -> str:
     """Source of the kernel `rates` alone, which Python runs (`specialise.dual`), without friction of ideal joints."""
+    return _text(*_equations(parts), "", _formulas(parts))
+
+
+def _equations(parts: Parts) -> tuple[Composition, str, str, str]:
+    """A file for the right-hand side, with what it is, the name of its kernel, and what makes that."""
     file = _rates(parts)
     maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_rates")
-    return _text(file, "right-hand side for Python", "rates", maker, "", _formulas(parts))
+    return file, f"right-hand side of {', '.join(parts.joints)}", "rates", maker
 
 
 def _evaluate(parts: Parts) -> str:
     file = _rates(parts)
-    if parts.harmonics:
-        file.given["harmonics"] = _harmonics(file)
+    file.given["laws"] = f"{file.take(PRESCRIBED, 'make_laws')}({_harmonics(file)})"
     file.add_effects("evaluate")
     maker = file.take(f"{DYNAMICS}.equations.right_hand_side", "make_right_hand_side")
     what = f"right-hand side of {', '.join(parts.joints)}"
     return _text(file, what, "right_hand_side", maker, EVALUATE, _formulas(parts))
+
+
+def _prescribe(parts: Parts) -> str:
+    file = Composition(parts)
+    if parts.harmonics:
+        file.given["harmonics"] = _harmonics(file)
+    return _text(file, "laws of time", "laws", file.take(PRESCRIBED, "make_laws"), PRESCRIBE)
+
+
+def _harmonics(file: Composition) -> str:
+    return file.take(f"{DYNAMICS}.drives.oscillation", "oscillate") if file.parts.harmonics else ""
 
 
 def _project(parts: Parts) -> str:
@@ -197,17 +231,22 @@ def _retract(parts: Parts) -> str:
     return _text(file, f"retraction of {', '.join(parts.joints)}", "retraction", maker, RETRACT)
 
 
-def _observe(parts: Parts) -> str:
+def _description(parts: Parts) -> tuple[Composition, str, str, str]:
+    """A file for what is recorded of an evaluation, with what it is, the name of its kernel, and what makes that."""
     file = _forces(parts)
-    file.given |= {"evaluate": "calls.evaluate", "project": _projection(file)}
-    if parts.harmonics:
-        file.given["harmonics"] = _harmonics(file)
     file.add_effects("observe")
     if parts.closures:
         file.add_effects("observe closures")
+    maker = file.take(f"{DYNAMICS}.equations.observation", "make_description")
+    return file, f"what is recorded of {', '.join(parts.joints)}", "description", maker
+
+
+def _observe(parts: Parts) -> str:
+    file = Composition(parts)
+    file.given = {"evaluate": "calls.evaluate", "laws": "calls.laws", "describe": "calls.describe"}
+    file.given["project"] = _projection(file)
     maker = file.take(f"{DYNAMICS}.equations.observation", "make_observation")
-    what = f"what is recorded of {', '.join(parts.joints)}"
-    return _text(file, what, "observation", maker, OBSERVE, _formulas(parts))
+    return _text(file, "record", "observation", maker, OBSERVE)
 
 
 def _advance(parts: Parts, scheme: Scheme) -> str:
@@ -298,10 +337,6 @@ def _formulas(parts: Parts) -> str:
     return "\n\n".join(formulas.source(f"formula{n}", kind[1]) for n, kind in written if len(kind) > 1)
 
 
-def _harmonics(file: Composition) -> str:
-    return file.take(f"{DYNAMICS}.drives.oscillation", "oscillate") if file.parts.harmonics else ""
-
-
 def _close(file: Composition) -> None:
     """Add the kernels of the closures: of joints, unless an effect brings more."""
     file.add_effects("closures")
@@ -313,8 +348,16 @@ def _projection(file: Composition) -> str:
     return "calls.project" if file.parts.closures else file.take(f"{DYNAMICS}.equations.projection", "no_projection")
 
 
-def _text(file: Composition, what: str, result: str, maker: str, function: str, kernels: str = "") -> str:
-    lines = sorted({f"from {module} import {name}" for module, name in [*([CALLS] if function else []), *file.imports]})
+def _text(
+    file: Composition,
+    what: str,
+    result: str,
+    maker: str,
+    function: str,
+    kernels: str = "",
+    using: tuple[str, str] = CALLS,
+) -> str:
+    lines = sorted({f"from {module} import {name}" for module, name in [*([using] if function else []), *file.imports]})
     arguments = [f"    {key}={value}," for key, value in file.given.items()]
     return "\n".join(
         [f'"""Generated: {what}."""', *lines, "", kernels, f"{result} = {maker}(", *arguments, ")", "", "", function]
@@ -326,26 +369,24 @@ def evaluate(h, f, w, n, t, y, dy):
     right_hand_side(h, f, w, n, t, y, dy)
     return 0
 """
-# laws of time are looked up as ever: their pieces change with time, and their number with the scene's numbers
-SPECIALISED = """WIRING = (
-{wiring})
-laws, along = {laws}, straight(rates, WIRING, exact={exact})
-
-
-@calls.exported("evaluate")
-def specialised(h, f, w, n, t, y, dy):
+PRESCRIBE = """@calls.exported("prescribe")
+def prescribe(h, f, w, n, t):
     laws(h, f, w, n, t)
-    along(h, f, w, n, y, dy)
     return 0
+"""
+# laws of time are looked up as ever: their pieces change with time, and their number with the scene's numbers
+STRAIGHT = """WIRING = (
+{wiring})
+files.assembles(__name__, NAME, lambda: straight({kernel}, WIRING, {options}), {level})
 """
 CHANGES = """WIRING = (
 {wiring})
-laws, law_changes, differentiated = {laws}, {law_changes}, along(rates, WIRING)
+law_changes, differentiated = {law_changes}, abreast.along(rates, WIRING)
 
 
 @calls.exported("evaluate")
 def specialised(h, f, w, n, t, y, dy):
-    laws(h, f, w, n, t)
+    calls.laws(h, f, w, n, t)
     d = data(h, f, w, n)
     size = d.nq + d.nv + d.n_ledger
     for k in range(1, d.n_changes + 1):
@@ -355,7 +396,7 @@ def specialised(h, f, w, n, t, y, dy):
 """
 LANES = """WIRING = (
 {wiring})
-run = make_lanes({laws}, *abreast(rates, WIRING, {lanes}), {lanes})
+run = make_lanes(*abreast.abreast(rates, WIRING, {lanes}), {lanes})
 
 
 @calls.exported("lanes")
@@ -370,6 +411,11 @@ def project(h, f, w, n, t, y, dy, tolerance):
 RETRACT = """@calls.exported("retract")
 def retract(h, f, w, n, y, displacement, out, total):
     retraction(h, f, w, n, y, displacement, out, total)
+    return 0
+"""
+DESCRIBE = """@calls.exported("describe")
+def describe(h, f, w, n):
+    description(h, f, w, n)
     return 0
 """
 OBSERVE = """@calls.exported("observe")

@@ -13,16 +13,13 @@ from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
 from flexclear.pipeline.dynamics.equations.named_bodies import OF_BODIES, SIZE, put_bodies, put_frames
-from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
+from flexclear.pipeline.dynamics.equations.prescribed_motion import prescribe
 from flexclear.pipeline.dynamics.equations.projection import BLIND, keep_scales, largest, open_by
 from flexclear.pipeline.dynamics.equations.right_hand_side import make_forces, spread_state
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import ZERO, add, add_wrench, dot, put, scale
+from flexclear.pipeline.dynamics.vectors import ZERO, add, add_wrench, dot, scale
 
-#: of an independent mechanism: kinetic energy, potential energy of gravity, that stored in bodies, springs and contacts
-#: [J]
-ENERGY = m.layout("kinetic potential elastic")
 BEARING = m.NAMED["bearing"]
 #: variables of a run's dataset with their dimensions, and coordinates
 Series = tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]
@@ -85,10 +82,8 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
     """
     drives = size(m.N_DRIVES)
     return {
-        "closure_wrenches": (m.WRENCH, size(m.N_CLOSURES)),
         **{f"body_{name}": (numbers, size(m.N_BODIES)) for name, numbers in OF_BODIES.items()},
         "frame_position": (3, size(m.N_FRAMES)),
-        "energy": (ENERGY, size(m.N_COMPONENTS)),
         "residual": (None, 1),
         "status": (None, 1),
         **_frames(size),
@@ -102,6 +97,8 @@ def _columns(size: Callable[[int], int]) -> dict[str, tuple[Any, int]]:
         "loads": (m.LOAD, size(m.N_LOADS)),
         "bearings": (BEARING, size(m.SIZES["n_bearings"])),
         "drive_force": (None, drives),
+        "closure_wrenches": (m.CLOSURE_WRENCH, size(m.N_CLOSURES)),
+        "energy": (m.ENERGY, size(m.N_COMPONENTS)),
         "jacobian": (None, size(m.JACOBIAN_SIZE)),
     }
 
@@ -165,16 +162,9 @@ def no_energy(d, component):
 
 
 @kernel
-def no_friction(d, out, column):
-    """No joint rubs."""
-
-
-@kernel
 def columns_before_state(d):
     """Columns of what is worked out, and of the frames of links and sites."""
-    worked_out = m.WRENCH.size * d.n_closures + SIZE * d.n_bodies + 3 * d.n_frames + 2
-    worked_out += ENERGY.size * d.n_components
-    return worked_out + m.FRAME.size * (d.n_links + d.n_sites)
+    return SIZE * d.n_bodies + 3 * d.n_frames + 2 + m.FRAME.size * (d.n_links + d.n_sites)
 
 
 @kernel
@@ -223,66 +213,58 @@ def foresee(d, rows, r, state, closed, states):
     return most > 0.0
 
 
-def make_observation(
-    evaluate: Callable,
-    project: Callable,
+def make_description(
     joints: tuple[Any, ...],
     flexible: Any = None,
     contacts: Callable | None = None,
     loads: Callable | None = None,
     stops: Callable | None = None,
-    harmonics: Callable | None = None,
     couplings: Callable | None = None,
     friction: Callable | None = None,
 ) -> Callable:
-    """The kernel observe(h, f, w, n, rows, pieces, tolerance, out), which writes on the blocks of `room`.
+    """The kernel describe(h, f, w, n): motion, wrenches and energies of what has been evaluated.
 
-    With a tolerance of AS_RECORDED nothing is evaluated and only frames are written, of links and of sites.
-
-    evaluate, project: as the stepper calls them; couplings: takes them off their links (`effects.gears`); friction: of
-    ideal joints, in closures (`effects.joint_friction`); the other arguments are those of `make_right_hand_side`.
+    couplings: takes them off their links (`effects.gears`); friction: of ideal joints, in closures
+    (`effects.joint_friction`); the other arguments are those of `make_rates`.
     """
-    kinematics, laws = make_kinematics(joints, flexible), make_laws(harmonics)
+    kinematics = make_kinematics(joints, flexible)
     forces = make_forces(flexible, contacts, loads, stops)
     modal_inertia = nothing if flexible is None else flexible.modal_inertia
     couple = nothing if couplings is None else couplings
-    rub = no_friction if friction is None else friction
+    rub = nothing if friction is None else friction
     flexible_energy = no_energy if flexible is None else flexible.energies
 
     @kernel
-    def closure_wrenches(d, out, o):
-        """Wrench of every closure on its second body, from out[o] on; taken off the links that it acts on."""
+    def closure_wrenches(d):
+        """Wrench of every closure on its second body; taken off the links that it acts on."""
         for c in range(d.n_closures):
             closure, moment, force = d.closures[c], ZERO, ZERO
             for k in range(closure.n_kept):
                 row, size = d.rows[closure.row0 + k], d.multiplier[closure.kept0 + k]
                 moment, force = add(moment, scale(size, row.moment)), add(force, scale(size, row.force))
-            put(out, o + 6 * c, moment)
-            put(out, o + 6 * c + 3, force)
+            wrench = d.closure_wrench[c]
+            wrench.moment, wrench.force = moment, force
             on_a, on_b = d.wrench[d.sites[closure.site_a].link], d.wrench[d.sites[closure.site_b].link]
             add_wrench(on_b, scale(-1.0, moment), scale(-1.0, force))
             add_wrench(on_a, moment, force)
         couple(d)
-        rub(d, out, o)
+        rub(d)
 
     @kernel
-    def joint_wrenches(d, out, o):
-        """Wrench on every link through its inboard joint, at the accelerations of its frames (Newton-Euler).
-
-        Wrenches of closures are stored from out[o] on.
-        """
+    def joint_wrenches(d):
+        """Wrench on every link through its inboard joint, at the accelerations of its frames (Newton-Euler)."""
         forces(d)
         modal_inertia(d)
-        closure_wrenches(d, out, o)
+        closure_wrenches(d)
         for i in range(d.n_links - 1, 0, -1):
             add_wrench(d.wrench[d.links[i].parent], d.wrench[i].moment, d.wrench[i].force)
 
     @kernel
-    def energies(d, out, o):
-        """Kinetic energy, potential of gravity, energy stored in bodies and contacts, from out[o] on."""
+    def energies(d):
+        """Kinetic energy, potential of gravity, energy stored in bodies and contacts."""
         for component in range(d.n_components):
             kinetic, elastic = flexible_energy(d, component)
-            potential, row = 0.0, o + ENERGY.size * component
+            potential = 0.0
             for i in range(1, d.n_links):
                 if d.links[i].component != component:
                     continue
@@ -295,7 +277,26 @@ def make_observation(
             for k in range(d.n_loads):
                 if component_of(d, d.loads[k].a, d.loads[k].b) == component:
                     elastic += d.load[k].stored
-            out[row], out[row + 1], out[row + 2] = kinetic, potential, elastic
+            energy = d.energy[component]
+            energy.kinetic, energy.potential, energy.elastic = kinetic, potential, elastic
+
+    @kernel
+    def describe(h, f, w, n):
+        d = data(h, f, w, n)
+        kinematics(d)  # at the accelerations in DU
+        joint_wrenches(d)
+        energies(d)
+
+    return describe
+
+
+def make_observation(evaluate: Callable, project: Callable, laws: Callable, describe: Callable) -> Callable:
+    """The kernel observe(h, f, w, n, rows, pieces, tolerance, out), which writes on the blocks of `room`.
+
+    With a tolerance of AS_RECORDED nothing is evaluated and only frames are written, of links and of sites.
+
+    evaluate, project, laws: as the stepper calls them.  describe: of `make_description`.
+    """
 
     @kernel
     def place(d, t):
@@ -324,6 +325,8 @@ def make_observation(
             (d.at_load, m.LOAD.size * d.n_loads),
             (d.at_bearing, BEARING.size * d.n_bearings),
             (d.at_drive_force, known),
+            (d.at_closure_wrench, m.CLOSURE_WRENCH.size * d.n_closures),
+            (d.at_energy, m.ENERGY.size * d.n_components),
             (d.at_jacobian, d.jacobian_size),
         )
         for s in range(2 if frames else len(stretches)):  # one loop: several would each be compiled
@@ -336,16 +339,12 @@ def make_observation(
     @kernel
     def store(d, out, every, r):
         """Store what is worked out of a row that has been evaluated; the number of columns that it takes."""
-        status, residual = d.evaluation, largest(d.residual, d.n_closure_rows)
-        column = m.WRENCH.size * d.n_closures
-        joint_wrenches(d, out, column * r)
-        put_bodies(d, out, every * column, every, r)
-        column += SIZE * d.n_bodies
+        put_bodies(d, out, 0, every, r)
+        column = SIZE * d.n_bodies
         put_frames(d, out, every * column + 3 * d.n_frames * r)
         column += 3 * d.n_frames
-        energies(d, out, every * column + ENERGY.size * d.n_components * r)
-        column += ENERGY.size * d.n_components
-        out[every * column + r], out[every * (column + 1) + r] = residual, status
+        out[every * column + r] = largest(d.residual, d.n_closure_rows)
+        out[every * (column + 1) + r] = d.evaluation
         return column + 2
 
     @kernel
@@ -391,7 +390,7 @@ def make_observation(
                     close(d, rows[r, 0], tolerance)
                     break
                 uneven, foreseen = first, False  # as where a step ends
-            kinematics(d)  # at the accelerations in DU
+            describe(h, f, w, n)
             if tolerance == AS_RECORDED:
                 copy(d, out, every, r, 0, True)
             else:

@@ -13,7 +13,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.bodies import rigid
 from flexclear.pipeline.dynamics.choice import nothing
 from flexclear.pipeline.dynamics.equations.kinematics import make_kinematics
-from flexclear.pipeline.dynamics.equations.prescribed_motion import make_laws, prescribe
+from flexclear.pipeline.dynamics.equations.prescribed_motion import prescribe
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import ZERO
@@ -64,12 +64,12 @@ def make_forces(
     return forces
 
 
-def make_right_hand_side(harmonics: Callable | None = None, **parts: Any) -> Callable:
+def make_right_hand_side(laws: Callable, **parts: Any) -> Callable:
     """The kernel evaluate(h, f, w, n, t, y, dy), from the parts that a mechanism has.
 
-    harmonics: adds those of the laws of time.  parts: see `make_rates`.
+    laws: of time (`equations.prescribed_motion`).  parts: see `make_rates`.
     """
-    laws, rates = make_laws(harmonics), make_rates(**parts)
+    rates = make_rates(**parts)
 
     @kernel
     def evaluate(h, f, w, n, t, y, dy):

@@ -153,6 +153,8 @@ def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: 
         m.GAIN: nv,
         m.ROWS: closure_rows + int(h[m.SIZES["n_couplings"]]),
         m.TOUCH: contacts,
+        m.CLOSURE_WRENCH: int(h[m.N_CLOSURES]),
+        m.ENERGY: int(h[m.N_COMPONENTS]),
         m.LAW: int(h[m.N_LAWS]),
         m.LOAD: int(h[m.N_LOADS]),
         m.LOAD_BENDS: int(h[m.N_LOAD_BENDS]),

@@ -105,7 +105,7 @@ class Runner:
             return self._over_events(scene, alive)
         engine, other = self._engines(scene)
         # exact, since how many points are run side by side depends on the machine and on how long they take
-        engine.straight.requested = engine.straight.exact = True
+        engine.straight.exact = True
         engine.straight.place = place
         if in_sections(self.recorded):
             values, count = _sections(scene, engine, self.recorded, alive)

@@ -63,7 +63,6 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     engine, _ = engines(edited(scene, {"output.interval": period}), bundles, progress)
     names = kept_bodies(engine.model, requested.bodies, "[sections.bodies]")
     start = consistent_start(engine)
-    engine.straight.requested = True
     parts = stretches(engine, period, requested.phase)
     require_periodic(parts, start)
     count = requested.transient + requested.periods

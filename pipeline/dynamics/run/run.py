@@ -209,7 +209,7 @@ def follow(
             progress(None, f"{stiff}; going on with {heir}")
             reasons.append(str(stiff))
             straight, engine, left = engine.straight, other(heir), stiff.handover
-            engine.straight.requested, engine.straight.exact = straight.requested, straight.exact
+            engine.straight.exact = straight.exact
 
 
 def require_shallow(model: Model, trajectory: Trajectory, seen: Observed) -> None:

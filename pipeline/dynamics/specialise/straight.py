@@ -1,47 +1,57 @@
 """The right-hand side of one wiring as straight code: no tables, no loops, no work space but registers and the stack.
 
-Of what an evaluation leaves in w there is only what the steps read (`KEPT`): the state's rates, what contacts do, how
-far loops are open and how independent their rows are. n[ABRIDGED] says so to who needs more (`equations.projection`).
+There are two of one wiring. The steps call what leaves in w only what they read (`KEPT`): the state's rates, what
+contacts do, how far loops are open and how independent their rows are; n[ABRIDGED] says so to who needs more. That one
+is optimised. The other leaves all that an evaluation does: it is called some hundreds of times in a run, and LLVM
+assembles it as it is, in a tenth of the time.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
-from types import CellType, FunctionType
 from typing import Any
 
 from llvmlite import ir
-from numba import njit, types
-from numba.extending import intrinsic
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.kernels import Kernel
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
-from flexclear.pipeline.dynamics.specialise.derivative import tangent
-from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, UnsuitedError
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, same
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
-#: operations beyond which straight code is no faster than loops: it no longer fits the processor's first caches
-LONGEST = 80_000
+#: operations beyond which straight code takes longer to make than kernels do, and is hardly faster: it no longer fits
+#: the processor's first caches
+LONGEST = 50_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
-_INTEGER = ir.IntType(64)
+#: integers of n that are left
+REPORTS = {m.EVALUATION, m.ABRIDGED}
+_INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
+#: of the function
+NAME = "straight"
 
 
-def program(rates: Callable, wiring: wired.Wiring) -> Program:
-    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is too long for that."""
+def program(kernel: Callable, wiring: wired.Wiring, *, whole: bool = False, describes: bool = False) -> Program:
+    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is too long for that.
+
+    whole: whether it leaves all in w, or only what steps read.  describes: the kernel is describe(h, f, w, n), of what
+    has been evaluated; all is left.
+    """
     h, trace = wired.header(wiring), Trace(LONGEST)
     w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
-    w.values.update(wired.ground(h))
-    try:
-        trace.plain(rates)(h, f, w, n, wired.start(wired.STATE), wired.start(wired.RATES))
-    except ZeroDivisionError:
-        raise UnsuitedError("rows are solved for of which the wiring says that they depend on each other") from None
-    is_stored = _kept(h)
-    stores = [("w", index, value) for index, value in w.values.items() if is_stored(*wired.split(index))]
+    ground = wired.ground(h)
+    w.values.update(ground)
+    trace.plain(kernel)(h, f, w, n, *(() if describes else (wired.start(wired.STATE), wired.start(wired.RATES))))
+    if describes or whole:
+        changed = {index: v for index, v in w.values.items() if index not in ground or not same(v, ground[index])}
+        return Program(trace.tape.block, [*_stores("w", changed), *_stores("n", n.values, REPORTS.__contains__)])
+    kept = _kept(h)
+    stores = _stores("w", w.values, lambda index: kept(*wired.split(index)))
     return Program(trace.tape.block, [*stores, ("n", m.EVALUATION, n.values[m.EVALUATION]), ("n", m.ABRIDGED, 1)])
+
+
+def _stores(array: str, values: dict[int, Any], kept: Callable[[int], bool] = lambda _: True) -> list[Any]:
+    return [(array, index, value) for index, value in values.items() if kept(index)]
 
 
 def _kept(h: list[int]) -> Callable[[int, int], bool]:
@@ -57,124 +67,47 @@ def _kept(h: list[int]) -> Callable[[int, int], bool]:
     return kept
 
 
-def straight(rates: Callable, wiring: wired.Wiring, *, exact: bool = False) -> Any:
-    """The function straight(h, f, w, n, y, dy) of compiled code that does what `rates` does for a wiring.
+def straight(
+    kernel: Callable, wiring: wired.Wiring, *, whole: bool = False, exact: bool = False, describes: bool = False
+) -> str:
+    """LLVM's text of a C function that does what a kernel does for a wiring.
 
-    exact: it gives what each lane of `abreast` gives, to the last bit; sums in any order are faster by a sixth.
+    It is evaluate(h, f, w, n, t, y, dy), which finds the laws at time t first, or where it describes describe(h, f, w,
+    n).  whole, describes: see `program`.  exact: it gives what each lane of `abreast` gives, to the last bit; sums in
+    any order are faster by a sixth.
     """
-
-    @intrinsic
-    def run(typingctx: Any, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any) -> Any:
-        def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            tape = program(rates, wiring)
-            Emitter(builder, tape, _places(builder, tape, [values]), exact=exact).emit()
-            return context.get_dummy_value()
-
-        return types.void(h, f, w, n, y, dy), generate
-
-    return run
-
-
-def along(rates: Callable, wiring: wired.Wiring) -> Any:
-    """Return along(h, f, w, n, y, dy, f0, w0, change, rates_change) of compiled code: `straight`, with its tangent.
-
-    f0, w0: indices where changes of the numbers, and of laws, impact rates and contacts, begin in f and w.
-    change, rates_change: places in w of changes of the state and of its rates.
-    """
-
-    @intrinsic
-    def run(
-        typingctx: Any, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any, f0: Any, w0: Any, change: Any, rates: Any
-    ) -> Any:
-        def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            tape = tangent(program(kernel, wiring), LONGEST)
-            Emitter(builder, tape, _places(builder, tape, [values])).emit()
-            return context.get_dummy_value()
-
-        return types.void(h, f, w, n, y, dy, f0, w0, change, rates), generate
-
-    kernel = rates
-    return run
+    tape, module = program(kernel, wiring, whole=whole, describes=describes), ir.Module("straight")
+    tables = [_INTEGER.as_pointer(), _FLOAT.as_pointer(), _FLOAT.as_pointer(), _INTEGER.as_pointer()]
+    more = [] if describes else [_FLOAT, _INTEGER, _INTEGER]
+    function = ir.Function(module, ir.FunctionType(_INTEGER, [*tables, *more]), NAME)
+    arrays, given = function.args[:4], function.args[5:]
+    for array in arrays:
+        array.add_attribute("noalias")
+    builder = ir.IRBuilder(function.append_basic_block())
+    if not describes:
+        address = builder.load(builder.gep(arrays[0], [_INTEGER(m.PRESCRIBE)]))
+        laws = ir.FunctionType(_INTEGER, [*tables, _FLOAT]).as_pointer()
+        builder.call(builder.inttoptr(address, laws), function.args[:5])
+    Emitter(builder, tape, places(builder, tape, [[*arrays, *given]]), exact=exact).emit()
+    builder.ret(_INTEGER(0))
+    return str(module)
 
 
-def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any]:
-    """Functions of compiled code: note(h, f, numbers, lane) and abreast(places, numbers).
-
-    The second does the same for several states, each of a mechanism with numbers of its own, which the first has put
-    where they are adjacent: numbers has room for all of f in all lanes.
-    places: addresses of all h, then of all f, w and n, then all addresses of y and dy, shape (6 lanes,).
-    """
-    made = cache(lambda: program(rates, wiring))  # both functions are typed and written, and the tape is long
-
-    @intrinsic
-    def note(typingctx: Any, h: Any, f: Any, numbers: Any, lane: Any) -> Any:
-        def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            h, f, numbers, lane = values
-            begins = dict[int, Any]()
-            for k, index in enumerate(_numbers(made())):
-                stretch, inside = wired.split(index)
-                if stretch not in begins:
-                    begins[stretch] = builder.gep(f, [builder.load(builder.gep(h, [_INTEGER(stretch)]))])
-                value = builder.load(builder.gep(begins[stretch], [_INTEGER(inside)]))
-                builder.store(value, builder.gep(numbers, [builder.add(lane, _INTEGER(k * lanes))]))
-            return context.get_dummy_value()
-
-        return types.void(h, f, numbers, lane), generate
-
-    @intrinsic
-    def run(typingctx: Any, places: Any, numbers: Any) -> Any:
-        def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            tape, (places, numbers) = made(), values
-            given = [_arguments(builder, places, lane, lanes) for lane in range(lanes)]
-            side_by_side = builder.bitcast(numbers, ir.VectorType(ir.DoubleType(), lanes).as_pointer())
-            row = {index: k for k, index in enumerate(_numbers(tape))}
-
-            def number(index: int) -> Any:
-                loaded = builder.load(builder.gep(side_by_side, [_INTEGER(row[index])]))
-                loaded.align = 8
-                return loaded
-
-            Emitter(builder, tape, _places(builder, tape, given), lanes, exact=True, number=number).emit()
-            return context.get_dummy_value()
-
-        return types.void(places, numbers), generate
-
-    return note, run
-
-
-def _numbers(tape: Program) -> list[int]:
-    """Places in f of all that a program loads from there."""
-    return sorted({index for array, index in loads(tape) if array == "f" and isinstance(index, int)})
-
-
-def exactly(kernel: Any) -> Any:
-    """A kernel, and those in its closure, with every operation rounded as it is: equal bits wherever it is used."""
-    function = kernel.py_func
-    cells = [cell.cell_contents for cell in function.__closure__ or ()]
-    exact = tuple(CellType(exactly(cell) if isinstance(cell, Kernel) else cell) for cell in cells)
-    scope, name = function.__globals__, function.__name__
-    return njit(error_model="numpy", _nrt=False)(FunctionType(function.__code__, scope, name, None, exact))
-
-
-def _arguments(builder: ir.IRBuilder, places: Any, lane: int, lanes: int) -> list[Any]:
-    """h, f, w, n, y and dy of a lane."""
-    words = [builder.load(builder.gep(places, [_INTEGER(k * lanes + lane)])) for k in range(6)]
-    kinds = [_INTEGER, ir.DoubleType(), ir.DoubleType(), _INTEGER]
-    return [builder.inttoptr(word, kind.as_pointer()) for word, kind in zip(words, kinds, strict=False)] + words[4:]
-
-
-def _places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
+def places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
     """Where the code finds an element of an array in a lane: in a stretch whose begin it has looked up first.
 
-    given: h, f, w, n, y and dy of each lane; of a tangent also where its changes are, see `along`.
+    given: h, f, w, n, y and dy of each lane; of a tangent also where its changes are, see `abreast.along`; of what only
+    describes no more than the arrays.
     """
     begins, arrays = dict[Any, Any](), list[dict[str, Any]]()
     places = [(array, index) for array, index, _ in tape.stores] + loads(tape)
     stretches = sorted({(array, wired.split(index)[0]) for array, index in places if isinstance(index, int)})
-    for lane, (h, f, w, n, y, dy, *changes) in enumerate(given):
-        builder.store(y, builder.gep(n, [_INTEGER(m.STATE)]))
+    for lane, (h, f, w, n, *states) in enumerate(given):
         arrays.append({"h": h, "f": f, "w": w, "n": n})
-        reported = {wired.STATE: y, wired.RATES: dy, -1: _INTEGER(0)}
+        reported, changes = {-1: _INTEGER(0)}, states[2:]
+        if states:
+            builder.store(states[0], builder.gep(n, [_INTEGER(m.STATE)]))
+            reported |= {wired.STATE: states[0], wired.RATES: states[1]}
         if changes:
             arrays[lane] |= {"df": builder.gep(f, [changes[0]]), "dw": builder.gep(w, [changes[1]])}
             reported |= {wired.STATE_CHANGE: changes[2], wired.RATES_CHANGE: changes[3]}

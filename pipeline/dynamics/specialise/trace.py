@@ -17,6 +17,14 @@ from flexclear.pipeline.dynamics.specialise.plain import Plain
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, Branch, Symbol, Tape, Undecided
 
 
+class Number(float):
+    """A number of the wiring by which kernels divide as they do when they are compiled."""
+
+    def __rtruediv__(self, other: float) -> float:
+        with np.errstate(all="ignore"):
+            return float(np.divide(other, self))
+
+
 class Memory:
     """An array that is read and written by index; what was not written is loaded when the code runs."""
 
@@ -123,7 +131,8 @@ class Trace:
         def apply(*arguments: Any) -> Any:
             if any(isinstance(a, Symbol) for a in arguments):
                 return self.tape.write(FLOAT, name, *arguments)
-            return float(getattr(np, name)(*arguments))
+            with np.errstate(all="ignore"):
+                return Number(getattr(np, name)(*arguments))
 
         return apply
 

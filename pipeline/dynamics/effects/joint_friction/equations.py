@@ -39,7 +39,6 @@ from flexclear.pipeline.dynamics.joints.bearings import BALL, PIN, SLIDER
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
     ZERO,
-    accumulate,
     add,
     add_wrench,
     at,
@@ -394,15 +393,14 @@ def load_drives(d):
 
 
 @kernel
-def take_off_closures(d, out, column):
-    """Add friction of joints that close loops to the wrenches of these in out[column:]; take it off their links."""
+def take_off_closures(d):
+    """Add friction of joints that close loops to the wrenches of these; take it off their links."""
     for e in range(d.n_bearings):
         joint, bearing = d.rubbing[d.bearings[e].joint], d.bearing[e]
         if joint.closure < 0:
             continue
         a, b = d.wrench[d.sites[joint.site_a].link], d.wrench[d.sites[joint.site_b].link]
         moment, force = scale(bearing.load, bearing.unit_moment), scale(bearing.load, bearing.unit_force)
-        accumulate(out, column + 6 * joint.closure, moment)
-        accumulate(out, column + 6 * joint.closure + 3, force)
+        add_wrench(d.closure_wrench[joint.closure], moment, force)
         add_wrench(b, scale(-1.0, moment), scale(-1.0, force))
         add_wrench(a, moment, force)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,7 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import functions
+from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, WHOLE
 from flexclear.pipeline.dynamics.effects import INTEGRATORS, scheme_of
 from flexclear.pipeline.dynamics.integrate.method import Method
 from flexclear.pipeline.dynamics.model import selection
@@ -23,32 +24,10 @@ from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import refuse_missed
-from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import LaneGroup, Place
+from flexclear.pipeline.dynamics.run.evaluation.straight_code import Straight, address, equations
 
 #: two breaks nearer than this fraction of the run are the same instant, written or summed up in two ways
 SHORTEST_SEGMENT = 1e-12
-
-
-@dataclass
-class Straight:
-    """Code for one wiring (`run.evaluation.specialised`), shared by the engines of one work space.
-
-    requested: whether all integrations shall use it.  used: whether the present one does.
-    exact: whether it is to give the same bits for one state as for several at once.
-    place: where it may step together with others; by default each engine takes its own steps.
-    group: who takes the steps there, for the closure rows that it is for.
-    addresses: where it is, by the closure rows that it solves for; 0: nowhere.
-    rows: those for which the present integration uses it.  They are its own, since what other integrations of this
-    engine have met must not change a bit of this one.
-    """
-
-    requested: bool = False
-    used: bool = False
-    exact: bool = False
-    place: Place | None = None
-    group: LaneGroup | None = None
-    addresses: dict[bytes, int] = field(default_factory=dict)
-    rows: list[bytes] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -73,6 +52,11 @@ class Engine:
     end: float
     rtol: float
     straight: Straight
+
+    @property
+    def has_straight_code(self) -> bool:
+        """Whether it evaluates with code for its wiring alone."""
+        return "evaluate" not in self.entry.addresses
 
     @cached_property
     def breaks(self) -> np.ndarray:
@@ -131,11 +115,20 @@ class Engine:
         self.connect()
 
     def connect(self) -> None:
-        """Let the steps evaluate with straight code where there is some for the rows solved for."""
+        """Let evaluations be those for the rows solved for, and steps evaluate by code of their own where there is
+        some."""
         rows, known = self.selected.tobytes(), self.straight
-        compiled = known.addresses.get(rows) if known.used and rows in known.rows else None
-        self.h[m.RATES] = compiled or self.h[m.EVALUATE]
-        self.n[m.TOGETHER] = bool(compiled and known.group and known.group.rows == rows)
+        alone = rows in known.rows
+        if self.has_straight_code:
+            self.h[m.EVALUATE] = address(self.model, self.h, known, rows, WHOLE)
+        self.h[m.RATES] = address(self.model, self.h, known, rows) if alone else self.h[m.EVALUATE]
+        self.n[m.TOGETHER] = bool(alone and known.group and known.group.rows == rows)
+
+    def observe(self, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
+        """Evaluate what is recorded of every row, in this thread."""
+        if self.has_straight_code:
+            self.h[m.DESCRIBE] = address(self.model, self.h, self.straight, self.selected.tobytes(), DESCRIBED)
+        self.entry.observe(self.h, self.model.arrays.f, self.w, self.n, rows, pieces, tolerance, out)
 
     def advance(self, outputs: np.ndarray, rows: np.ndarray, events: np.ndarray) -> None:
         """Step to the end of the segment or of the budget, in this thread or by the group."""
@@ -208,7 +201,8 @@ def prepare(model: Model, progress: Progress) -> Engine:
     if mobility.singular_start and not may_start_singular(model):
         raise SolverError(mobility.start_refusal)
     _check_branch(model, mobility)
-    entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text))
+    alone = equations(model, mobility)
+    entry = functions.entry(model.parts, scheme_of(solver), lambda text: progress(None, text), alone)
     return assemble(model, entry, lookup(INTEGRATORS, solver.integrator, where="[solver.integrator]"), mobility)
 
 
@@ -219,13 +213,14 @@ def assemble(model: Model, entry: functions.Entry, method: Method, mobility: Mob
     selected, time = np.ones(model.arrays.size(m.N_CLOSURE_ROWS), dtype=bool), model.scene.time
     engine = Engine(model, entry, method, *space, selected, mobility, time.start, time.end, solver.rtol, Straight())
     engine.control[m.LENGTH] = model.length
+    engine.connect()
     return engine
 
 
 def another(engine: Engine) -> Engine:
     """An engine of the same model with a work space of its own, as it is before anything has been run on it."""
     made = assemble(engine.model, engine.entry, engine.method, engine.mobility)
-    made.straight.requested, made.straight.exact = engine.straight.requested, engine.straight.exact
+    made.straight.exact = engine.straight.exact
     made.straight.addresses = engine.straight.addresses.copy()
     return made
 

@@ -45,14 +45,6 @@ def observe_with(engine: Engine, rows: np.ndarray, pieces: np.ndarray, fraction:
 
 
 def _observe(engine: Engine, rows: np.ndarray, pieces: np.ndarray, tolerance: float, out: np.ndarray) -> None:
-    arrays = engine.model.arrays
-    engine.entry.observe(
-        engine.h,
-        arrays.f,
-        engine.w,
-        engine.n,
-        np.ascontiguousarray(rows),
-        np.ascontiguousarray(pieces).reshape(len(rows), arrays.size(m.N_LAWS)),
-        tolerance,
-        out,
-    )
+    laws = engine.model.arrays.size(m.N_LAWS)
+    pieces = np.ascontiguousarray(pieces).reshape(len(rows), laws)
+    engine.observe(np.ascontiguousarray(rows), pieces, tolerance, out)

@@ -28,7 +28,7 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, assemble
-from flexclear.pipeline.dynamics.run.evaluation.specialised import suited
+from flexclear.pipeline.dynamics.run.evaluation.straight_code import suited
 from flexclear.pipeline.dynamics.run.pieces import Tape
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 from flexclear.pipeline.dynamics.specialise.tape import UnsuitedError
@@ -100,8 +100,10 @@ def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> En
     Raises SolverError for a mechanism that is not differentiated.
     """
     model, count = engine.model, len(directions)
-    if not suited(engine):
+    if not suited(model):
         raise SolverError("friction of ideal joints is solved for by iteration, which is not differentiated")
+    if not engine.has_straight_code:
+        raise SolverError("the equations of this mechanism are not differentiated: the computation is too long")
     if any(isinstance(load, SampledPid) for load in model.scene.load.values()):
         raise SolverError("a controller that samples is not differentiated: use a continuous 'pid'")
     if engine.method.traits.implicit:
@@ -115,7 +117,6 @@ def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> En
     room = len(made.w)
     made.h[[m.N_CHANGES, m.F_CHANGE, m.W_CHANGE]] = count, len(wide.f) // (1 + count), room
     made = replace(made, w=np.concatenate([made.w, np.zeros(count * room)]))
-    made.straight.requested = True
     return made
 
 

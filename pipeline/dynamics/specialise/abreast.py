@@ -1,0 +1,108 @@
+"""The right-hand side of one wiring for several states at once, or for one with its tangent, as parts of kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from types import CellType, FunctionType
+from typing import Any
+
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+from flexclear.pipeline.dynamics.kernels import Kernel
+from flexclear.pipeline.dynamics.specialise import wiring as wired
+from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
+from flexclear.pipeline.dynamics.specialise.derivative import tangent
+from flexclear.pipeline.dynamics.specialise.straight import LONGEST, places, program
+
+_INTEGER = ir.IntType(64)
+
+
+def along(rates: Callable, wiring: wired.Wiring) -> Any:
+    """Return along(h, f, w, n, y, dy, f0, w0, change, rates_change) of compiled code: `straight`, with its tangent.
+
+    f0, w0: indices where changes of the numbers, and of laws, impact rates and contacts, begin in f and w.
+    change, rates_change: places in w of changes of the state and of its rates.
+    """
+
+    @intrinsic
+    def run(
+        typingctx: Any, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any, f0: Any, w0: Any, change: Any, rates: Any
+    ) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+            tape = tangent(program(kernel, wiring), LONGEST)
+            Emitter(builder, tape, places(builder, tape, [values])).emit()
+            return context.get_dummy_value()
+
+        return types.void(h, f, w, n, y, dy, f0, w0, change, rates), generate
+
+    kernel = rates
+    return run
+
+
+def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any]:
+    """Functions of compiled code: note(h, f, numbers, lane) and abreast(addresses, numbers).
+
+    The second does the same for several states, each of a mechanism with numbers of its own, which the first has put
+    where they are adjacent: numbers has room for all of f in all lanes.
+    addresses: of all h, then of all f, w and n, then all addresses of y and dy, shape (6 lanes,).
+    """
+    made = cache(lambda: program(rates, wiring))  # both functions are typed and written, and the tape is long
+
+    @intrinsic
+    def note(typingctx: Any, h: Any, f: Any, numbers: Any, lane: Any) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+            h, f, numbers, lane = values
+            begins = dict[int, Any]()
+            for k, index in enumerate(_numbers(made())):
+                stretch, inside = wired.split(index)
+                if stretch not in begins:
+                    begins[stretch] = builder.gep(f, [builder.load(builder.gep(h, [_INTEGER(stretch)]))])
+                value = builder.load(builder.gep(begins[stretch], [_INTEGER(inside)]))
+                builder.store(value, builder.gep(numbers, [builder.add(lane, _INTEGER(k * lanes))]))
+            return context.get_dummy_value()
+
+        return types.void(h, f, numbers, lane), generate
+
+    @intrinsic
+    def run(typingctx: Any, addresses: Any, numbers: Any) -> Any:
+        def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
+            tape, (addresses, numbers) = made(), values
+            given = [_arguments(builder, addresses, lane, lanes) for lane in range(lanes)]
+            side_by_side = builder.bitcast(numbers, ir.VectorType(ir.DoubleType(), lanes).as_pointer())
+            row = {index: k for k, index in enumerate(_numbers(tape))}
+
+            def number(index: int) -> Any:
+                loaded = builder.load(builder.gep(side_by_side, [_INTEGER(row[index])]))
+                loaded.align = 8
+                return loaded
+
+            Emitter(builder, tape, places(builder, tape, given), lanes, exact=True, number=number).emit()
+            return context.get_dummy_value()
+
+        return types.void(addresses, numbers), generate
+
+    return note, run
+
+
+def _numbers(tape: Program) -> list[int]:
+    """Places in f of all that a program loads from there."""
+    return sorted({index for array, index in loads(tape) if array == "f" and isinstance(index, int)})
+
+
+def exactly(kernel: Any) -> Any:
+    """A kernel, and those in its closure, with every operation rounded as it is: equal bits wherever it is used."""
+    function = kernel.py_func
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    exact = tuple(CellType(exactly(cell) if isinstance(cell, Kernel) else cell) for cell in cells)
+    scope, name = function.__globals__, function.__name__
+    return njit(error_model="numpy", _nrt=False)(FunctionType(function.__code__, scope, name, None, exact))
+
+
+def _arguments(builder: ir.IRBuilder, addresses: Any, lane: int, lanes: int) -> list[Any]:
+    """h, f, w, n, y and dy of a lane."""
+    words = [builder.load(builder.gep(addresses, [_INTEGER(k * lanes + lane)])) for k in range(6)]
+    kinds = [_INTEGER, ir.DoubleType(), ir.DoubleType(), _INTEGER]
+    return [builder.inttoptr(word, kind.as_pointer()) for word, kind in zip(words, kinds, strict=False)] + words[4:]
