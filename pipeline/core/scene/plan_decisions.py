@@ -19,6 +19,9 @@ EVIDENCE = {
 #: why an effect stays for which no run was made
 NOT_WORTH = "to leave it out would save no time worth the look"
 
+#: why an effect stays that could be left out
+NO_CHEAPER = "without it the run is not cheaper"
+
 
 @dataclass(frozen=True)
 class Decision:
@@ -50,7 +53,7 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Plan:
-    """All decisions. requested: by quantity [SI].  integrator, rtol: of the planned run.
+    """All decisions. requested: by quantity [SI].  integrator, rtol: of the planned run; no integrator: as the scene.
 
     modes: elastic coordinates of flexible bodies that stay that need fewer than they have.
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that

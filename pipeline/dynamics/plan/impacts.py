@@ -16,7 +16,7 @@ from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
-from flexclear.pipeline.dynamics.plan.screening_runs import MEMBERS
+from flexclear.pipeline.dynamics.plan.screening_runs import LEAST_PART, MEMBERS, OF_TIGHT, TAKES_LONG, shorter
 from flexclear.pipeline.dynamics.run.ledger import CHOSEN
 
 #: where members part, fewer modes are only trusted that were seen over this part of the time
@@ -24,6 +24,8 @@ LEAST_SEEN = 0.5
 #: what is tried: next to impacts steps are short whatever the order, so the method of order 5, at a tolerance that is
 #: looser than that of the pilots where these are tight
 QUICK, QUICK_RTOL = "dopri5", 1e-4
+#: what they are compared with: the pilots' method at so much tighter a tolerance, at most the default one
+TIGHTER, TIGHTEST = 1e-2, 1e-10
 #: of the largest energy error of a run, what one over a part of the time may have, as a fraction of that part
 OF_LEDGER = 0.25
 #: energy error that the planned run may have then: what it does to the requested quantities has been tested
@@ -33,7 +35,7 @@ WORTH = 0.85
 #: differences beyond so many budgets are not of the tolerance
 NEAR = 10.0
 #: evaluations times variables of all pilots beyond which nothing more is tried
-MOST_WORK = 2e7
+MOST_WORK = 6e7
 
 
 def bent(search: Search, soft: Sequence[Effect]) -> None:
@@ -55,28 +57,43 @@ def bent(search: Search, soft: Sequence[Effect]) -> None:
 
 
 def quickest(search: Search, usual: str) -> Chosen:
-    """The cheapest way to integrate what is left of a scene with contacts; by `usual` where no other is shown to do."""
+    """The cheapest way to integrate what is left of a scene with contacts; by `usual`, tighter, where none is shown
+    to do.
+
+    All are compared with `usual` at a tolerance that is TIGHTER than that of the pilots.
+    """
     pilots, gone = search.pilots, search.gone
-    scene = pilots.variant(gone)
-    loose, fraction = pilots.loose(scene), pilots.part(gone)
+    loose, fraction = pilots.loose(pilots.variant(gone)), pilots.part(gone)
+    tight, most = max(TIGHTER * loose, TIGHTEST), OF_TIGHT * pilots.extent.most
+    unknown = Chosen(usual, tight, dict.fromkeys(search.requested, np.nan))
+    there = pilots.point(gone, fraction=fraction, rtol=tight, evaluations=most)
+    if TAKES_LONG in there.refused and fraction > LEAST_PART:
+        fraction = shorter(fraction)
+        there = pilots.point(gone, fraction=fraction, rtol=tight, evaluations=most)
     whole = pilots.must_run(gone, fraction)
-    unknown = Chosen(usual, loose, dict.fromkeys(search.requested, np.nan))
-    if whole.refused:
+    if whole.refused or there.refused:
         return unknown
     for level in [*_levels(search, fraction), None]:
         for rtol in sorted({QUICK_RTOL, loose}, reverse=True):
             if pilots.work > MOST_WORK:
                 return unknown
-            effect_sizes = pilots.between(_tried(search, level, fraction, rtol, whole), whole)
-            most = {name: (1.0 + _more(fraction)) * i.difference for name, i in effect_sizes.items()}
-            if search.fits(most):
-                search.spend(most)
+            tried = _tried(search, level, fraction, rtol, whole)
+            errors = _errors(search, tried, there, fraction)
+            if search.fits(errors):
+                search.spend(errors)
                 if level is not None:
-                    _tell(search, level, effect_sizes)
-                return Chosen(QUICK, rtol, most, level, LEDGER)
-            if level is not None and _by_modes(search, most, effect_sizes):
+                    _tell(search, level, pilots.between(tried, there))
+                return Chosen(QUICK, rtol, errors, level, LEDGER)
+            if level is not None and _by_modes(search, errors, pilots.between(tried, there)):
                 break
-    return unknown
+    errors = _errors(search, whole, there, fraction)
+    return Chosen(usual, loose, errors) if search.fits(errors) else unknown
+
+
+def _errors(search: Search, tried: Point, there: Point, fraction: float) -> dict[str, float]:
+    """What a way to integrate errs by over the whole time, by quantity."""
+    differences = search.pilots.same_starts(tried, there, search.requested)
+    return {name: (1.0 + _more(fraction)) * difference for name, difference in differences.items()}
 
 
 def _by_modes(search: Search, most: Mapping[str, float], effect_sizes: Mapping[str, Influence]) -> bool:
