@@ -6,7 +6,7 @@ take, and count by what exceeds chance.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,12 +14,12 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
+from flexclear.pipeline.core.scene.variants import CLEARANCE, Effect, effects
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
 from flexclear.pipeline.dynamics.plan.screening_runs import LEAST_PART, MEMBERS, OF_TIGHT, TAKES_LONG, shorter
 from flexclear.pipeline.dynamics.run.ledger import CHOSEN
 
-#: where members part, fewer modes are only trusted that were seen over this part of the time
+#: rigid bodies and fewer modes are only trusted that were seen over this part of the time
 LEAST_SEEN = 0.5
 #: what is tried: next to impacts steps are short whatever the order, so the method of order 5, at a tolerance that is
 #: looser than that of the pilots where these are tight
@@ -43,12 +43,15 @@ def bent(search: Search, soft: Sequence[Effect]) -> None:
     pilots = search.pilots
     every = effects(pilots.scene)
     gone = [*search.gone, *(e for e in every if e.within in {g.name for g in search.gone})]
-    fraction = pilots.part(gone)
-    whole = pilots.must_run(gone, fraction)
-    rigid = [*soft, *(e for e in every if e.within in {s.name for s in soft})]
-    effect_sizes = pilots.between(pilots.point([*gone, *rigid], fraction=fraction), whole)
-    effect_sizes = with_doubt(search, effect_sizes, False, _more(fraction))
-    most = {name: i.most for name, i in effect_sizes.items()}
+    rigid = [*gone, *soft, *(e for e in every if e.within in {s.name for s in soft})]
+    part = pilots.part(gone)
+    for fraction in sorted({part, max(part, LEAST_SEEN)}):
+        there = pilots.must_run(gone, fraction)
+        effect_sizes = pilots.between(pilots.point(rigid, fraction=fraction), there)
+        effect_sizes = with_doubt(search, effect_sizes, False, _more(fraction))
+        most = {name: i.most for name, i in effect_sizes.items()}
+        if not search.fits(most):
+            break
     small = search.fits(most)
     if small:
         search.spend(most)
@@ -66,6 +69,12 @@ def quickest(search: Search, usual: str) -> Chosen:
     loose, fraction = pilots.loose(pilots.variant(gone)), pilots.part(gone)
     tight, most = max(TIGHTER * loose, TIGHTEST), OF_TIGHT * pilots.extent.most
     unknown = Chosen(usual, tight, dict.fromkeys(search.requested, np.nan))
+    levels = _levels(search)
+    if levels and fraction < LEAST_SEEN:
+        if pilots.point(gone, fraction=LEAST_SEEN, rtol=tight, evaluations=most).refused:
+            levels = []
+        else:
+            fraction = LEAST_SEEN
     there = pilots.point(gone, fraction=fraction, rtol=tight, evaluations=most)
     if TAKES_LONG in there.refused and fraction > LEAST_PART:
         fraction = shorter(fraction)
@@ -73,7 +82,7 @@ def quickest(search: Search, usual: str) -> Chosen:
     whole = pilots.must_run(gone, fraction)
     if whole.refused or there.refused:
         return unknown
-    for level in [*_levels(search, fraction), None]:
+    for level in [*levels, None]:
         for rtol in sorted({QUICK_RTOL, loose}, reverse=True):
             if pilots.work > MOST_WORK:
                 return unknown
@@ -109,18 +118,11 @@ def _more(fraction: float) -> float:
     return 0.0 if fraction == 1.0 else WHOLE
 
 
-def _levels(search: Search, fraction: float) -> Iterator[int]:
+def _levels(search: Search) -> list[int]:
     """Levels of fewer modes that may be tried."""
     pilots = search.pilots
     bending = pilots.variant(search.gone).flexible()
-    mine = [k for k in range(len(pilots.fewer)) if pilots.modes(k, bending) and pilots.saved(k) >= 1.0 / WORTH]
-    if mine and fraction < LEAST_SEEN:
-        every = effects(pilots.scene)
-        soft = [e for e in every if e.kind == FLEXIBILITY or e.within.startswith("body.")]
-        rigid = pilots.point(list({e.name: e for e in [*search.gone, *soft]}.values()))
-        if any(i.uncertainty > search.requested[name] for name, i in pilots.between(rigid, rigid).items()):
-            return  # members of rigid bodies diverge later, and the beginning does not show what modes do then
-    yield from mine
+    return [k for k in range(len(pilots.fewer)) if pilots.modes(k, bending) and pilots.saved(k) >= 1.0 / WORTH]
 
 
 def _tried(search: Search, level: int | None, fraction: float, rtol: float, whole: Point) -> Point:
