@@ -17,7 +17,6 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import effect_plan, limit, watched_quantities
-from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import FailedTasksError, Workplace, check, open_workplace
 
 if TYPE_CHECKING:
@@ -126,13 +125,6 @@ def dataset(scene: Scene, workplace: Workplace, level: str, budget: str | float 
     return planned.planned, answered(result, words(result), picture, table)
 
 
-def planned_scenes(requested: list[Graph], workplace: Workplace) -> list[Planned]:
-    """The plans of scenes, brought up to date and printed."""
-    plans = [bring(graph.scene, workplace) for graph in requested]
-    print(*(plan.text() for plan in plans), sep="\n")
-    return plans
-
-
 @dataclass(frozen=True)
 class Planned:
     """A plan that is up to date. scene: the full one.  planned: what the plan makes of it."""
@@ -174,10 +166,6 @@ class Planned:
         )
         base = load_scene(self.scene.path)
         return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
-
-    def missed(self) -> list[str]:
-        """Verify the plan; see `verify`."""
-        return verify(self, self.workplace)
 
     def tell(self) -> None:
         """One line on what was written where."""

@@ -59,7 +59,7 @@ class Plan:
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
     the plan has run.  runs: how many.  uncoupled: names of parts that nothing couples to the requested quantities.
     meshes: finite elements of flexible bodies whose recipes tell them.  ledger_tolerance: of the planned run, where it
-    is not the usual one.  dearer: in words, why it takes more evaluations than with the scene's own integrator.
+    is not the usual one.
     """
 
     decisions: tuple[Decision, ...]
@@ -73,7 +73,6 @@ class Plan:
     uncoupled: tuple[str, ...] = ()
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
     ledger_tolerance: float | None = None
-    dearer: str = ""
 
     @property
     def gone(self) -> tuple[Effect, ...]:

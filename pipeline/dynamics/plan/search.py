@@ -350,5 +350,4 @@ def _finished(
         uncoupled_parts,
         _meshes(search, meshes),
         chosen.ledger_tolerance,
-        chosen.dearer,
     )

@@ -4,7 +4,6 @@ accuracy, and no dearer ones than the scene names itself."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -61,8 +60,7 @@ def own_method(scene: Scene) -> tuple[str, float] | None:
 def no_dearer(search: Search, chosen: Chosen) -> Chosen:
     """What was chosen; instead the scene's own method, where that takes fewer evaluations and does as well.
 
-    Both integrate what is left of the scene, over the part of the time that pilots with contacts are run for.  Where
-    the cheaper one errs by too much, what was chosen says that it is dearer.
+    Both integrate what is left of the scene, over the part of the time that pilots with contacts are run for.
     """
     pilots, gone, own = search.pilots, search.gone, own_method(search.pilots.scene)
     if own is None or (own[0] == chosen.integrator and own[1] <= chosen.rtol):
@@ -78,16 +76,9 @@ def no_dearer(search: Search, chosen: Chosen) -> Chosen:
         return chosen
     differences = {name: i.difference for name, i in pilots.between(mine, there).items()}
     known = all(np.isfinite(error) for error in chosen.error.values())
-    if (
-        known
-        and not there.refused
-        and not (search.fits(differences) if loose else _within(differences, search.requested))
-    ):
-        return replace(
-            chosen,
-            dearer=f"With the scene's own {own[0]} at {own[1]:.0e} the planned run would take {mine.evaluations:,} "
-            f"evaluations instead of {there.evaluations:,}, and err by more than the plan allows",
-        )
+    good = search.fits(differences) if loose else _within(differences, search.requested)
+    if known and not there.refused and not good:
+        return chosen
     return Chosen(*own, differences if known else chosen.error, chosen.level)
 
 

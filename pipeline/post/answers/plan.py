@@ -65,7 +65,6 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
             "Conventions": "CF-1.11",
             "title": title,
             "planned": json.dumps(planned, sort_keys=True),
-            "dearer": plan.dearer,
             "evaluations": plan.evaluations,
             "runs": plan.runs,
         },
@@ -122,8 +121,6 @@ def table(planned: xr.Dataset) -> Table:
         notes.append(
             f"Not integrated, since nothing couples it to the requested quantities: {listed(decided['uncoupled'])}."
         )
-    if planned.attrs["dearer"]:
-        notes.append(f"{planned.attrs['dearer']}.")
     notes.append(
         f"{_integrated(decided)} The plan rests on {planned.attrs['runs']} short runs, "
         f"{planned.attrs['evaluations']:,} evaluations."
