@@ -7,14 +7,13 @@ take, and count by what exceeds chance.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.variants import CLEARANCE, Effect, effects
+from flexclear.pipeline.core.scene.variants import Effect, effects
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
 from flexclear.pipeline.dynamics.plan.screening_runs import LEAST_PART, MEMBERS, OF_TIGHT, TAKES_LONG, shorter
 from flexclear.pipeline.dynamics.run.ledger import CHOSEN
@@ -90,8 +89,6 @@ def quickest(search: Search, usual: str) -> Chosen:
             errors = _errors(search, tried, there, fraction)
             if search.fits(errors):
                 search.spend(errors)
-                if level is not None:
-                    _tell(search, level, pilots.between(tried, there))
                 return Chosen(QUICK, rtol, errors, level, LEDGER)
             if level is not None and _by_modes(search, errors, pilots.between(tried, there)):
                 break
@@ -134,20 +131,3 @@ def _tried(search: Search, level: int | None, fraction: float, rtol: float, whol
         "ledger_tolerance": OF_LEDGER * CHOSEN * fraction,
     }
     return pilots.point(search.gone, level=level, fraction=fraction, integrator=QUICK, rtol=rtol, **limits)
-
-
-def _tell(search: Search, level: int, effect_sizes: dict[str, Influence]) -> None:
-    """Say of bodies with fewer modes why the others go."""
-    beyond = [name for name, i in effect_sizes.items() if i.uncertainty > search.requested[name]]
-    loose = next((d.effect.owner for d in search.decisions.values() if d.kept and d.effect.kind == CLEARANCE), "")
-    for body, count in search.pilots.modes(level, search.pilots.bundles).items():
-        decision = search.decisions.get(f"body.{body}.modes")
-        if decision is None or not decision.kept:
-            continue
-        why = f"{count} of its modes do the same as all"
-        if beyond:
-            why = (
-                f"{' and '.join(beyond)} parts by more than requested when {loose or 'a contact'} starts a hair "
-                f"elsewhere, and with {count} of its modes it differs by no more than that"
-            )
-        search.decisions[decision.effect.name] = replace(decision, reason=f"{decision.reason}; {why}")
