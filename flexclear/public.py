@@ -304,7 +304,8 @@ def plan(
     The dataset (`pipeline.post.answers.plan.dataset`) holds the estimated influence of each effect on each quantity of
     `[accuracy]`, what was decided, and why.  accuracy: of all watched quantities, as a fraction of their sizes, for a
     scene without `[accuracy]`.  budget: time in which members of the full and the planned scene are compared [s], or
-    text such as "1min"; the dataset then has the plan's true `error`, its `chance` and the `scatter` of single runs.
+    text such as "1min"; the dataset then has the plan's true `error` where it is decided, its `chance`, what is
+    `allowed` there, the `horizon` as a fraction of the run and the `scatter` of single runs.
     In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     from flexclear.commands import plan as plan_command

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
 
 #: without a budget the answers may take so many times the run's own processor time, and at least so long [s]
-TIMES, LEAST = 3.0, 40.0
+TIMES, LEAST = 3.0, 20.0
 #: variants are run and compiled so many at a time
 AT_ONCE = 2.0
 #: of variants without a clearance or a flexible body, the kernels of so many are compiled next to the scene's own run

@@ -17,7 +17,6 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages import effect_plan, limit, watched_quantities
-from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import FailedTasksError, Workplace, check, open_workplace
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 #: how a planned scene's file is called, after its scene's
 SUFFIX = ".planned.toml"
 #: starts that `--verify` runs of scenes with contacts: more of them until the verdict is decided or the budget used [s]
-MEMBERS, BUDGET = (4, 8, 16, 32), 60.0
+MEMBERS, BUDGET = (4, 8, 16, 32, 64), 60.0
 #: accuracies that are planned for a scene without `[accuracy]`, as fractions of each watched quantity's size
 LEVELS = ("10 %", "1 %", "0.1 %")
 
@@ -118,17 +117,12 @@ def dataset(scene: Scene, workplace: Workplace, level: str, budget: str | float 
     if budget is not None:
         seconds = limit.seconds(budget, "budget") if isinstance(budget, str) else budget
         compared = errors_of(planned, workplace, seconds)
-        result = result.assign({name: compared[name] for name in ("wanted", "error", "chance", "scatter")})
+        result = result.assign(
+            {name: compared[name] for name in ("wanted", "error", "chance", "allowed", "horizon", "scatter")}
+        )
         table = as_html(verified(compared)) + table
     picture = planned.stored("plan.png").read_bytes()
     return planned.planned, answered(result, words(result), picture, table)
-
-
-def planned_scenes(requested: list[Graph], workplace: Workplace) -> list[Planned]:
-    """The plans of scenes, brought up to date and printed."""
-    plans = [bring(graph.scene, workplace) for graph in requested]
-    print(*(plan.text() for plan in plans), sep="\n")
-    return plans
 
 
 @dataclass(frozen=True)
@@ -172,10 +166,6 @@ class Planned:
         )
         base = load_scene(self.scene.path)
         return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
-
-    def missed(self) -> list[str]:
-        """Verify the plan; see `verify`."""
-        return verify(self, self.workplace)
 
     def tell(self) -> None:
         """One line on what was written where."""
@@ -235,7 +225,7 @@ def of(scene: Scene, plan: xr.Dataset) -> Scene:
             "title": f"{scene.title}, as planned",
             "accuracy": None,
             "ensemble": None,
-            "solver": solver,
+            **({"solver": solver} if "integrator" in decided else {}),  # else the scene as it is
             "view": view | {"watch": watch},
         },
     )
@@ -267,74 +257,64 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
 
     budget: time for members that decide the verdicts [s].
     """
-    from flexclear.pipeline.post.answers.plan import MISSED, verdict, verified
+    from flexclear.pipeline.post.answers.plan import agreement_of, verified
     from flexclear.pipeline.post.plotting.table import as_markdown
 
     compared = errors_of(planned, workplace, budget)
     print(as_markdown(verified(compared)))
-    requested = planned.scene.accuracy
-    columns = ("quantity", "unit", "error", "chance", "wanted")
-    over = [
-        f"{planned.scene.name}: the plan misses {name}: {error:.3g} instead of {most:.3g} {unit}"
-        for name, unit, error, chance, most in zip(*(compared[key].values for key in columns), strict=True)
-        if verdict(error, chance, most) == MISSED
+    if planned.scene.accuracy is not None and planned.scene.accuracy.allow_missed:
+        return []
+    found = [agreement_of(compared, k) for k in range(compared.sizes["quantity"])]
+    columns = zip(compared["quantity"].values, compared["unit"].values, found, strict=True)
+    return [
+        f"{planned.scene.name}: the plan misses {name}: {one.error:.3g} instead of {one.allowed:.3g} {unit}"
+        for name, unit, one in columns
+        if one.missed
     ]
-    return over if requested is None or not requested.allow_missed else []
 
 
 def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> xr.Dataset:
     """Distance of the planned run from the full one by quantity, each over members where it has contacts.
 
-    Members are added until every verdict is decided, as long as the next ones fit into the budget [s].
+    As many members as decide every verdict, as far as they fit into the budget [s].
     """
-    from flexclear.pipeline.post.answers.plan import UNDECIDED, verdict
-
-    begun, last = time.monotonic(), 0.0
-    for members in MEMBERS:
-        round_begun = time.monotonic()
-        result = _compared(planned, workplace, members)
-        last = time.monotonic() - round_begun
-        open_ = [verdict(*values) == UNDECIDED for values in _columns(result)]
-        loose = planned.scene.contacts() or planned.scene.stop
-        if not any(open_) or not loose or time.monotonic() - begun + 2.0 * last > budget:
-            break
-    return result
-
-
-def _columns(result: xr.Dataset) -> list[tuple[float, float, float]]:
-    """Error, chance and requested accuracy, by quantity."""
-    columns = (result[key].values for key in ("error", "chance", "wanted"))
-    return [(float(e), float(c), float(w)) for e, c, w in zip(*columns, strict=True)]
-
-
-def _compared(results: Planned, workplace: Workplace, members: int) -> xr.Dataset:
-    """Distance of the planned run from the full one over so many members."""
     from flexclear.pipeline.core.artifacts import effect_size
     from flexclear.pipeline.core.scene.quantity import parse
     from flexclear.pipeline.core.system.errors import SolverError
+    from flexclear.pipeline.post.answers.plan import until_decided
 
-    assert results.scene.accuracy is not None
-    names = list(results.scene.accuracy.quantities)
-    chosen = [parse(name, results.scene.owners()) for name in names]
-    full = edited(results.scene, {"accuracy": None})
-    tasks = [watched_quantities.task(scene, chosen, members) for scene in (full, results.planned)]
-    outcome = workplace.bring(tasks)
-    check(outcome)
-    one, two = (
-        watched_quantities.point(workplace.store.load(outcome.records[id(task)]), scene, chosen)
-        for task, scene in zip(tasks, (full, results.planned), strict=True)
-    )
-    for point, what in ((one, "full"), (two, "planned")):
-        if point.refused:
-            raise SolverError(f"{results.scene.name}: the {what} run is refused: {point.refused}")
-    plan = results.dataset()
-    difference = [effect_size.influence(two, one, q, members) for q in chosen]
-    result = plan[["wanted"]].copy()
-    for k, q in enumerate(chosen):
-        want = results.scene.accuracy.quantities[q.name]
-        if want.relative is not None:  # what it is relative to is known now
-            result["wanted"][k] = want.relative * effect_size.size(one, q)
-    result["error"] = (("quantity",), [i.difference for i in difference])
-    result["chance"] = (("quantity",), [i.uncertainty for i in difference])
-    result["scatter"] = (("quantity",), [effect_size.scatter(one, q) for q in chosen])
-    return result.assign_attrs(full_evaluations=one.evaluations, planned_evaluations=two.evaluations, members=members)
+    assert planned.scene.accuracy is not None
+    asked, begun = planned.scene.accuracy.quantities, time.monotonic()
+    chosen = [parse(name, planned.scene.owners()) for name in asked]
+    full = edited(planned.scene, {"accuracy": None})
+    result, first = planned.dataset()[["wanted"]].copy(), list[float]()
+
+    def compared(members: int) -> list[effect_size.Agreement]:
+        tasks = [watched_quantities.task(scene, chosen, members) for scene in (full, planned.planned)]
+        outcome = workplace.bring(tasks)
+        check(outcome)
+        one, two = (
+            watched_quantities.point(workplace.store.load(outcome.records[id(task)]), scene, chosen)
+            for task, scene in zip(tasks, (full, planned.planned), strict=True)
+        )
+        for point, what in ((one, "full"), (two, "planned")):
+            if point.refused:
+                raise SolverError(f"{planned.scene.name}: the {what} run is refused: {point.refused}")
+        for k, q in enumerate(chosen):
+            relative = asked[q.name].relative
+            if relative is not None:  # what it is relative to is known now
+                result["wanted"][k] = relative * effect_size.size(one, q)
+        result["scatter"] = (("quantity",), [effect_size.scatter(one, q) for q in chosen])
+        result.attrs |= {"full_evaluations": one.evaluations, "planned_evaluations": two.evaluations}
+        first.append(time.monotonic() - begun)
+        requested = result["wanted"].values
+        return [effect_size.agreement(two, one, q, members, float(r)) for q, r in zip(chosen, requested, strict=True)]
+
+    def affordable(members: int) -> bool:
+        return time.monotonic() - begun + first[0] * members / MEMBERS[0] <= budget
+
+    loose = planned.scene.contacts() or planned.scene.stop
+    found, members = until_decided(compared, MEMBERS if loose else MEMBERS[:1], affordable)
+    for name in ("error", "chance", "allowed", "horizon"):
+        result[name] = (("quantity",), [getattr(one, name) for one in found])
+    return result.assign_attrs(members=members)

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from flexclear.commands import as_json, export
-from flexclear.commands.plan import planned_scenes
+from flexclear.commands import as_json, export, plan
 from flexclear.commands.scenes import (
     FACTS,
     check_out,
@@ -50,8 +49,9 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--verify", "reports the true error of a plan, and no plan is requested", "add --planned")
     requested = graphs(options.scenes, options.set)
     workplace = open_workplace(options)
-    plans = planned_scenes(requested, workplace) if options.planned else []
-    requested = [Graph(plan.planned) for plan in plans] or requested
+    plans = [plan.bring(graph.scene, workplace) for graph in requested] if options.planned else []
+    print(*(f"{one.text()}\n" for one in plans), sep="", end="")
+    requested = [Graph(one.planned) for one in plans] or requested
     for graph in requested:
         check_run(graph.scene, workplace.store.root)
         taken = claim(graph.scene, workplace.store)
@@ -67,7 +67,7 @@ def command(options: argparse.Namespace) -> None:
         print(as_json.as_json({graph.scene.name: _result(graph, workplace, outcome) for graph in requested}))
     for graph in requested if options.to in ("simulate", "ensemble", "post") and not options.json else ():
         print_files(workplace.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
-    missed = [text for plan in plans if options.verify for text in plan.missed()]
+    missed = [text for one in plans if options.verify for text in plan.verify(one, workplace)]
     conclude(requested, workplace, outcome, missed)
 
 

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
     from flexclear.pipeline.post.overview.page import Part
 
+#: what a report shows of the motion, by the names of `Graph.render`
+SHOWN = ("motion mp4", "motion html", "modes html")
 #: general figures, in this order: caption, and what a reader who does not see them reads
 FIGURES = {
     "motion.png": ("Motion", "Displacement, velocity and rotation of the bodies over time"),
@@ -80,9 +82,9 @@ def make(
     if loose(scene) or scene.flexible():
         with in_file(scene.path):
             compared = compare.bring([scene], workplace, "both", answering.kernels() if answers else ())
-    drawn = graph.render.values()
+    drawn = [task for what, task in graph.render.items() if what in SHOWN]
     members = [graph.ensemble, graph.post] if graph.ensemble else []
-    outcome = workplace.bring([graph.overview, *members, *drawn])
+    outcome = workplace.bring([*drawn, graph.overview, *members])  # the film takes longest, so it begins first
     if any(failure.task not in [*drawn, *members] for failure in outcome.failures):
         check(outcome)
     for failure in outcome.failures:

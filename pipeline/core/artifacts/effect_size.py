@@ -15,7 +15,7 @@ motions.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import stdtrit
@@ -27,6 +27,8 @@ from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 
 #: a difference of means that chance alone makes less often than this counts: of hundred independent looks one in ten
 RARE = 1e-3
+#: how often chance may make one where two ways of integration are compared: to reject a good one costs evaluations only
+LIKELY = 0.05
 #: fraction of a series over which the spread of members is pooled
 POOLED = 0.05
 #: by how much members start apart: a fraction of the clearance, and the least [m]
@@ -57,9 +59,45 @@ class Influence:
         return self.difference + self.uncertainty
 
 
-def chance(members: int) -> float:
-    """Standard errors of a difference of two means over so many members each that chance reaches (Student's t)."""
-    return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * RARE))
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """How far a planned run is from the full one where it matters most, next to what is allowed there [SI].
+
+    allowed: what is requested; beyond the horizon, where two runs of the full scene whose starts cannot be told apart
+    differ by more, that difference as a root mean square.  horizon: fraction of the run up to which such runs agree
+    within what is requested; 1 where they agree throughout, 0 where a number without time differs.
+    """
+
+    error: float
+    chance: float
+    allowed: float
+    horizon: float = 1.0
+
+    @property
+    def met(self) -> bool:
+        """Whether error and chance together are within what is allowed."""
+        return self.error + self.chance <= self.allowed
+
+    @property
+    def missed(self) -> bool:
+        """Whether the error exceeds what is allowed by more than chance."""
+        return self.error - self.chance > self.allowed
+
+    def enough(self, members: int) -> float:
+        """How many members would decide, as far as the difference stays as it is; infinite where none would.
+
+        members: those of this one.
+        """
+        room = self.allowed - self.error if self.error < self.allowed else self.error - self.allowed
+        return members * (self.chance / room) ** 2 if room > 0.0 else np.inf
+
+
+def chance(members: int, rare: float = RARE) -> float:
+    """Standard errors of a difference of two means over so many members each that chance reaches (Student's t).
+
+    rare: how often it exceeds them.
+    """
+    return float(stdtrit(2.0 * max(members - 1, 1), 1.0 - 0.5 * rare))
 
 
 def with_members(scene: Scene) -> Scene:
@@ -103,19 +141,91 @@ def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence
 
 
 def _apart(a: Point, b: Point, name: str, members: int, *, turning: bool) -> Influence:
+    distance, error = _along(a, b, name, members, turning=turning)
+    doubt = chance(members) * error
+    return Influence(float(_beyond(distance, doubt).max(initial=0.0)), float(doubt.max(initial=0.0)))
+
+
+def _along(a: Point, b: Point, name: str, members: int, *, turning: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Distance of two means at each output and its standard error; infinite where a point lacks the quantity.
+
+    Points of equal values and deviations are the same members: their distance is none, without error.
+    """
     if name not in a.values or name not in b.values:
-        return Influence(np.inf)
+        return np.array([np.inf]), np.zeros(1)
     one, two = (_rows(p.values[name]) for p in (a, b))
-    spreads = [np.linalg.norm(_rows(p.deviation.get(name, np.zeros(len(one)))), axis=1) for p in (a, b)]
-    error = np.hypot(*spreads) / np.sqrt(max(members, 1))
+    deviations = [_deviations(p, name, turning=turning) for p in (a, b)]
+    if np.array_equal(one, two) and np.array_equal(deviations[0], deviations[1]):
+        return np.zeros(len(one)), np.zeros(len(one))
+    error = _pooled(np.hypot(*deviations) / np.sqrt(max(members, 1)))
     if turning:
-        one, two = (q / np.linalg.norm(q, axis=1, keepdims=True) for q in (one, two))
-        distance, error = rotation_between(one, two), 2.0 * error  # a quaternion changes by half the angle
-    else:
-        distance = np.linalg.norm(one - two, axis=1)
-    error = chance(members) * _pooled(error)
-    distances = np.sqrt(np.maximum(0.0, distance**2 - error**2))
-    return Influence(float(distances.max(initial=0.0)), float(error.max(initial=0.0)))
+        return rotation_between(*(q / np.linalg.norm(q, axis=1, keepdims=True) for q in (one, two))), error
+    return np.linalg.norm(one - two, axis=1), error
+
+
+def _beyond(distance: np.ndarray, doubt: np.ndarray) -> np.ndarray:
+    """The part of distances that exceeds chance."""
+    squares: np.ndarray = np.maximum(0.0, distance**2 - doubt**2)
+    return np.sqrt(squares)
+
+
+def same_starts(a: Point, b: Point, quantity: Quantity, members: int, requested: float) -> float:
+    """How far two ways to integrate one scene differ from the same starts, in the quantity's SI unit.
+
+    While runs of b agree within what is requested, all of the difference counts; beyond, what exceeds LIKELY chance,
+    as a fraction of what may be off there (`Agreement.allowed`).
+    """
+    if quantity.kind == "impact_times":
+        return _impact_times(a, b, quantity.name).difference
+    turning, most = quantity.kind == "orientation", 0.0
+    for name in (f"{quantity.name}.{reduction}" for reduction in _reductions(quantity)):
+        distance, error = _along(a, b, name, members, turning=turning)
+        if np.isinf(distance).any():
+            return np.inf
+        allowed = _allowed(b, name, requested, turning=turning)
+        doubt = np.where(allowed > requested, chance(members, LIKELY) * error, 0.0)
+        most = max(most, float((_beyond(distance, doubt) * requested / allowed).max(initial=0.0)))
+    return most
+
+
+def _allowed(full: Point, name: str, requested: float, *, turning: bool) -> np.ndarray:
+    """What may be off at each output: what is requested, or the difference of two runs of the scene itself."""
+    apart: np.ndarray = np.sqrt(2.0) * _pooled(_deviations(full, name, turning=turning))
+    return np.maximum(requested, apart)
+
+
+def _deviations(point: Point, name: str, *, turning: bool) -> np.ndarray:
+    """Standard deviation of one member at each output; a quaternion changes by half the angle."""
+    rows = np.linalg.norm(_rows(point.deviation.get(name, np.zeros(len(_rows(point.values[name]))))), axis=1)
+    return 2.0 * rows if turning else rows
+
+
+def agreement(planned: Point, full: Point, quantity: Quantity, members: int, requested: float) -> Agreement:
+    """How well a planned run agrees with the full one in a quantity, at the output where that is decided.
+
+    members: starts of each.  requested: accuracy [SI].
+    """
+    if quantity.kind == "impact_times":
+        return Agreement(_impact_times(planned, full, quantity.name).difference, 0.0, requested)
+    turning, found = quantity.kind == "orientation", list[Agreement]()
+    for reduction in _reductions(quantity):
+        name = f"{quantity.name}.{reduction}"
+        distance, doubt = _along(planned, full, name, members, turning=turning)
+        if np.isinf(distance).any():
+            return Agreement(np.inf, 0.0, requested)
+        doubt = chance(members) * doubt
+        error = _beyond(distance, doubt)
+        allowed = _allowed(full, name, requested, turning=turning)
+        worst = int(np.argmax((error - doubt) / allowed))
+        if error[worst] - doubt[worst] <= allowed[worst]:
+            worst = int(np.argmax((error + doubt) / allowed))
+        beyond = allowed > requested
+        horizon = float(np.argmax(beyond)) / len(beyond) if beyond.any() else 1.0
+        found.append(Agreement(float(error[worst]), float(doubt[worst]), float(allowed[worst]), horizon))
+    missed = [one for one in found if one.missed]
+    worst_of = max(missed or found, key=lambda one: (one.error + one.chance) / one.allowed)
+    same = all(one.error == one.chance == 0.0 for one in found)
+    return replace(worst_of, horizon=1.0 if same else found[0].horizon)  # that of the series, where there is one
 
 
 def scatter(point: Point, quantity: Quantity) -> float:
@@ -126,9 +236,9 @@ def scatter(point: Point, quantity: Quantity) -> float:
     if quantity.kind == "impact_times":
         return 0.0
     names = [f"{quantity.name}.{reduction}" for reduction in _reductions(quantity)]
-    spreads = [_pooled(np.linalg.norm(_rows(point.deviation[n]), axis=1)) for n in names if n in point.deviation]
-    turning = 2.0 if quantity.kind == "orientation" else 1.0
-    return turning * max((float(spread.max(initial=0.0)) for spread in spreads), default=0.0)
+    turning = quantity.kind == "orientation"
+    spreads = [_pooled(_deviations(point, n, turning=turning)) for n in names if n in point.deviation]
+    return max((float(spread.max(initial=0.0)) for spread in spreads), default=0.0)
 
 
 def _pooled(error: np.ndarray) -> np.ndarray:

@@ -19,6 +19,9 @@ EVIDENCE = {
 #: why an effect stays for which no run was made
 NOT_WORTH = "to leave it out would save no time worth the look"
 
+#: why an effect stays that could be left out
+NO_CHEAPER = "without it the run is not cheaper"
+
 
 @dataclass(frozen=True)
 class Decision:
@@ -50,13 +53,13 @@ class Mesh:
 
 @dataclass(frozen=True)
 class Plan:
-    """All decisions. requested: by quantity [SI].  integrator, rtol: of the planned run.
+    """All decisions. requested: by quantity [SI].  integrator, rtol: of the planned run; no integrator: as the scene.
 
     modes: elastic coordinates of flexible bodies that stay that need fewer than they have.
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
     the plan has run.  runs: how many.  uncoupled: names of parts that nothing couples to the requested quantities.
     meshes: finite elements of flexible bodies whose recipes tell them.  ledger_tolerance: of the planned run, where it
-    is not the usual one.  dearer: in words, why it takes more evaluations than with the scene's own integrator.
+    is not the usual one.
     """
 
     decisions: tuple[Decision, ...]
@@ -70,7 +73,6 @@ class Plan:
     uncoupled: tuple[str, ...] = ()
     meshes: Mapping[str, Mesh] = field(default_factory=dict)
     ledger_tolerance: float | None = None
-    dearer: str = ""
 
     @property
     def gone(self) -> tuple[Effect, ...]:

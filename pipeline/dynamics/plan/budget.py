@@ -28,7 +28,6 @@ class Chosen:
     """How the planned scene is integrated. level: of modes, None: all.  error: by quantity [SI], nan where unknown.
 
     ledger_tolerance: energy error beyond which the run is refused, where it is not the usual one.
-    dearer: in words, why that takes more evaluations than the scene's own integrator.
     """
 
     integrator: str
@@ -36,7 +35,6 @@ class Chosen:
     error: Mapping[str, float]
     level: int | None = None
     ledger_tolerance: float | None = None
-    dearer: str = ""
 
 
 @dataclass

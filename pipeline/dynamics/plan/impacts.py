@@ -6,24 +6,25 @@ take, and count by what exceeds chance.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
+from flexclear.pipeline.core.scene.variants import Effect, effects
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
-from flexclear.pipeline.dynamics.plan.screening_runs import MEMBERS
+from flexclear.pipeline.dynamics.plan.screening_runs import LEAST_PART, MEMBERS, OF_TIGHT, TAKES_LONG, shorter
 from flexclear.pipeline.dynamics.run.ledger import CHOSEN
 
-#: where members part, fewer modes are only trusted that were seen over this part of the time
+#: rigid bodies and fewer modes are only trusted that were seen over this part of the time
 LEAST_SEEN = 0.5
 #: what is tried: next to impacts steps are short whatever the order, so the method of order 5, at a tolerance that is
 #: looser than that of the pilots where these are tight
 QUICK, QUICK_RTOL = "dopri5", 1e-4
+#: what they are compared with: the pilots' method at so much tighter a tolerance, at most the default one
+TIGHTER, TIGHTEST = 1e-2, 1e-10
 #: of the largest energy error of a run, what one over a part of the time may have, as a fraction of that part
 OF_LEDGER = 0.25
 #: energy error that the planned run may have then: what it does to the requested quantities has been tested
@@ -33,7 +34,7 @@ WORTH = 0.85
 #: differences beyond so many budgets are not of the tolerance
 NEAR = 10.0
 #: evaluations times variables of all pilots beyond which nothing more is tried
-MOST_WORK = 2e7
+MOST_WORK = 6e7
 
 
 def bent(search: Search, soft: Sequence[Effect]) -> None:
@@ -41,12 +42,15 @@ def bent(search: Search, soft: Sequence[Effect]) -> None:
     pilots = search.pilots
     every = effects(pilots.scene)
     gone = [*search.gone, *(e for e in every if e.within in {g.name for g in search.gone})]
-    fraction = pilots.part(gone)
-    whole = pilots.must_run(gone, fraction)
-    rigid = [*soft, *(e for e in every if e.within in {s.name for s in soft})]
-    effect_sizes = pilots.between(pilots.point([*gone, *rigid], fraction=fraction), whole)
-    effect_sizes = with_doubt(search, effect_sizes, False, _more(fraction))
-    most = {name: i.most for name, i in effect_sizes.items()}
+    rigid = [*gone, *soft, *(e for e in every if e.within in {s.name for s in soft})]
+    part = pilots.part(gone)
+    for fraction in sorted({part, max(part, LEAST_SEEN)}):
+        there = pilots.must_run(gone, fraction)
+        effect_sizes = pilots.between(pilots.point(rigid, fraction=fraction), there)
+        effect_sizes = with_doubt(search, effect_sizes, False, _more(fraction))
+        most = {name: i.most for name, i in effect_sizes.items()}
+        if not search.fits(most):
+            break
     small = search.fits(most)
     if small:
         search.spend(most)
@@ -55,28 +59,47 @@ def bent(search: Search, soft: Sequence[Effect]) -> None:
 
 
 def quickest(search: Search, usual: str) -> Chosen:
-    """The cheapest way to integrate what is left of a scene with contacts; by `usual` where no other is shown to do."""
+    """The cheapest way to integrate what is left of a scene with contacts; by `usual`, tighter, where none is shown
+    to do.
+
+    All are compared with `usual` at a tolerance that is TIGHTER than that of the pilots.
+    """
     pilots, gone = search.pilots, search.gone
-    scene = pilots.variant(gone)
-    loose, fraction = pilots.loose(scene), pilots.part(gone)
+    loose, fraction = pilots.loose(pilots.variant(gone)), pilots.part(gone)
+    tight, most = max(TIGHTER * loose, TIGHTEST), OF_TIGHT * pilots.extent.most
+    unknown = Chosen(usual, tight, dict.fromkeys(search.requested, np.nan))
+    levels = _levels(search)
+    if levels and fraction < LEAST_SEEN:
+        if pilots.point(gone, fraction=LEAST_SEEN, rtol=tight, evaluations=most).refused:
+            levels = []
+        else:
+            fraction = LEAST_SEEN
+    there = pilots.point(gone, fraction=fraction, rtol=tight, evaluations=most)
+    if TAKES_LONG in there.refused and fraction > LEAST_PART:
+        fraction = shorter(fraction)
+        there = pilots.point(gone, fraction=fraction, rtol=tight, evaluations=most)
     whole = pilots.must_run(gone, fraction)
-    unknown = Chosen(usual, loose, dict.fromkeys(search.requested, np.nan))
-    if whole.refused:
+    if whole.refused or there.refused:
         return unknown
-    for level in [*_levels(search, fraction), None]:
+    for level in [*levels, None]:
         for rtol in sorted({QUICK_RTOL, loose}, reverse=True):
             if pilots.work > MOST_WORK:
                 return unknown
-            effect_sizes = pilots.between(_tried(search, level, fraction, rtol, whole), whole)
-            most = {name: (1.0 + _more(fraction)) * i.difference for name, i in effect_sizes.items()}
-            if search.fits(most):
-                search.spend(most)
-                if level is not None:
-                    _tell(search, level, effect_sizes)
-                return Chosen(QUICK, rtol, most, level, LEDGER)
-            if level is not None and _by_modes(search, most, effect_sizes):
+            tried = _tried(search, level, fraction, rtol, whole)
+            errors = _errors(search, tried, there, fraction)
+            if search.fits(errors):
+                search.spend(errors)
+                return Chosen(QUICK, rtol, errors, level, LEDGER)
+            if level is not None and _by_modes(search, errors, pilots.between(tried, there)):
                 break
-    return unknown
+    errors = _errors(search, whole, there, fraction)
+    return Chosen(usual, loose, errors) if search.fits(errors) else unknown
+
+
+def _errors(search: Search, tried: Point, there: Point, fraction: float) -> dict[str, float]:
+    """What a way to integrate errs by over the whole time, by quantity."""
+    differences = search.pilots.same_starts(tried, there, search.requested)
+    return {name: (1.0 + _more(fraction)) * difference for name, difference in differences.items()}
 
 
 def _by_modes(search: Search, most: Mapping[str, float], effect_sizes: Mapping[str, Influence]) -> bool:
@@ -92,18 +115,11 @@ def _more(fraction: float) -> float:
     return 0.0 if fraction == 1.0 else WHOLE
 
 
-def _levels(search: Search, fraction: float) -> Iterator[int]:
+def _levels(search: Search) -> list[int]:
     """Levels of fewer modes that may be tried."""
     pilots = search.pilots
     bending = pilots.variant(search.gone).flexible()
-    mine = [k for k in range(len(pilots.fewer)) if pilots.modes(k, bending) and pilots.saved(k) >= 1.0 / WORTH]
-    if mine and fraction < LEAST_SEEN:
-        every = effects(pilots.scene)
-        soft = [e for e in every if e.kind == FLEXIBILITY or e.within.startswith("body.")]
-        rigid = pilots.point(list({e.name: e for e in [*search.gone, *soft]}.values()))
-        if any(i.uncertainty > search.requested[name] for name, i in pilots.between(rigid, rigid).items()):
-            return  # members of rigid bodies diverge later, and the beginning does not show what modes do then
-    yield from mine
+    return [k for k in range(len(pilots.fewer)) if pilots.modes(k, bending) and pilots.saved(k) >= 1.0 / WORTH]
 
 
 def _tried(search: Search, level: int | None, fraction: float, rtol: float, whole: Point) -> Point:
@@ -115,20 +131,3 @@ def _tried(search: Search, level: int | None, fraction: float, rtol: float, whol
         "ledger_tolerance": OF_LEDGER * CHOSEN * fraction,
     }
     return pilots.point(search.gone, level=level, fraction=fraction, integrator=QUICK, rtol=rtol, **limits)
-
-
-def _tell(search: Search, level: int, effect_sizes: dict[str, Influence]) -> None:
-    """Say of bodies with fewer modes why the others go."""
-    beyond = [name for name, i in effect_sizes.items() if i.uncertainty > search.requested[name]]
-    loose = next((d.effect.owner for d in search.decisions.values() if d.kept and d.effect.kind == CLEARANCE), "")
-    for body, count in search.pilots.modes(level, search.pilots.bundles).items():
-        decision = search.decisions.get(f"body.{body}.modes")
-        if decision is None or not decision.kept:
-            continue
-        why = f"{count} of its modes do the same as all"
-        if beyond:
-            why = (
-                f"{' and '.join(beyond)} parts by more than requested when {loose or 'a contact'} starts a hair "
-                f"elsewhere, and with {count} of its modes it differs by no more than that"
-            )
-        search.decisions[decision.effect.name] = replace(decision, reason=f"{decision.reason}; {why}")

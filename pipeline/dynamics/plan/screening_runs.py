@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.effect_size import Influence, influence, recorded, with_members
+from flexclear.pipeline.core.artifacts.effect_size import Influence, influence, recorded, same_starts, with_members
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.quantity import Quantity
@@ -35,15 +35,22 @@ RTOL, SMOOTH_RTOL, SMOOTH = 1e-7, 1e-5, "radau"
 OF_CLEARANCE, TIGHTEST, LOOSEST = 0.05, 1e-7, 1e-5
 #: evaluations times variables that pilots of one variant with contacts may take, all members together: measured, some
 #: 0.2 s on one core.  What takes longer is run over a part of the time, at least so much of it
-ALLOWED, LEAST_PART = 5e6, 0.0625
+ALLOWED, LEAST_PART, SHORTER = 5e6, 0.0625, 0.25
 #: the beginning that is run to know how long the rest takes
 BEGINNING = 0.03125
 #: a pilot is given up at so many times that, and is then as one that was refused
 GIVEN_UP = 4.0
+#: runs at tight tolerances may take so many times more
+OF_TIGHT = 2
 #: how refusals name that limit
 TAKES_LONG = "[solver.evaluations]"
 #: what a variant is: the effects that it lacks, and its solver
 Key = tuple[frozenset[str], str]
+
+
+def shorter(fraction: float) -> float:
+    """The part of the time that is run where a part takes too long."""
+    return max(LEAST_PART, SHORTER * fraction)
 
 
 @dataclass(frozen=True)
@@ -110,11 +117,14 @@ class Pilots:
     def part(self, gone: Collection[Effect]) -> float:
         """The part of the time over which a variant is compared with others, so that it does not take too long.
 
-        Its beginning is run from one start to know.
+        Its beginning is run from one start to know, and less where the part then takes too long all the same.
         """
         begun = self.must_run(gone, BEGINNING, 0)
         fraction = BEGINNING * ALLOWED / (MEMBERS * max(begun.evaluations, 1) * self.extent.variables)
-        return LEAST_PART if begun.refused else float(np.clip(fraction, LEAST_PART, 1.0))
+        fraction = LEAST_PART if begun.refused else float(np.clip(fraction, LEAST_PART, 1.0))
+        while TAKES_LONG in self.must_run(gone, fraction).refused and fraction > LEAST_PART:
+            fraction = shorter(fraction)
+        return fraction
 
     def point(
         self,
@@ -179,3 +189,9 @@ class Pilots:
         if a.refused or b.refused:
             return {q.name: Influence(np.inf) for q in self.chosen}
         return {q.name: influence(a, b, q, MEMBERS) for q in self.chosen}
+
+    def same_starts(self, a: Point, b: Point, requested: Mapping[str, float]) -> dict[str, float]:
+        """Difference of two ways to integrate one variant, in each quantity; infinite where one was refused."""
+        if a.refused or b.refused:
+            return dict.fromkeys(requested, np.inf)
+        return {q.name: same_starts(a, b, q, MEMBERS, requested[q.name]) for q in self.chosen}

@@ -10,6 +10,7 @@ Effects that are not shown to be small stay.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +18,8 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
-from flexclear.pipeline.core.scene.plan_decisions import BOUND, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
+from flexclear.pipeline.core.scene.integrators import DEFAULT
+from flexclear.pipeline.core.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
 from flexclear.pipeline.core.scene.quantity import KINDS, OF_CLEARANCE, parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
@@ -29,7 +31,7 @@ from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.impacts import bent, quickest
 from flexclear.pipeline.dynamics.plan.requested_accuracy import requested_in
 from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, Pilots
-from flexclear.pipeline.dynamics.plan.tolerance import DEFAULT, no_dearer, smooth
+from flexclear.pipeline.dynamics.plan.tolerance import as_it_is, no_dearer, smooth
 from flexclear.pipeline.dynamics.run.run import Run, integrate
 
 if TYPE_CHECKING:
@@ -42,6 +44,8 @@ BY_BOUND = 0.9
 OF_RESPONSE = 2.0
 #: effects that cost nothing to keep are dropped below this fraction of the requested accuracy
 FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
+#: the planned run is that of the scene: its integrator and tolerance stay
+AS_IT_IS = Chosen("", 0.0, {})
 #: why parts go that the requested motion never feels
 UNCOUPLED = "nothing couples it to the requested quantities"
 
@@ -323,6 +327,10 @@ def _finished(
 ) -> Plan:
     order = {effect.name: k for k, effect in enumerate(every)}
     chosen = no_dearer(search, _chosen(search))
+    if as_it_is(search, chosen):
+        chosen = AS_IT_IS
+        for decision in [d for d in search.decisions.values() if not d.kept]:
+            search.decisions[decision.effect.name] = replace(decision, kept=True, reason=NO_CHEAPER)
     left = search.pilots.variant(search.gone).flexible()
     modes = {} if chosen.level is None else search.pilots.modes(chosen.level, left)
     for effect in every:
@@ -342,5 +350,4 @@ def _finished(
         uncoupled_parts,
         _meshes(search, meshes),
         chosen.ledger_tolerance,
-        chosen.dearer,
     )

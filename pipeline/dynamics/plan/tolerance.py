@@ -4,21 +4,32 @@ accuracy, and no dearer ones than the scene names itself."""
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from flexclear.pipeline.core.scene.integrators import DEFAULT, STIFF
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.dynamics.plan.budget import Chosen, Search
-from flexclear.pipeline.dynamics.plan.screening_runs import MEMBERS, RTOL, SMOOTH, SMOOTH_RTOL, Pilots
+from flexclear.pipeline.dynamics.plan.screening_runs import (
+    MEMBERS,
+    OF_TIGHT,
+    RTOL,
+    SMOOTH,
+    SMOOTH_RTOL,
+    TAKES_LONG,
+    Pilots,
+)
+from flexclear.pipeline.dynamics.run.progress_rate import AFFORDABLE, UNVERIFIED
 
 #: fraction of the requested accuracy that the integration may err by
 FRACTION = 0.15
 #: tolerances that are tried, loosest first, down to that of the reference
 TRIED = (1e-4, 1e-5, 1e-6)
 STIFF_TRIED = (1e-3, 1e-4)
-DEFAULT, TIGHT = "dop853", 1e-8
+TIGHT = 1e-8
+#: by so much a planned run must be cheaper than the scene as it is
+CHEAPER = 1.2
 
 
 def smooth(pilots: Pilots, gone: Sequence[Effect], requested: Mapping[str, float], level: int | None) -> Chosen:
@@ -49,8 +60,7 @@ def own_method(scene: Scene) -> tuple[str, float] | None:
 def no_dearer(search: Search, chosen: Chosen) -> Chosen:
     """What was chosen; instead the scene's own method, where that takes fewer evaluations and does as well.
 
-    Both integrate what is left of the scene, over the part of the time that pilots with contacts are run for.  Where
-    the cheaper one errs by too much, what was chosen says that it is dearer.
+    Both integrate what is left of the scene, over the part of the time that pilots with contacts are run for.
     """
     pilots, gone, own = search.pilots, search.gone, own_method(search.pilots.scene)
     if own is None or (own[0] == chosen.integrator and own[1] <= chosen.rtol):
@@ -66,17 +76,34 @@ def no_dearer(search: Search, chosen: Chosen) -> Chosen:
         return chosen
     differences = {name: i.difference for name, i in pilots.between(mine, there).items()}
     known = all(np.isfinite(error) for error in chosen.error.values())
-    if (
-        known
-        and not there.refused
-        and not (search.fits(differences) if loose else _within(differences, search.requested))
-    ):
-        return replace(
-            chosen,
-            dearer=f"With the scene's own {own[0]} at {own[1]:.0e} the planned run would take {mine.evaluations:,} "
-            f"evaluations instead of {there.evaluations:,}, and err by more than the plan allows",
-        )
+    good = search.fits(differences) if loose else _within(differences, search.requested)
+    if known and not there.refused and not good:
+        return chosen
     return Chosen(*own, differences if known else chosen.error, chosen.level)
+
+
+def as_it_is(search: Search, chosen: Chosen) -> bool:
+    """Whether a planned run with contacts is not predicted to be cheaper than the scene as it is, by CHEAPER.
+
+    Both are run over a part of the time; their costs are evaluations times variables.
+    """
+    pilots, gone, scene = search.pilots, search.gone, search.pilots.scene
+    bare = pilots.variant(gone)
+    if scene.solver.step is not None or not (bare.contacts() or bare.stop):
+        return False
+    fraction, most = pilots.part(gone), OF_TIGHT * pilots.extent.most
+    ways = {"integrator": chosen.integrator, "rtol": chosen.rtol, "evaluations": most}
+    planned = pilots.point(gone, level=chosen.level, fraction=fraction, members=0, **ways)
+    integrator, rtol = own_method(scene) or (DEFAULT, scene.solver.rtol)
+    full = pilots.point((), fraction=fraction, members=0, integrator=integrator, rtol=rtol, evaluations=most)
+    taken = most if TAKES_LONG in full.refused else full.evaluations
+    if scene.by_need() and taken > fraction * AFFORDABLE:
+        full = pilots.point((), fraction=fraction, members=0, integrator=STIFF, rtol=UNVERIFIED, evaluations=most)
+        taken = most if TAKES_LONG in full.refused else full.evaluations
+    if planned.refused or not taken:
+        return bool(planned.refused)
+    fewer = 1.0 if chosen.level is None else pilots.saved(chosen.level)
+    return CHEAPER * planned.evaluations / fewer > taken
 
 
 def _within(error: Mapping[str, float], requested: Mapping[str, float]) -> bool:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.effect_size import Agreement
 from flexclear.pipeline.core.scene.plan_decisions import EVIDENCE, NOT_WORTH, Plan
 from flexclear.pipeline.post.answers.effect_sizes import written
 from flexclear.pipeline.post.plotting.table import Table
@@ -30,8 +32,7 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
     planned = {
         "gone": [effect.name for effect in plan.gone],
         "modes": dict(plan.modes),
-        "integrator": plan.integrator,
-        "rtol": plan.rtol,
+        **({"integrator": plan.integrator, "rtol": plan.rtol} if plan.integrator else {}),
         **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
         "uncoupled": list(plan.uncoupled),
     }
@@ -64,7 +65,6 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
             "Conventions": "CF-1.11",
             "title": title,
             "planned": json.dumps(planned, sort_keys=True),
-            "dearer": plan.dearer,
             "evaluations": plan.evaluations,
             "runs": plan.runs,
         },
@@ -121,11 +121,9 @@ def table(planned: xr.Dataset) -> Table:
         notes.append(
             f"Not integrated, since nothing couples it to the requested quantities: {listed(decided['uncoupled'])}."
         )
-    if planned.attrs["dearer"]:
-        notes.append(f"{planned.attrs['dearer']}.")
     notes.append(
-        f"The planned run is integrated by {decided['integrator']} at a relative tolerance of {decided['rtol']:.0e}. "
-        f"The plan rests on {planned.attrs['runs']} short runs, {planned.attrs['evaluations']:,} evaluations."
+        f"{_integrated(decided)} The plan rests on {planned.attrs['runs']} short runs, "
+        f"{planned.attrs['evaluations']:,} evaluations."
     )
     return Table(
         "What the requested accuracy calls for",
@@ -133,6 +131,13 @@ def table(planned: xr.Dataset) -> Table:
         tuple(rows),
         tuple(notes),
     )
+
+
+def _integrated(decided: Mapping[str, Any]) -> str:
+    """How the planned run is integrated, in a sentence."""
+    if "integrator" not in decided:
+        return "No other way to run the scene is cheaper and as accurate as requested: it stays as it is."
+    return f"The planned run is integrated by {decided['integrator']} at a relative tolerance of {decided['rtol']:.0e}."
 
 
 def _of_mesh(part: xr.Dataset, units: list[str]) -> str:
@@ -173,19 +178,43 @@ def listed(names: list[str]) -> str:
     return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" and {names[-1]}"
 
 
+MET, MET_TO_HORIZON, MISSED, UNDECIDED = "met", "met to the horizon", "missed", "not decided"
+
+
+def verdict(one: Agreement) -> str:
+    """Met where error and chance together are below what is allowed, missed where they are above, else not decided."""
+    if one.met:
+        return MET if one.horizon == 1.0 else MET_TO_HORIZON
+    return MISSED if one.missed else UNDECIDED
+
+
+def until_decided(
+    compared: Callable[[int], list[Agreement]], levels: Sequence[int], affordable: Callable[[int], bool]
+) -> tuple[list[Agreement], int]:
+    """Agreements over as many members as decide all of them, and that number.
+
+    compared: makes them over so many members.  levels: numbers of members, rising.  affordable: whether so many are.
+    """
+    members = levels[0]
+    while True:
+        found = compared(members)
+        needed = max((one.enough(members) for one in found if verdict(one) == UNDECIDED), default=0.0)
+        more = [n for n in levels if n > members and affordable(n)]
+        if not needed or not more:
+            return found, members
+        members = next((n for n in more if n >= needed), more[-1])
+
+
 def verified(planned: xr.Dataset) -> Table:
     """The true distance of the planned run from the full one, next to what is requested."""
     rows = []
     for k, name in enumerate(planned["quantity"].values):
-        unit = str(planned["unit"].values[k])
-        error, chance = float(planned["error"][k]), float(planned["chance"][k])
-        requested = float(planned["wanted"][k])
-        rows.append(
-            (str(name), written(requested, 0.0, unit), written(error, chance, unit), _verdict(planned.isel(quantity=k)))
-        )
+        unit, one = str(planned["unit"].values[k]), agreement_of(planned, k)
+        requested = written(float(planned["wanted"][k]), 0.0, unit)
+        rows.append((str(name), requested, written(one.error, one.chance, unit), _verdict(planned, k)))
     notes = [
         f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
-        f"{int(planned.attrs['planned_evaluations']):,} as planned, of all members together.",
+        f"{int(planned.attrs['planned_evaluations']):,} as planned, of {planned.attrs['members']} members each.",
         *_no_gain(int(planned.attrs["full_evaluations"]), int(planned.attrs["planned_evaluations"])),
         "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
@@ -194,31 +223,26 @@ def verified(planned: xr.Dataset) -> Table:
     )
 
 
-MET, MISSED, UNDECIDED = "met", "missed", "not decided"
+def agreement_of(planned: xr.Dataset, k: int) -> Agreement:
+    """The agreement in the k-th quantity of a verified plan."""
+    return Agreement(*(float(planned[name][k]) for name in ("error", "chance", "allowed", "horizon")))
 
 
-def verdict(error: float, chance: float, requested: float) -> str:
-    """Met where error and chance together are below what is requested, missed where they are above, else not
-    decided."""
-    if error + chance <= requested:
-        return MET
-    return MISSED if error - chance > requested else UNDECIDED
-
-
-def _verdict(one: xr.Dataset) -> str:
-    """The verdict on one quantity; where it is not decided, what it would take, and how far single runs scatter."""
-    error, chance, requested, scatter = (float(one[name]) for name in ("error", "chance", "wanted", "scatter"))
-    said = verdict(error, chance, requested)
+def _verdict(planned: xr.Dataset, k: int) -> str:
+    """The verdict on one quantity; beyond the horizon how far single runs scatter; what would decide."""
+    one, unit = agreement_of(planned, k), str(planned["unit"].values[k])
+    said, reasons = verdict(one), list[str]()
     if said == MISSED:
-        return f"missed, {error / requested:.2g} times"
-    if said == MET:
-        return said
-    reasons = []
-    if scatter > requested:
-        reasons.append(f"single runs of the full scene scatter by {written(scatter, 0.0, str(one['unit'].item()))}")
-    if error < requested:
-        enough = int(np.ceil(int(one.attrs["members"]) * (chance / (requested - error)) ** 2))
-        reasons.append(f"means of {enough} members would decide" if reasons else f"{enough} members would")
+        return f"missed, {one.error / one.allowed:.2g} times"
+    if one.horizon < 1.0:
+        reasons.append(
+            f"beyond {one.horizon:.0%} of the time single runs of the full scene scatter by "
+            f"{written(float(planned['scatter'][k]), 0.0, unit)}"
+            + (", and the means differ by less" if said == MET_TO_HORIZON else "")
+        )
+    enough = one.enough(planned.attrs["members"])
+    if said == UNDECIDED and np.isfinite(enough):
+        reasons.append(f"{int(np.ceil(enough))} members would decide")
     return f"{said}: {'; '.join(reasons)}" if reasons else said
 
 
@@ -232,7 +256,7 @@ def levels(plans: Mapping[str, xr.Dataset | str]) -> Table:
         text = json.loads(result.attrs["planned"])
         needed, unseen, gone = _sorted(result)
         modes = ", ".join(f"{count} of {body}" for body, count in text["modes"].items()) or "all"
-        method = f"{text['integrator']}, rtol {text['rtol']:.0e}"
+        method = f"{text['integrator']}, rtol {text['rtol']:.0e}" if "integrator" in text else "as the scene"
         rows.append((level, *(listed(names or ["none"]) for names in (needed, unseen, gone)), modes, method))
     return Table(
         "What accuracy calls for",
