@@ -21,7 +21,7 @@ _CORE, _RUN = "flexclear.pipeline.core", "flexclear.pipeline.dynamics"
 PARTS: Mapping[str, Mapping[str, str]] = {
     f"{_CORE}.scene.load": {"load_scene": "scene"},
     f"{_CORE}.workflow.task": {"facts": "keys", "key": "keys"},
-    f"{_CORE}.artifacts.store": {"Store.find": "keys", "_store": "writing"},
+    f"{_CORE}.artifacts.store": {"Store.find": "keys", "_written": "writing"},
     f"{_RUN}.run.evaluation.engine": {"prepare": "assembling"},
     f"{_RUN}.model.model": {"tabulate": "assembling"},
     f"{_RUN}.run.trajectory": {"integrate": "integrating"},

@@ -260,6 +260,7 @@ def test_a_body_with_files_has_no_name_of_a_device(root: Path, name: str) -> Non
         ("trail .toml", "ends with a dot or a space"),
         ("COM1.v2/fine.toml", "'COM1.v2' is a device"),
         ("50%?/fine.toml", r"contains \?"),
+        ("scene*.toml", "there is no such file"),
     ],
 )
 def test_a_scene_has_a_name_that_every_system_can_have(

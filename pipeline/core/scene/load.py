@@ -180,7 +180,7 @@ def scene_name(path: Path) -> str:
         here = Path.cwd()
         parts = whole.relative_to(here).parts if whole.is_relative_to(here) else (whole.name,)
     for reason in filter(None, map(file_names.unfit, parts)):
-        if not is_file(path):  # as a pattern that no file matched
+        if "*" in str(path) and not is_file(path):  # a pattern that no file matched
             raise InputError(shown(str(path)), "there is no such file")
         raise InputError(shown(str(path)), f"{reason}: results go into a folder of that name", "rename it")
     return "/".join(parts)
