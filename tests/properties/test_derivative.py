@@ -58,11 +58,11 @@ def changes(
     df, dw = f * random.normal(size=len(f)), np.zeros(len(w))
     dw[laws], dw[impacts] = random.normal(size=laws.stop - laws.start), random.normal(size=len(model.contacts))
     direction = random.normal(size=model.ny) * np.maximum(np.abs(begin), 1e-3)
-    made = straight.program(kernel, wiring(model.arrays, h))
+    made = straight.program(kernel, wiring(model.arrays, h), longest=straight.LONGEST_DIFFERENTIATED)
 
     exact = {"f": f, "w": w.copy(), "n": n.copy(), "df": df, "dw": dw}
     exact["w"][vy : vy + model.ny] = direction
-    tapes.run(tangent(made, straight.LONGEST), h, exact, y, dy, (vy, vdy))
+    tapes.run(tangent(made, straight.LONGEST_DIFFERENTIATED), h, exact, y, dy, (vy, vdy))
     moved = {"f": f + 1j * STEP * df, "w": w + 1j * STEP * dw, "n": n.copy()}
     moved["w"][y : y + model.ny] += 1j * STEP * direction
     tapes.run(made, h, moved, y, dy, operations=tapes.COMPLEX)

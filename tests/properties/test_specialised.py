@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from llvmlite import ir
 
+from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
@@ -27,6 +28,7 @@ from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities
 from flexclear.pipeline.dynamics.specialise import straight as tracing
 from flexclear.pipeline.dynamics.specialise.code import Emitter
 from flexclear.pipeline.dynamics.specialise.straight import program
@@ -174,7 +176,7 @@ def test_compiled_code_runs_as_the_kernels_do(integrator: str, monkeypatch: pyte
         assert all(np.abs(a[k] - b[k]).max() <= 1e-6 * np.abs(a[k]).max() for k in fields), name
 
 
-def test_what_is_too_long_is_evaluated_by_the_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_too_long_is_evaluated_by_the_kernels_and_differentiated(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tracing, "LONGEST", 10)
     monkeypatch.setattr(straight_code, "_known", {})
     scene = edited(load_scene(TREE / "scenes/checks/pendulum.toml"), {"time.end": 0.01})
@@ -186,6 +188,10 @@ def test_what_is_too_long_is_evaluated_by_the_kernels(monkeypatch: pytest.Monkey
         one = engine_of(scene, {}, silent)
         assert not one.has_straight_code
         assert integrate(one, consistent_start(one), silent).time[-1] == 0.01
+        made = sensitivities(scene, {}, silent, ["hinge.velocity.final"], ["load.gravity.acceleration.1"])
+        # as long as it hangs still, its rate grows with gravity
+        rate = made["hinge.velocity.final"].item() * -9.81
+        assert rate == pytest.approx(float(dynamics.simulate(scene, {}, silent).joint_velocity[-1, 0]), rel=1e-3)
 
 
 def test_other_closure_rows_are_solved_for_with_what_leaves_all() -> None:

@@ -15,7 +15,7 @@ from flexclear.pipeline.dynamics.kernels import Kernel
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
 from flexclear.pipeline.dynamics.specialise.derivative import tangent
-from flexclear.pipeline.dynamics.specialise.straight import LONGEST, places, program
+from flexclear.pipeline.dynamics.specialise.straight import LONGEST_DIFFERENTIATED, places, program
 
 _INTEGER = ir.IntType(64)
 
@@ -32,7 +32,8 @@ def along(rates: Callable, wiring: wired.Wiring) -> Any:
         typingctx: Any, h: Any, f: Any, w: Any, n: Any, y: Any, dy: Any, f0: Any, w0: Any, change: Any, rates: Any
     ) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
-            tape = tangent(program(kernel, wiring), LONGEST)
+            plain = program(kernel, wiring, longest=LONGEST_DIFFERENTIATED)
+            tape = tangent(plain, LONGEST_DIFFERENTIATED)
             Emitter(builder, tape, places(builder, tape, [values])).emit()
             return context.get_dummy_value()
 

@@ -20,8 +20,8 @@ from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, same
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
 #: operations beyond which straight code takes longer to make than kernels do, and is hardly faster: it no longer fits
-#: the processor's first caches
-LONGEST = 50_000
+#: the processor's first caches; and those that are differentiated, which kernels cannot be
+LONGEST, LONGEST_DIFFERENTIATED = 50_000, 80_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
 #: integers of n that are left
@@ -31,13 +31,15 @@ _INTEGER, _FLOAT = ir.IntType(64), ir.DoubleType()
 NAME = "straight"
 
 
-def program(kernel: Callable, wiring: wired.Wiring, *, whole: bool = False, describes: bool = False) -> Program:
+def program(
+    kernel: Callable, wiring: wired.Wiring, *, whole: bool = False, describes: bool = False, longest: int = 0
+) -> Program:
     """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is too long for that.
 
     whole: whether it leaves all in w, or only what steps read.  describes: the kernel is describe(h, f, w, n), of what
-    has been evaluated; all is left.
+    has been evaluated; all is left.  longest: most operations; `LONGEST` when 0.
     """
-    h, trace = wired.header(wiring), Trace(LONGEST)
+    h, trace = wired.header(wiring), Trace(longest or LONGEST)
     w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
     ground = wired.ground(h)
     w.values.update(ground)

@@ -26,8 +26,8 @@ def settle(engine: Engine, progress: Progress) -> None:
     for all rows that it has met before.
     """
     straight, rows = engine.straight, engine.selected.tobytes()
-    if engine.has_straight_code:
-        if straight.place is not None and straight.group is None and engine.method.staged:
+    if engine.has_straight_code or engine.h[m.N_CHANGES]:
+        if straight.place is not None and straight.group is None and side_by_side(engine):
             straight.group = _group(engine, rows, straight.place, progress)
         if rows not in straight.rows and (len(straight.rows) < SELECTIONS or engine.h[m.N_CHANGES]):
             straight.rows.append(rows)

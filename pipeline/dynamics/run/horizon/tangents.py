@@ -102,8 +102,6 @@ def differentiated_engine(engine: Engine, directions: Sequence[Direction]) -> En
     model, count = engine.model, len(directions)
     if not suited(model):
         raise SolverError("friction of ideal joints is solved for by iteration, which is not differentiated")
-    if not engine.has_straight_code:
-        raise SolverError("the equations of this mechanism are not differentiated: the computation is too long")
     if any(isinstance(load, SampledPid) for load in model.scene.load.values()):
         raise SolverError("a controller that samples is not differentiated: use a continuous 'pid'")
     if engine.method.traits.implicit:
