@@ -57,12 +57,12 @@ def show(records: list[Record]) -> str:
     rows = []
     for r in records:
         cells = [r["case"], str(r["unknowns"]), spread(r["dgesv"], "us", 1)]
-        for label in ("free", "free, straight", "in contact", "in contact, straight"):
+        for label in ("free, straight", "in contact, straight", "free", "in contact"):
             ours = r["ours"].get(label)
             cells += [spread(ours, "us", 2), f"1/{ours['ratio']:.1f}"] if ours else ["", ""]
         rows.append(cells)
     head = ["scene", "n", "dgesv(n) [us]"]
-    for label in ("free", "straight, free", "in contact", "straight, in contact"):
+    for label in ("free", "in contact", "kernels, free", "kernels, in contact"):
         head += [f"{label} [us]", "of dgesv"]
     derivations = "\n".join(f"- {r['case']}: n = {r['derivation']}" for r in records)
     return f"{pipe_table(head, rows)}\n\n{derivations}"

@@ -328,7 +328,7 @@ def _of_parts(records: list[Record], what: str) -> str:
         return table(records, runs)
     columns: Columns = {
         what: lambda r: str(r[what]),
-        "us per evaluation": lambda r: spread(r, "us", 2),
+        "kernels [us]": lambda r: spread(r, "us", 2),
         "exponent": exponent,
         "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
         "its exponent": _exponent(records, what, _straight),
@@ -342,7 +342,7 @@ def _of_modes(records: list[Record]) -> str:
         "modes": lambda r: str(r["modes"]),
         "of them held": lambda r: str(r["held"]),
         "integrals of two modes": lambda r: str(r["products"]),
-        "us per evaluation": lambda r: spread(r, "us", 2),
+        "kernels [us]": lambda r: spread(r, "us", 2),
         "exponent": _exponent(records, "modes", lambda one: one["us"]),
         "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
         "its exponent": _exponent(records, "modes", _straight),
