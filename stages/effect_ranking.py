@@ -66,5 +66,6 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     pairs = {name: matters.Pair(point("", n), point(name, n), n) for name, n in params["pairs"].items()}
     results = matters.assemble(pairs, params["words"], chosen, params["units"], params["undone"])
     result: dict[str, Any] = {"nc": results} | files("matters", matters.table(results))
-    shown = results.assign_coords(effect=results["words"].values).sel(effect=[w for w in params["words"].values() if w])
+    listed = results.isel(effect=[k for k, words in enumerate(results["words"].values) if words])
+    shown = listed.assign_coords(effect=listed["words"].values)
     return result | effect_sizes.chart("matters", shown, f"What each effect does: {params['title']}")

@@ -251,6 +251,9 @@ class _Comparison:
         names = list(self._gone)
         taken, total, known = list[str](), self._seconds("", MEMBERS[0]), self._compiled
         for name in names:
+            if any(self._gone[name] == self._gone[other] for other in taken):  # the same runs
+                taken.append(name)
+                continue
             kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
             one = self._seconds(name, MEMBERS[0]) + (0.0 if kinds in known else cost.COMPILING / AT_ONCE)
             if not taken or total + one <= self.study.seconds:
@@ -270,7 +273,6 @@ class _Comparison:
         """What goes with each effect: first all clearances and flexible bodies, then each alone."""
         alone = {e.name: self._closed({e.name}) for e in self.effects}
         ideal = self._closed({e.name for e in self.effects if e.kind in (CLEARANCE, FLEXIBILITY)})
-        # an effect by itself that is all of them need not be looked at twice
         both = {IDEAL: ideal} if ideal and (loose(self.scene) or self.scene.flexible()) else {}
         order = sorted(alone, key=lambda name: _kind(self.effects, name) not in (CLEARANCE, FLEXIBILITY))
         return both | {name: alone[name] for name in order}

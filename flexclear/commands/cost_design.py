@@ -2,7 +2,7 @@
 
 First the neighbourhood of the scene's own setting: looser and tighter tolerances, another family of methods, denser
 output. Then, cheapest first, all methods over all their tolerances and steps. No run is a reference by itself: the
-study takes the tightest that was made (`pipeline.post.cost.study.reference_of`).
+study takes the tightest that was made (`pipeline.post.cost.study`).
 """
 
 from __future__ import annotations

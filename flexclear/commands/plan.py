@@ -317,4 +317,4 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
     found, members = until_decided(compared, MEMBERS if loose else MEMBERS[:1], affordable)
     for name in ("error", "chance", "allowed", "horizon"):
         result[name] = (("quantity",), [getattr(one, name) for one in found])
-    return result.assign_attrs(members=members)
+    return result.assign_attrs(members=members if loose else 0)

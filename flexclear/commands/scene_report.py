@@ -102,6 +102,7 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
         return where / f"{name}.html"
     from flexclear.pipeline.post.overview.page import in_folder
 
+    (where / name).mkdir(parents=True, exist_ok=True)
     for file, content in in_folder(page).items():
         publish(where / name / file, content)
     return where / name / "index.html"

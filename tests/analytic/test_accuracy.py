@@ -39,8 +39,8 @@ def test_the_delivered_error_is_the_wanted_one(reference, requested):
     # a run is accepted whose estimate is at most what is wanted; estimates are good to some per cent, and at 1e-9 the
     # reference's own rounding, 4e-10 m/s, is as large as what is compared
     assert delivered < 3.0 * requested
-    # nor is it too dear: errors jump from tolerance to tolerance, as impacts do, but a ten times looser one misses, or is
-    # refused by its energy
+    # nor is it too dear: errors jump from tolerance to tolerance, as impacts do, but a ten times looser one misses, or
+    # its energy is refused
     with suppress(SolverError):
         looser = dynamics.simulate(load_scene(CSJ, {"solver.rtol": 10.0 * run.attrs["accuracy_rtol"]}), {}, quiet)
         assert quantities.error(looser, reference, velocity) / size > requested

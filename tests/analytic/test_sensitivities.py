@@ -72,6 +72,12 @@ def test_a_pendulum_swings_faster_with_gravity() -> None:
     assert np.abs(by_mass).max() < 4e-8
 
 
+def test_bennett_where_other_closure_rows_are_solved_for() -> None:
+    """From 0.38 s on other rows are kept. Tolerance: at rtol 1e-10 the differences are good to 1e-5."""
+    scene = load("bennett", **{"time.end": 1.5, "solver.rtol": 1e-10})
+    agree(scene, ["coupler.position.x.final"], {"body.coupler.mass": 1e-3}, 1e-3)
+
+
 def test_slider_crank_through_impacts() -> None:
     """Six impacts and more, each of which magnifies what comes before it.
 

@@ -58,10 +58,22 @@ def test_scatter_leaves_a_change_undecided_and_more_members_decide_it():
 
 
 def test_no_change_is_decided_when_chance_is_below_a_hundredth():
-    change = compared(Pair(point(0.0, 1e-3), point(0.0, 1e-3), 8), VELOCITY)
+    change = compared(Pair(point(0.0, 1e-3), point(0.0, 1.01e-3), 8), VELOCITY)
     assert change.difference == 0.0
     assert decided(change, 1.0)
     assert not decided(change, 0.01)
+
+
+def test_the_same_members_do_not_differ():
+    change = compared(Pair(point(0.0, 1e-3), point(0.0, 1e-3), 8), VELOCITY)
+    assert change.difference == change.uncertainty == 0.0
+
+
+def test_an_effect_that_is_not_listed_is_in_no_table():
+    made = study(weak=Pair(point(0.0), point(5e-3), 0), other=Pair(point(0.0), point(5e-3), 0))
+    words = made["words"].values.copy()
+    words[1] = ""
+    assert [row[0] for row in table(made.assign_coords(words=("effect", words))).rows] == ["weak"]
 
 
 def test_the_summary_says_what_changes_by_how_much_and_how_sure_it_is():
@@ -99,7 +111,7 @@ def test_a_requested_accuracy_decides_instead_of_levels():
 
 
 def test_what_chance_may_hide_is_not_called_absent():
-    found = study(unsure=Pair(point(0.0, 0.5), point(0.0, 0.5), 4))
+    found = study(unsure=Pair(point(0.0, 0.5), point(0.0, 0.51), 4))
     assert "not decided: unsure" in sentence(found, {})
 
 

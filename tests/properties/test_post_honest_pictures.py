@@ -58,6 +58,7 @@ def test_rounding_is_judged_by_the_whole_motion_where_all_curves_of_a_kind_are_r
     run = xr.Dataset(
         {
             "frame_position": (("time", "frame", "axis"), frames),
+            "position": (vectors, np.zeros((2, 1, 3))),
             "velocity": (vectors, np.zeros((2, 1, 3))),
             "angular_velocity": (vectors, np.ones((2, 1, 3))),
             "kinetic": ("time", [0.0, 50.0]),
@@ -67,6 +68,8 @@ def test_rounding_is_judged_by_the_whole_motion_where_all_curves_of_a_kind_are_r
     for unit, rounding, motion in (("m", 1e-15, 1e-9), ("m/s", 1e-14, 1e-9), ("N", 1e-13, 1e-9), ("N m", 1e-12, 1e-6)):
         assert not without_noise(rounding * change, noise(run, rounding * change, unit)).any()
         assert np.array_equal(without_noise(motion * change, noise(run, motion * change, unit)), motion * change)
+    without_frames = run.isel(frame=slice(0))
+    assert noise(without_frames, change, "m") == noise(without_frames, change, "rad") > 0.0
 
 
 @pytest.mark.parametrize(

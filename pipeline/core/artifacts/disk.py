@@ -82,7 +82,7 @@ def publish(path: Path, content: bytes) -> str:
 def settle(made: Path, path: Path) -> str:
     """Force the bytes of a file to the disk and give it its name; returns its sha256.
 
-    The name is on the disk after `system.sync_folder`, together with all others of its folder.
+    The name is on the disk after `platforms.sync_folder`, together with all others of its folder.
     """
     with made.open("rb+") as file:  # Windows forces only what could be written
         os.fsync(file.fileno())

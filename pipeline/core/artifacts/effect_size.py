@@ -74,6 +74,12 @@ class Agreement:
     horizon: float = 1.0
 
     @property
+    def fraction(self) -> float:
+        """Error and chance together as a fraction of what is allowed."""
+        most = self.error + self.chance
+        return most / self.allowed if self.allowed > 0.0 else np.inf if most > 0.0 else 0.0
+
+    @property
     def met(self) -> bool:
         """Whether error and chance together are within what is allowed."""
         return self.error + self.chance <= self.allowed
@@ -216,14 +222,15 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
         doubt = chance(members) * doubt
         error = _beyond(distance, doubt)
         allowed = _allowed(full, name, requested, turning=turning)
-        worst = int(np.argmax((error - doubt) / allowed))
+        floor = np.maximum(allowed, np.finfo(float).tiny)  # nothing is allowed of what never changes
+        worst = int(np.argmax((error - doubt) / floor))
         if error[worst] - doubt[worst] <= allowed[worst]:
-            worst = int(np.argmax((error + doubt) / allowed))
+            worst = int(np.argmax((error + doubt) / floor))
         beyond = allowed > requested
         horizon = float(np.argmax(beyond)) / len(beyond) if beyond.any() else 1.0
         found.append(Agreement(float(error[worst]), float(doubt[worst]), float(allowed[worst]), horizon))
     missed = [one for one in found if one.missed]
-    worst_of = max(missed or found, key=lambda one: (one.error + one.chance) / one.allowed)
+    worst_of = max(missed or found, key=lambda one: one.fraction)
     same = all(one.error == one.chance == 0.0 for one in found)
     return replace(worst_of, horizon=1.0 if same else found[0].horizon)  # that of the series, where there is one
 

@@ -230,10 +230,11 @@ def scale(run: xr.Dataset, quantity: Quantity) -> float:
 def natural_size(run: xr.Dataset, unit: str) -> float:
     """Size that the motion of a whole mechanism gives a length, speed, force or torque [SI]; 0 of other units.
 
-    The extent of all frames; the largest speed of a centre of mass, or of a point at that distance; the kinetic energy
-    over the extent, or all of it. Values that are a tiny fraction of it are rounding.
+    The extent of all frames and centres of mass; the largest speed of a centre of mass, or of a point at that distance;
+    the kinetic energy over the extent, or all of it. Values that are a tiny fraction of it are rounding.
     """
-    extent = float(np.linalg.norm(np.ptp(run["frame_position"].values, axis=(0, 1))))
+    points = np.concatenate([run["frame_position"].values, run["position"].values], axis=1).reshape(-1, 3)
+    extent = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
     if unit == "m":
         return extent
     if unit == "m/s":

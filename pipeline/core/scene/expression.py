@@ -167,10 +167,14 @@ def postfix(
 
     try:
         return steps(ast.parse(" ".join(words), mode="eval").body)
-    except (SyntaxError, RecursionError, MemoryError):
+    except (RecursionError, MemoryError):
+        raise ValueError(f"'{_shortened(text)}' is too long or too deeply nested") from None
+    except SyntaxError:
         raise _misread(text) from None
 
 
+#: letters of an expression that a message shows
+LONGEST_SHOWN = 200
 _OPERATORS: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 
 
@@ -196,7 +200,10 @@ def _leaf(token: re.Match[str], term: Callable[[str], Any], constants: Mapping[s
     if token["number"]:
         written = token["unit"]
         factor, unit = (units.UNITS[written][0], units.si(units.measured(written))) if written else (1.0, "1")
-        return factor * float(token["number"]), unit
+        value = factor * float(token["number"])
+        if not math.isfinite(value):
+            raise ValueError(f"{token[0].strip()} is too large: the largest number is 1.8e308")
+        return value, unit
     name = token["name"]
     if name in constants:
         return constants[name]
@@ -214,10 +221,14 @@ def _exponent(text: str, steps: list[Any]) -> tuple[float, str]:
     return fold(steps, lambda leaf: float(leaf[0]), _number), "1"
 
 
+def _shortened(text: str) -> str:
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]} ..."
+
+
 def _misread(text: str) -> ValueError:
     return ValueError(
-        f"'{text}' is no quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or an expression of "
-        "them with + - * / ^, parentheses, functions such as norm(...) and numbers with units, spaces around + and -"
+        f"'{_shortened(text)}' is no quantity: write <owner>.<quantity>, as in 'platform.velocity.x', or an expression "
+        "of them with + - * / ^, parentheses, functions such as norm(...) and numbers with units, spaces around + and -"
     )
 
 

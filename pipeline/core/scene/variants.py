@@ -30,6 +30,8 @@ OF_THE_WORLD = ("gravity", "joint-friction")
 CLEARANCE, FLEXIBILITY = "clearance", "flexibility"
 #: what an ideal mechanism lacks, by kind of effect, and how a scene without it is called
 EFFECTS = {CLEARANCE: "without clearance", FLEXIBILITY: "rigid"}
+#: what the parts of such effects own: loosened joints, ends of stops, modes and stresses of flexible bodies
+OWNED = {CLEARANCE: ("contact", "worn"), "stop": ("contact",), FLEXIBILITY: ("mode", "section", "gauge")}
 #: joint with clearance -> the joint that connects the same frames without; slots and planes have none
 WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
 #: keys of a flexible body that a rigid one from the same recipe has, too
@@ -102,7 +104,7 @@ def without(scene: Scene, gone: Collection[Effect]) -> Scene:
     for family in dict.fromkeys(where.split(".")[0] for where in removed):
         left = {n: p.model_dump(mode="json", exclude_none=True) for n, p in getattr(scene, family).items()}
         table[family] = {n: p for n, p in left.items() if f"{family}.{n}" not in removed}
-    result = edited(scene, table | _settings(scene, gone) | _owned(scene, _left(gone)))
+    result = edited(scene, table | _settings(scene, gone) | _owned(scene, gone))
     result._name = f"{scene.name} without {', '.join(sorted(effect.name for effect in gone))}"
     return result
 
@@ -129,14 +131,15 @@ def loose(scene: Scene) -> dict[str, Clearance]:
     return {name: joint for name, joint in scene.contacts().items() if joint.type in WITHOUT_CLEARANCE}
 
 
-def _owned(scene: Scene, left: Collection[str]) -> dict[str, Any]:
-    """Edits of what is asked for, where the joints with clearance, or the stops, of these names are taken away."""
+def _owned(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
+    """Edits of what is asked for, where it belongs to what goes."""
     keys: dict[str, Any] = {}
     owners = scene.owners()
-    if left:
-        loosened = ("contact", "worn")
+    lost = {of: {e.owner for e in gone if of in OWNED.get(e.kind, ())} for of in sum(OWNED.values(), ())}
+    if any(lost.values()):
         owners |= {
-            of: {n: turns for n, turns in owners[of].items() if n.partition(".")[0] not in left} for of in loosened
+            of: {n: turns for n, turns in owners[of].items() if n.partition(".")[0] not in names}
+            for of, names in lost.items()
         }
         if not owners["contact"]:
             keys["ensemble"] = None
@@ -173,11 +176,6 @@ def _settings(scene: Scene, gone: Collection[Effect]) -> dict[str, Any]:
         start = scene.start.model_dump(mode="json", exclude_none=True)
         settings["start"] = start | {"modal": {k: v for k, v in start["modal"].items() if k not in rigid}}
     return settings
-
-
-def _left(gone: Collection[Effect]) -> frozenset[str]:
-    """Owners of quantities that go: loosened joints by name, ends of stops by their stop's."""
-    return frozenset(effect.owner for effect in gone if effect.kind in (CLEARANCE, "stop"))
 
 
 def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:

@@ -28,7 +28,7 @@ def disk(folder: Path) -> int:
 
 
 def require_memory(need: float, what: str, remedy: str, limit: float | None = None) -> None:
-    """ResourceError when `what` needs more bytes than are allowed; limit: default `SHARE` of what is left."""
+    """ResourceError when `what` needs more bytes than are allowed; limit: default `FRACTION` of what is left."""
     allowed = FRACTION * memory() if limit is None else limit
     if need > allowed:
         raise ResourceError(f"{what} takes about {size(need)} of memory, and {size(allowed)} are allowed; {remedy}")

@@ -202,7 +202,13 @@ def code_digest(tree: ast.Module) -> str:
                     part.values = []
                 elif isinstance(part, ast.Constant) and isinstance(part.value, str):
                     part.value = ""
-    return hashlib.sha256(ast.dump(tree).encode()).hexdigest()
+    return hashlib.sha256(_dumped(tree).encode()).hexdigest()
+
+
+def _dumped(tree: ast.Module) -> str:
+    """The text of a syntax tree, the same from all releases of Python: some leave out what is empty, or lack it."""
+    whole: dict[str, Any] = {"show_empty": True} if sys.version_info >= (3, 13) else {}
+    return ast.dump(tree, **whole).replace(", type_params=[]", "")
 
 
 _DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)

@@ -188,6 +188,7 @@ def remember(engine: Engine, arrays: Mapping[str, np.ndarray]) -> None:
     for name in MEMORY:
         getattr(engine, name)[:] = arrays[name]
     engine.h[list(m.ADDRESSES)] = addresses
+    engine.connect()  # code is of the rows that are selected now
 
 
 def piece(engine: Engine, y: np.ndarray, outputs: np.ndarray, left: Handover | None) -> Piece | None:

@@ -320,9 +320,11 @@ def _segment(
             continue
         elif status == m.SINGULAR_AHEAD:
             _pass_over(engine, tape)
+            _carry_changes(engine, progress)
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
             if closure_rows.improve(engine, t):
                 tape.selections.append((t, engine.selected.copy()))
+                _carry_changes(engine, progress)
             elif status != m.WORN_ROWS and not _rescued(engine, tape):
                 raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
         elif status != m.PAUSED:
@@ -382,6 +384,12 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
         known = tape.passes[-1].time if tape.passes else -np.inf
         tape.passes += [p for p in passes if p.time - known > EQUAL_TIMES * made.span]
     return made is not None
+
+
+def _carry_changes(engine: Engine, progress: Progress) -> None:
+    """Derivatives are in the steps' own code alone: where rows have changed, it is made before the next pause."""
+    if engine.h[m.N_CHANGES]:
+        settle(engine, progress)
 
 
 def _rescued(engine: Engine, tape: Tape) -> bool:

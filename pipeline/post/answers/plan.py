@@ -214,7 +214,8 @@ def verified(planned: xr.Dataset) -> Table:
         rows.append((str(name), requested, written(one.error, one.chance, unit), _verdict(planned, k)))
     notes = [
         f"Evaluations of the equations of motion: {int(planned.attrs['full_evaluations']):,} in full, "
-        f"{int(planned.attrs['planned_evaluations']):,} as planned, of {planned.attrs['members']} members each.",
+        f"{int(planned.attrs['planned_evaluations']):,} as planned"
+        + (f", of {planned.attrs['members']} members each." if planned.attrs["members"] else "."),
         *_no_gain(int(planned.attrs["full_evaluations"]), int(planned.attrs["planned_evaluations"])),
         "Behind ±: what may be chance, by Student's t of the members' means of runs with contacts.",
     ]
@@ -233,7 +234,7 @@ def _verdict(planned: xr.Dataset, k: int) -> str:
     one, unit = agreement_of(planned, k), str(planned["unit"].values[k])
     said, reasons = verdict(one), list[str]()
     if said == MISSED:
-        return f"missed, {one.error / one.allowed:.2g} times"
+        return f"missed, {one.error / one.allowed:.2g} times" if one.allowed else said
     if one.horizon < 1.0:
         reasons.append(
             f"beyond {one.horizon:.0%} of the time single runs of the full scene scatter by "

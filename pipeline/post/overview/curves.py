@@ -178,7 +178,7 @@ def impacts(count: int, closed: float = 0.0) -> str:
 def noise(run: xr.Dataset, values: np.ndarray, unit: str) -> float:
     """Largest range that is rounding, of a run's values of one kind over time, shape (time, ...) [SI unit]."""
     largest = float(np.ptp(values, axis=0).max(initial=0.0))
-    return max(NOISE * largest, ROUNDING.get(unit, 0.0) * quantities.natural_size(run, unit))
+    return max(NOISE * largest, ROUNDING[unit] * quantities.natural_size(run, unit) if unit in ROUNDING else 0.0)
 
 
 def without_noise(values: np.ndarray, noise: float) -> np.ndarray:
