@@ -252,6 +252,8 @@ def test_expressions_balance() -> None:
         ("slider.position $ 2", "is no quantity: write"),
         ("", "is no quantity: write"),
         ("2 * 3", "is a number"),
+        ("slider.position.x + 1e400 m", "1e400 m is too large"),
+        (" + ".join(["slider.position.x"] * 10_000), "is too long or too deeply nested"),
     ],
 )
 def test_what_is_unknown_is_said_in_the_same_words_everywhere(text: str, says: str) -> None:

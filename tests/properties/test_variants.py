@@ -44,6 +44,14 @@ def test_friction_of_ideal_joints_is_an_effect_of_its_own(crank: Path):
     assert variants.without(scene, [found["joint.main.friction"]]).joint["main"].friction is None
 
 
+def test_modes_of_a_body_that_becomes_rigid_are_asked_for_no_more(crank: Path):
+    watched = ["rod.1.modal_coordinate", "pin.peak_force", "slider.position"]
+    scene = edited(load_scene(crank), {"view": {"watch": watched}})
+    gone = [effect for effect in variants.effects(scene) if effect.name == "body.rod.modes"]
+    assert variants.without(scene, gone).view.watch == tuple(watched[1:])
+    assert variants.ideal(scene).view.watch == ("slider.position",)
+
+
 def test_any_variant_is_a_file_that_extends_its_scene_by_parts_replaced_and_removed(crank: Path):
     scene = load_scene(crank)
     every = variants.effects(scene)
