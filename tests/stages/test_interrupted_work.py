@@ -22,6 +22,7 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.core.workflow import cores, journal, schedule, stopping
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import Task
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run import pieces, progress_rate, trajectory
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.post import derive
@@ -167,6 +168,16 @@ def test_what_an_engine_has_met_before_changes_no_bit(root: Path) -> None:
     once, again = (trajectory.integrate(engine, start, silent) for _ in range(2))
     assert len(engine.straight.rows) == 2 or config.DISABLE_JIT
     assert np.array_equal(once.rows, again.rows)
+
+
+def test_an_engine_that_remembers_another_evaluates_for_the_same_closure_rows(root: Path) -> None:
+    first, other = (engine_with(check(root, "bricard", **CHANGING)) for _ in range(2))
+    state = trajectory.integrate(first, consistent_start(first), silent).state[-1]
+    assert not np.array_equal(first.selected, other.selected)
+    pieces.remember(other, pieces.memory(first))
+    time = float(first.control[m.TIME])
+    assert all(engine.attempt(state, time) for engine in (first, other))
+    assert np.array_equal(first.slope, other.slope)
 
 
 @pytest.mark.usefixtures("often")
