@@ -32,9 +32,9 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
 
 #: without a budget the answers may take so many times the run's own processor time, and at least so long [s]
-TIMES, LEAST = 3.0, 20.0
-#: variants are run and compiled so many at a time
-AT_ONCE = 2.0
+TIMES, LEAST = 3.0, 30.0
+#: variants are run and compiled so many at a time; what code for one takes, where the scene's steps are there [s]
+AT_ONCE, COMPILING = 2.0, 4.0
 #: of variants without a clearance or a flexible body, the kernels of so many are compiled next to the scene's own run
 AHEAD = 2
 #: tolerance of members with contacts, at most so tight: they start a thousandth of the clearance apart
@@ -255,7 +255,7 @@ class _Comparison:
                 taken.append(name)
                 continue
             kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
-            one = self._seconds(name, MEMBERS[0]) + (0.0 if kinds in known else cost.COMPILING / AT_ONCE)
+            one = self._seconds(name, MEMBERS[0]) + (0.0 if kinds in known else COMPILING / AT_ONCE)
             if not taken or total + one <= self.study.seconds:
                 taken.append(name)
                 total, known = total + one, known | {kinds}
