@@ -16,8 +16,7 @@ import flexclear as fc
 from flexclear.commands import plan
 from flexclear.commands.__main__ import main
 from flexclear.commands.new import write
-from flexclear.pipeline.core.artifacts.effect_size import POOLED, Agreement, Influence, agreement, same_starts
-from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.coupling import uncoupled
 from flexclear.pipeline.core.scene.load import edited, load_scene
@@ -34,7 +33,6 @@ from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.search import summed
 from flexclear.pipeline.dynamics.plan.tolerance import as_it_is, no_dearer
 from flexclear.pipeline.dynamics.run.run import Run, integrate
-from flexclear.pipeline.post.answers.plan import _verdict, until_decided, verdict
 from flexclear.stages import effect_plan, simulation, watched_quantities
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import FailedTasksError, open_workplace
@@ -299,81 +297,6 @@ def test_without_a_requested_accuracy_three_levels_are_planned(tmp_path: Path, c
     said = capsys.readouterr().out
     assert all(f"| {level}" in said for level in plan.LEVELS)
     assert said.count("gravity") >= 3  # without it nothing swings
-
-
-@pytest.mark.parametrize(
-    "error, chance, allowed, said",
-    [(0.0, 0.5, 1.0, "met"), (0.6, 0.5, 1.0, "not decided"), (1.2, 0.5, 1.0, "not decided"), (1.6, 0.5, 1.0, "missed")],
-)
-def test_met_and_missed_are_said_only_where_error_and_chance_agree(error, chance, allowed, said):
-    assert verdict(Agreement(error, chance, allowed)) == said
-
-
-def test_an_undecided_verdict_says_how_far_single_runs_scatter():
-    one = {"error": [0.5], "chance": [5.0], "allowed": [1.0], "horizon": [0.25], "scatter": [2.0]}
-    coordinates = {"quantity": ["x"], "unit": ("quantity", ["m"])}
-    compared = xr.Dataset({k: ("quantity", v) for k, v in one.items()}, coordinates, {"members": 4})
-    said = _verdict(compared, 0)
-    # four times as many halve the chance: half of what is allowed is left for it, a tenth of it
-    beyond = "beyond 25% of the time single runs of the full scene scatter by 2 m"
-    assert said == f"not decided: {beyond}; 400 members would decide"
-    assert _verdict(compared.assign(horizon=("quantity", [1.0])), 0) == "not decided: 400 members would decide"
-    assert _verdict(compared.assign(error=("quantity", [8.0])), 0) == "missed, 8 times"
-    assert _verdict(compared.assign(chance=("quantity", [0.1])), 0).startswith(f"met to the horizon: {beyond}, and the")
-
-
-def _scattered(mean: np.ndarray, scatter: np.ndarray | float) -> Point:
-    """A point with a series of positions along x and its standard deviation over members."""
-    rows = np.zeros((len(mean), 3))
-    rows[:, 0] = mean
-    deviation = np.zeros_like(rows)
-    deviation[:, 0] = scatter
-    values = {"b.position.series": rows}
-    return Point(values, {}, {"b.position.series": deviation}, 1)
-
-
-def test_beyond_the_horizon_as_much_is_allowed_as_two_runs_of_the_scene_differ():
-    """Members part by steps at half of the time; means that differ by less than two runs of the scene are as good."""
-    n, requested, spread = 400, 1.0, 100.0
-    later = np.arange(n) >= n // 2
-    full = _scattered(np.zeros(n), np.where(later, spread, 0.0))
-    q = Quantity("b", "position")
-    same = agreement(full, full, q, 4, requested)
-    assert (same.error, same.chance, same.horizon) == (0.0, 0.0, 1.0)  # the same members: nothing is chance
-    early = _scattered(np.where(later, 0.0, 3.0), np.where(later, spread, 0.0))
-    missed = agreement(early, full, q, 4, requested)
-    assert missed.missed
-    assert missed.error == pytest.approx(3.0)
-    assert missed.allowed == requested
-    late = _scattered(np.where(later, 60.0, 0.0), np.where(later, spread, 0.0))
-    few, many = (agreement(late, full, q, members, requested) for members in (4, 4000))
-    assert verdict(few) == "not decided"
-    assert verdict(many) == "met to the horizon"
-    assert many.allowed == pytest.approx(np.sqrt(2.0) * spread)
-    # the spread is pooled over a twentieth of the series, so it is seen so much earlier
-    assert many.horizon == pytest.approx(0.5, abs=0.5 * POOLED + 1.0 / n)
-    # from the same starts, too, the whole difference counts before the horizon
-    assert same_starts(early, full, q, 3, requested) == pytest.approx(3.0)
-    assert same_starts(late, full, q, 3, requested) == 0.0
-
-
-def test_members_are_added_until_all_is_decided_as_far_as_they_are_affordable():
-    """Chance falls with the root of the members: four leave it at four times the rest, sixteen times as many do."""
-    made = list[int]()
-
-    def compared(members: int) -> list[Agreement]:
-        made.append(members)
-        return [Agreement(0.0, 4.0 * np.sqrt(4.0 / members), 1.0), Agreement(0.0, 0.1, 1.0)]
-
-    found, members = until_decided(compared, plan.MEMBERS, lambda members: True)
-    assert members == 64
-    assert made == [4, 64]
-    assert verdict(found[0]) == "met"
-    made.clear()
-    found, members = until_decided(compared, plan.MEMBERS, lambda members: members <= 16)
-    assert members == 16
-    assert made == [4, 16]
-    assert verdict(found[0]) == "not decided"
 
 
 def test_an_accuracy_above_all_that_moves_would_drop_the_motion_too(tmp_path: Path, results: Path):
