@@ -304,6 +304,8 @@ def _segment(
     while True:
         if n[m.EVALUATIONS] >= n[m.BUDGET]:  # segments may be so short that no pause falls into one
             n[m.BUDGET] = n[m.EVALUATIONS] + (judge.every or SLICE)
+        if engine.h[m.N_CHANGES]:  # only the steps' own code for the rows solved for now has derivatives
+            settle(engine, progress)
         known = n[m.N_EVENTS]  # with no more room than one step needs, the stepper returns after each event
         engine.advance(tape.outputs, tape.rows, tape.events if jumps is None else tape.events[: known + few])
         if jumps is not None and n[m.N_EVENTS] > known:
@@ -320,11 +322,9 @@ def _segment(
             continue
         elif status == m.SINGULAR_AHEAD:
             _pass_over(engine, tape)
-            _carry_changes(engine, progress)
         elif status == m.WORN_ROWS or (status in STALLED and engine.mobility.redundant):
             if closure_rows.improve(engine, t):
                 tape.selections.append((t, engine.selected.copy()))
-                _carry_changes(engine, progress)
             elif status != m.WORN_ROWS and not _rescued(engine, tape):
                 raise SolverError(refusal.text(engine, tape.rows[: n[m.N_RECORDED]]))
         elif status != m.PAUSED:
@@ -384,12 +384,6 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
         known = tape.passes[-1].time if tape.passes else -np.inf
         tape.passes += [p for p in passes if p.time - known > EQUAL_TIMES * made.span]
     return made is not None
-
-
-def _carry_changes(engine: Engine, progress: Progress) -> None:
-    """Derivatives are in the steps' own code alone: where rows have changed, it is made before the next pause."""
-    if engine.h[m.N_CHANGES]:
-        settle(engine, progress)
 
 
 def _rescued(engine: Engine, tape: Tape) -> bool:
