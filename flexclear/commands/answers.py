@@ -239,8 +239,7 @@ class _Comparison:
             pairs |= dict.fromkeys(waiting, members)
             full = self._point("", members)
             waiting = [n for n in waiting if undecided(Pair(full, self._point(n, members), members), self.chosen)]
-        both = self._gone.get(IDEAL)  # a single effect may be all of them: it is not listed twice
-        alone = any(gone == both for name, gone in self._gone.items() if name != IDEAL)
+        alone = IDEAL in self._gone and self._repeats(IDEAL, [name for name in self._gone if name != IDEAL])
         words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if alone else IDEAL}
         made = {name: (self._variant(name), self.tasks[name]) for name in ("", *names)}
         left = [words[name] for name in undone if words[name]]
@@ -251,7 +250,7 @@ class _Comparison:
         names = list(self._gone)
         taken, total, known = list[str](), self._seconds("", MEMBERS[0]), self._compiled
         for name in names:
-            if any(self._gone[name] == self._gone[other] for other in taken):  # the same runs
+            if self._repeats(name, taken):
                 taken.append(name)
                 continue
             kinds = kernels.shared(watched_quantities.plain(self._variant(name)))
@@ -304,21 +303,28 @@ class _Comparison:
         """Those that the rest of the budget holds, the first ones first: what the summary says before the others."""
         fitting, total = list[str](), self.spent + self._seconds("", members)
         for name in names:
-            seconds = self._seconds(name, members)
+            seconds = 0.0 if self._repeats(name, fitting) else self._seconds(name, members)
             if total + seconds <= self.study.seconds:
                 fitting.append(name)
                 total += seconds
         return fitting
 
+    def _repeats(self, name: str, others: Sequence[str]) -> bool:
+        """Whether the runs without an effect are those without another one: a single effect may be all of them."""
+        return any(self._gone.get(name) == self._gone.get(other) for other in others)
+
     def _bring(self, names: Sequence[str], members: int) -> None:
         made = {name: watched_quantities.task(self._variant(name), self.chosen, members) for name in names}
         outcome = self.workplace.bring(list(made.values()))
         check(outcome)
+        brought = list[str]()
         for name, task in made.items():
             self.tasks.setdefault(name, {})[members] = task
             seconds = self.workplace.store.load(outcome.records[id(task)]).attrs
             self.took[name] = float(seconds["cpu_seconds"]) / (members if self._touching(name) else 1)
-            self.spent += self._seconds(name, members) + float(seconds["compile_seconds"]) / AT_ONCE
+            if not self._repeats(name, brought):
+                self.spent += self._seconds(name, members) + float(seconds["compile_seconds"]) / AT_ONCE
+            brought.append(name)
 
     def _point(self, name: str, members: int) -> Point:
         task = self.tasks[name][members]
