@@ -68,17 +68,14 @@ def position_rate(w, x, u, rate):
     put(w, rate, at(w, u))
 
 
-class RotationVector:
-    """Three rotations, held by a path; a joint of this type in a scene is `spherical`."""
+POSITIONS, SPEEDS = "rrr", "rrr"  #: r: rotation [rad or -], t: translation [m]
+TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
+ROTATIONS: tuple[tuple[int, int], ...] = ()
+COORDINATES: tuple[Coordinate, ...] = ()
 
-    POSITIONS, SPEEDS = "rrr", "rrr"  #: r: rotation [rad or -], t: translation [m]
-    TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
-    ROTATIONS: tuple[tuple[int, int], ...] = ()
-    COORDINATES: tuple[Coordinate, ...] = ()
 
-    @staticmethod
-    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Rotation vector [rad] of an angle up to pi, shape (3,)."""
-        q = matrix_to_quaternion(R)
-        half = np.linalg.norm(q[1:])
-        return q[1:] * (2.0 if half == 0.0 else 2.0 * np.arctan2(half, q[0]) / half)
+def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Rotation vector [rad] of an angle up to pi, shape (3,)."""
+    q = matrix_to_quaternion(R)
+    half = np.linalg.norm(q[1:])
+    return q[1:] * (2.0 if half == 0.0 else 2.0 * np.arctan2(half, q[0]) / half)

@@ -1,6 +1,6 @@
 """Loads. To add one: a module here that is called like its type, and its parameters in core/scene/loads.
 
-Each module but that of gravity, which is a field, holds a class, called like its parameters, with
+Each module but that of gravity, which is a field, has
 - ``row(load, place)`` or, on a joint coordinate, ``row(load, place, coordinate)``: what it acts on
   and with (see `row.Row`); ValueError, in words, for values that cannot be;
 - ``apply(d, k)``: kernel that applies load k by `fields.act`.

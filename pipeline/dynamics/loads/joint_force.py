@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.scene.loads import JointForce as Declared
+from flexclear.pipeline.core.scene.loads import JointForce
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, law, measure
@@ -18,12 +18,6 @@ def apply(d, k):
     act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * rate, 0.0)
 
 
-class JointForce:
-    """See the module's text."""
-
-    apply = staticmethod(apply)
-
-    @staticmethod
-    def row(load: Declared, path: str, coordinate: Coordinate) -> Row:
-        """One law [N or N m]."""
-        return Row(joint=load.joint, laws=((load.force, coordinate.force, f"{path[:-1]}.force]"),))
+def row(load: JointForce, path: str, coordinate: Coordinate) -> Row:
+    """One law [N or N m]."""
+    return Row(joint=load.joint, laws=((load.force, coordinate.force, f"{path[:-1]}.force]"),))

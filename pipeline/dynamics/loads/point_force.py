@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.scene.loads import PointForce as Declared
+from flexclear.pipeline.core.scene.loads import PointForce
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, law
 from flexclear.pipeline.dynamics.loads.row import Row
@@ -20,13 +20,7 @@ def apply(d, k):
     act(d, k, cross(frame.origin, force), force, 0.0, 0.0, 0.0, power, 0.0)
 
 
-class PointForce:
-    """See the module's text."""
-
-    apply = staticmethod(apply)
-
-    @staticmethod
-    def row(load: Declared, path: str) -> Row:
-        """Three laws [N]."""
-        laws = tuple((c, "force", f"{path[:-1]}.force]") for c in load.force)
-        return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")
+def row(load: PointForce, path: str) -> Row:
+    """Three laws [N]."""
+    laws = tuple((c, "force", f"{path[:-1]}.force]") for c in load.force)
+    return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.loads import SampledPid as Declared
+from flexclear.pipeline.core.scene.loads import SampledPid
 from flexclear.pipeline.dynamics.gauge import counted
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -34,24 +34,18 @@ def apply(d, k):
     act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * speed, 0.0)
 
 
-class SampledPid:
-    """See the module's text."""
+def row(load: SampledPid, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
+    """Six numbers (`pid.numbers`) and the period [s], the reference, three states."""
+    reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
+    gains = (*numbers(load, coordinate, measured), load.period)
+    return Row(joint=load.joint, laws=(reference,), numbers=gains, states=3)
 
-    apply = staticmethod(apply)
 
-    @staticmethod
-    def row(load: Declared, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
-        """Six numbers (`pid.numbers`) and the period [s], the reference, three states."""
-        reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
-        gains = (*numbers(load, coordinate, measured), load.period)
-        return Row(joint=load.joint, laws=(reference,), numbers=gains, states=3)
-
-    @staticmethod
-    def sample(gains: np.ndarray, held: np.ndarray, error: float, *, first: bool) -> np.ndarray:
-        """Internal states after a sample, from those before it and the error there; shape (3,)."""
-        proportional, integral, derivative, low, high, tracking, period = gains
-        change = 0.0 if first else (error - held[ERROR]) / period
-        asked = proportional * error + held[INTEGRAL] + derivative * change
-        force = min(max(asked, low), high)
-        grown = held[INTEGRAL] + period * (integral * error + tracking * (force - asked))
-        return np.array([force, grown, error])
+def sample(gains: np.ndarray, held: np.ndarray, error: float, *, first: bool) -> np.ndarray:
+    """Internal states after a sample, from those before it and the error there; shape (3,)."""
+    proportional, integral, derivative, low, high, tracking, period = gains
+    change = 0.0 if first else (error - held[ERROR]) / period
+    asked = proportional * error + held[INTEGRAL] + derivative * change
+    force = min(max(asked, low), high)
+    grown = held[INTEGRAL] + period * (integral * error + tracking * (force - asked))
+    return np.array([force, grown, error])

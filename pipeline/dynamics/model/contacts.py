@@ -11,7 +11,7 @@ from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_LAWS, Parts
+from flexclear.pipeline.dynamics.effects import FRICTION_LAWS, NORMAL_LAWS, SURFACES, Parts
 from flexclear.pipeline.dynamics.effects.stops.model import End, ends_an_angle
 from flexclear.pipeline.dynamics.model.components import Floors, Group
 from flexclear.pipeline.dynamics.model.gauges import Gauges
@@ -110,7 +110,7 @@ def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
     normal = lookup(NORMAL_LAWS, joint.normal.law, where=path)
     if isinstance(joint, End):
         return _resolved(normal, joint, joint.normal.stiffness, None, path)
-    surfaces = lookup(CONTACTS, joint.type, where=path)
+    surfaces = lookup(SURFACES, joint.type, where=path)
     exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
     try:
         stiffness = surfaces.stiffness(joint, exponent)

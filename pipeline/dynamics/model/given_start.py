@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.model.chain import path_positions
 from flexclear.pipeline.dynamics.model.constraints import Constraint, prescribed
 from flexclear.pipeline.dynamics.model.deformation import start_place
-from flexclear.pipeline.dynamics.model.driving import coordinate_of, joint_class
+from flexclear.pipeline.dynamics.model.driving import coordinate_of, joint_type
 from flexclear.pipeline.dynamics.model.laws import drive_laws
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -99,7 +99,7 @@ def given_links(mechanism: Mechanism) -> set[int]:
 
 def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Miss]:
     A, B = joint.frames(poses)
-    relative, declared = A.inverse().of(B), joint_class(joint.edge.kind)
+    relative, declared = A.inverse().of(B), joint_type(joint.edge.kind)
     now = declared.coordinates(relative.R, relative.p)
     for (k, value), difference in zip(
         joint.values.items(), prescribed(joint.edge.kind, A, B, joint.values)[0], strict=True

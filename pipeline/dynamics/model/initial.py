@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
 from flexclear.pipeline.dynamics.model.constraints import outboard_place
 from flexclear.pipeline.dynamics.model.deformation import start_place
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift
 from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.given_rates import given_rates
@@ -41,7 +41,7 @@ def start_state(model: Model) -> np.ndarray:
     """State at the start as the scene gives it, before the loops are closed; shape (NY,)."""
     y = np.zeros(model.ny)
     for i, link in enumerate(model.links[1:], start=1):
-        if not link.drives and joint_class(link.kind).POSITIONS:
+        if not link.drives and joint_type(link.kind).POSITIONS:
             y[model.numbering.positions[i]] = _positions(model.mechanism, link)
     for i, q in model.mechanism.deformation.items():
         y[model.numbering.modal_positions[i]] = q
@@ -56,7 +56,7 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
     assert link.inboard is not None
     F = starts[link.inboard.link].of(start_place(mechanism, link.inboard))
     relative = F.inverse().of(link.start.of(outboard_place(mechanism, link)))
-    return np.asarray(joint_class(link.kind).coordinates(relative.R, relative.p))
+    return np.asarray(joint_type(link.kind).coordinates(relative.R, relative.p))
 
 
 @dataclass(frozen=True)

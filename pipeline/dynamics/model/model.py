@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.model import filling, flexible_bodies, guards, 
 from flexclear.pipeline.dynamics.model import loads as loading
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.model.assembly import assembled
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.gauges import Gauges
 from flexclear.pipeline.dynamics.model.loads import Load
 from flexclear.pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
@@ -278,7 +278,7 @@ def _borne(mechanism: Mechanism) -> np.ndarray:
             sums[i] += mass, mass * np.linalg.norm(com), mass * com @ com + 0.5 * np.trace(J)
         mass, first, second = sums[i]
         a = float(np.linalg.norm(link.start.p - above.start.p))
-        if "t" in joint_class(link.kind).SPEEDS:
+        if "t" in joint_type(link.kind).SPEEDS:
             a = max(a, mechanism.length)
         sums[link.branch.parent] += mass, first + mass * a, second + a * (2.0 * first + mass * a)
     return sums[:, ::2]
@@ -360,7 +360,7 @@ def _floors(
             target[places[k]] = len(rows) - 1
 
     for i, link in enumerate(mechanism.links[1:], start=1):
-        declared = joint_class(link.kind)
+        declared = joint_type(link.kind)
         if not link.drives:
             fill(q_group, numbering.positions[i], declared.POSITIONS, of_link[i])
             fill(v_group, numbering.coordinates[i], declared.SPEEDS, of_link[i])

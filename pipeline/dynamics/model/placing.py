@@ -15,7 +15,7 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.dynamics.model.closing import close, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
@@ -98,7 +98,7 @@ def chosen(
     distances = [_distance(mechanism, joints, one.coordinates, hints) for one in candidates]
     if hints and distances[1] - distances[0] > SAME_ASSEMBLY:
         return ""
-    units = {(j.name, k): c for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
+    units = {(j.name, k): c for j in joints for k, c in enumerate(joint_type(j.edge.kind).COORDINATES)}
     differences = {key: abs(first.coordinates[key] - candidates[1].coordinates[key]) for key in first.coordinates}
     name, k = max(differences, key=lambda key: differences[key])
     coordinate, several = units[name, k], len([key for key in units if key[0] == name]) > 1
@@ -122,7 +122,7 @@ def _guess(
     """Poses of all links, those not placed each put where a joint to a known one has it."""
     poses, known = [link.start for link in mechanism.links], set(placed)
     # joints with few degrees of freedom are best
-    order = sorted(joints, key=lambda joint: len(joint_class(joint.edge.kind).SPEEDS) - len(joint.values))
+    order = sorted(joints, key=lambda joint: len(joint_type(joint.edge.kind).SPEEDS) - len(joint.values))
     while True:
         joint = next((j for j in order if (j.link_a in known) != (j.link_b in known)), None)
         if joint is None:
@@ -140,7 +140,7 @@ def _motion(
     mechanism: Mechanism, joint: Constraint, values: Hints, random: np.random.Generator | None, spread: float
 ) -> Placement:
     """Pose of a joint's second frame in its first, its coordinates moved one after the other."""
-    coordinates = joint_class(joint.edge.kind).COORDINATES
+    coordinates = joint_type(joint.edge.kind).COORDINATES
     pose = Placement()
     if not coordinates and random is not None and joint.edge.kind == "spherical":
         return Placement(R=rotation_vector_to_matrix(np.pi * spread * random.normal(size=3)))
@@ -158,7 +158,7 @@ def _coordinates(joints: Sequence[Constraint], poses: Sequence[Placement]) -> di
     coordinates = dict[tuple[str, int], float]()
     for joint in joints:
         A, B = joint.frames(poses)
-        declared, relative = joint_class(joint.edge.kind), A.inverse().of(B)
+        declared, relative = joint_type(joint.edge.kind), A.inverse().of(B)
         now = declared.coordinates(relative.R, relative.p)
         coordinates |= {(joint.name, k): float(now[k]) for k in range(len(declared.COORDINATES))}
     return coordinates
@@ -166,7 +166,7 @@ def _coordinates(joints: Sequence[Constraint], poses: Sequence[Placement]) -> di
 
 def _distance(mechanism: Mechanism, joints: Sequence[Constraint], one: Hints, other: Hints) -> float:
     """Largest difference of coordinates that both have, in radians or fractions of the mechanism's size."""
-    turning = {(j.name, k): c.turning for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
+    turning = {(j.name, k): c.turning for j in joints for k, c in enumerate(joint_type(j.edge.kind).COORDINATES)}
     differences = [0.0]
     for key in one.keys() & other.keys():
         way = one[key] - other[key]

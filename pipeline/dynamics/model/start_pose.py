@@ -15,7 +15,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model import given_start
 from flexclear.pipeline.dynamics.model.assembly import assembled, settled
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.placing import opened
@@ -161,7 +161,7 @@ def _coordinates(mechanism: Mechanism) -> list[tuple[str, float]]:
     poses, result = [link.start for link in mechanism.links], list[tuple[str, float]]()
     for joint in constraints(mechanism):
         A, B = joint.frames(poses)
-        declared, relative = joint_class(joint.edge.kind), A.inverse().of(B)
+        declared, relative = joint_type(joint.edge.kind), A.inverse().of(B)
         now, names = declared.coordinates(relative.R, relative.p), [one.name for one in declared.COORDINATES]
         labels = [joint.name] if len(names) == 1 else [f"{joint.name}.{name}" for name in names]
         result += [(label, float(value)) for label, value in zip(labels, now, strict=False)]

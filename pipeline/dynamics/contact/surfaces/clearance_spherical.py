@@ -5,6 +5,10 @@ Nothing but the contact (`contact.forces`) joins the bodies.
 
 from __future__ import annotations
 
+import math
+
+from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
+from flexclear.pipeline.dynamics.contact.hertz import given_or, relative_radius, sphere_stiffness
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import radial
 
@@ -21,7 +25,11 @@ def separation(axes, numbers, p, v):
     return numbers.clearance - distance, rate, normal, turning, p
 
 
-class ClearanceSpherical:
-    """See the module's text."""
+def stiffness(joint: ClearanceSpherical, exponent: float) -> float:
+    """K [N/m^exponent], given or of two spheres; ValueError where nothing is published."""
+    return given_or(joint, exponent, {1.5: sphere_stiffness})
 
-    separation = staticmethod(separation)
+
+def contact_size(joint: ClearanceSpherical, depth: float, force: float) -> float:
+    """Radius of the contact [m] at a penetration [m]: sqrt(R d) (Hertz)."""
+    return math.sqrt(relative_radius(joint) * depth)
