@@ -91,8 +91,9 @@ def _unused(reached: Collection[str], parts: Collection[str]) -> Iterator[str]:
         listed = getattr(import_module(family), "NAMES", None) if inside else None
         if listed is None:
             continue
-        those = {module_of(family, name) for name in listed}
-        yield from (inside & those) - set(parts) if inside & set(parts) else inside
+        those = {module_of(family, name) for name in listed} & set(reached)
+        yield from those - set(parts)
+        yield from inside if not those & set(parts) else ()
 
 
 def named(source: str) -> Iterator[str]:

@@ -6,6 +6,7 @@ folders, and the same declarations, those of the effects.
 
 An effect is a folder here. Its declaration is in `effect`; its other modules are called like the folder of the tower
 whose work they do for the effect, and import what modules there may: `model`, `equations`, `contact`, `run`, `record`.
+A load that comes with an effect is a module there, called like the load.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ r"""PID controller that samples: at t_k it looks at the error, and holds its for
           z_{k+1} = z_k + T\,[K_i e_k + (F_k - u_k)/T_t]
 
 The force, the integral part and the last error are internal states that change at samples only
-(`effects.controllers.run`), where steps end.
+(`run`), where steps end.
 Source: Astrom & Hagglund (1995), PID Controllers: Theory, Design, and Tuning, 2nd ed., sec. 3.6.
 """
 
@@ -13,11 +13,11 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.core.scene.loads import SampledPid
+from flexclear.pipeline.dynamics.effects.controllers.pid import numbers
 from flexclear.pipeline.dynamics.gauge import counted
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, measure
-from flexclear.pipeline.dynamics.loads.pid import numbers
 from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.vectors import scale
 
