@@ -45,7 +45,7 @@ class Effect:
     explains: ``explanation(engine)`` -> why the run stopped, in words, or None.
     records: ``series(model, seen)`` -> variables and coordinates of the run's dataset, by the beginnings of the
     variables' names.
-    acts: ``acting(model, seen)`` -> frames on which it acts, moments and forces (`record.acting`).
+    acts: ``acting(model, seen)`` -> frames on which it acts, moments and forces (`record.wrenches`).
     warns: ``warnings(run)`` -> sentences about what a run is to be doubted for.
     """
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.model.deformation import start_place
 from flexclear.pipeline.dynamics.model.driving import joint_type
+from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
 from flexclear.pipeline.dynamics.model.laws import NONE, drive_laws
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -39,6 +39,13 @@ class Constraint:
     def frames(self, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
         """Both frames in the world, from the poses of all links."""
         return poses[self.link_a].of(self.place_a), poses[self.link_b].of(self.place_b)
+
+    def coordinates(self, poses: Sequence[Placement]) -> dict[tuple[str, int], float]:
+        """Where its named coordinates are [m or rad], by its name and their numbers."""
+        A, B = self.frames(poses)
+        declared, relative = joint_type(self.edge.kind), A.inverse().of(B)
+        now = declared.coordinates(relative.R, relative.p)
+        return {(self.name, k): float(now[k]) for k in range(len(declared.COORDINATES))}
 
 
 def constraints(

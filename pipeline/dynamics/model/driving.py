@@ -31,6 +31,12 @@ def joint_type(kind: str) -> Any:
     return lookup(JOINTS, kind, where="joint")
 
 
+def label(joint: str, kind: str, k: int) -> str:
+    """Name in records and in ``[start.joint]`` of coordinate k of a joint of some type."""
+    declared: tuple[Coordinate, ...] = joint_type(kind).COORDINATES
+    return joint if len(declared) == 1 else f"{joint}.{declared[k].name}"
+
+
 def prescribed(scene: Scene) -> list[Prescribed]:
     """All prescribed coordinates, in the order of the scene."""
     coordinates = []

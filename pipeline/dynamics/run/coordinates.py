@@ -9,7 +9,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import joint_type
+from flexclear.pipeline.dynamics.model.driving import joint_type, label
 from flexclear.pipeline.dynamics.model.model import Model
 
 Series = tuple[np.ndarray, np.ndarray, np.ndarray]  #: coordinate, rate and second rate, shape (time,) each
@@ -36,12 +36,6 @@ def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
         for index, coordinate in enumerate(joint_type(edge.kind).COORDINATES):
             series[label(edge.name, edge.kind, index)] = _measured(a, b, coordinate)
     return {name: series[name] for name, _, _ in named_coordinates(model.scene) if name in series}
-
-
-def label(joint: str, kind: str, k: int) -> str:
-    """Name in records of coordinate k of a joint of some type."""
-    declared: tuple[Coordinate, ...] = joint_type(kind).COORDINATES
-    return joint if len(declared) == 1 else f"{joint}.{declared[k].name}"
 
 
 def named_coordinates(scene: Scene) -> list[tuple[str, str, bool]]:
