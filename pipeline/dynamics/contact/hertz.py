@@ -53,10 +53,7 @@ def plane_stiffness(joint: Clearance) -> float:
 
 
 def cylinder_stiffness(joint: Pin) -> float:
-    r"""K [N/m] of two parallel cylinders, or of one on a plane: :math:`K = \tfrac{\pi}{4}E^*L`, whatever the radii.
-
-    Source: Popov (2017), Contact Mechanics and Friction, sec. 5.3.
-    """
+    r"""K [N/m] of two parallel cylinders, or of one on a plane: :math:`K = \tfrac{\pi}{4}E^*L`, whatever the radii."""
     return joint.length / (4.0 * compliance(joint))
 
 

@@ -135,15 +135,13 @@ def _under(diagonal: np.ndarray, front: Front) -> np.ndarray:
     return under
 
 
-def negative_pivots(
-    matrix: sp.csr_array, positions: np.ndarray, last: int = 0, tell: Tell = lambda fraction: None
-) -> int:
+def negative_pivots(matrix: sp.csr_array, positions: np.ndarray, last: int = 0) -> int:
     """Number of negative eigenvalues of a symmetric matrix, by Sylvester's law of inertia.
 
     last: this many last rows are eliminated last, since they have no diagonal entry of their own.
     """
     tree = dissect(matrix, positions, last)
-    return sum(_eliminate(front) for front in _fronts(matrix, tree, tell))
+    return sum(_eliminate(front) for front in _fronts(matrix, tree, lambda fraction: None))
 
 
 def _eliminate(front: Front) -> int:

@@ -34,7 +34,11 @@ def separation(axes, numbers, p, v):
 
 
 def stiffness(joint: ClearanceRevolute, exponent: float) -> float:
-    """K [N/m^exponent], given or as above; ValueError where nothing is published."""
+    """K [N/m^exponent], given or as above; ValueError where nothing is published.
+
+    Source: Wang & Wang (2019), eq. (26), of spheres; Popov (2017), Contact Mechanics and Friction, sec. 5.3, of
+    cylinders.
+    """
     return given_or(joint, exponent, {1.0: cylinder_stiffness, 1.5: sphere_stiffness})
 
 

@@ -18,15 +18,18 @@ def separation(axes, numbers, p, v):
     """Gap [m], rate of penetration, normal towards the socket, its rate, and the offset that closes the gap.
 
     p, v: offset of the ball's centre from the socket's, its rate as seen from the socket, world axes.
-    Source: Wang & Wang (2019), eqs. (19), (20), (21), (22).
     axes: of the socket, world axes.  numbers: of the contact (CONTACT_NUMBERS).
+    Source: Wang & Wang (2019), eqs. (19), (20), (21), (22).
     """
     distance, rate, normal, turning = radial(p, v)
     return numbers.clearance - distance, rate, normal, turning, p
 
 
 def stiffness(joint: ClearanceSpherical, exponent: float) -> float:
-    """K [N/m^exponent], given or of two spheres; ValueError where nothing is published."""
+    """K [N/m^exponent], given or of two spheres; ValueError where nothing is published.
+
+    Source: Wang & Wang (2019), eq. (26).
+    """
     return given_or(joint, exponent, {1.5: sphere_stiffness})
 
 
