@@ -239,8 +239,6 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     modules = reached(generated(found))
     requested = {module_of(JOINTS, n) for n in found.joints}
     requested.add("flexclear.pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
-    if "joint friction" in present:
-        requested.add("flexclear.pipeline.dynamics.joints.bearings")
     assert below(modules, ("flexclear.pipeline.dynamics.joints",)) == requested
     if not {"contact", "stops", "joint friction"} & present:
         assert below(modules, CONTACT) == set()

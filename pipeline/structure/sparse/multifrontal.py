@@ -39,11 +39,6 @@ class Factor:
     order: np.ndarray
     blocks: tuple[Block, ...]
 
-    @property
-    def entries(self) -> int:
-        """Stored numbers."""
-        return sum(block.diagonal.size + block.under.size for block in self.blocks)
-
     def smallest_pivot(self, diagonal: np.ndarray) -> float:
         """Least pivot as a fraction of the matrix' own `diagonal`, shape (n,); rounding when the matrix is singular."""
         pivots = np.concatenate([np.diag(block.diagonal) for block in self.blocks]) ** 2
