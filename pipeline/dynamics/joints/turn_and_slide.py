@@ -1,7 +1,4 @@
-"""Joints that turn about z of the first frame, slide along its axes, or do both: each by its coordinates alone.
-
-Source of the sliding joint: Wang & Wang (2019), eqs. (30), (31).
-"""
+"""Joints that turn about z of the first frame, slide along its axes, or do both: each by its coordinates alone."""
 
 from __future__ import annotations
 
@@ -46,7 +43,7 @@ def joint(*coordinates: Coordinate) -> Joint:
 
     @kernel
     def motion(w, q, u, S):
-        """Motion of frame G in frame F (see `spherical.motion`)."""
+        """Motion of frame G in frame F (see `spherical.motion`); Wang & Wang (2019), eqs. (30), (31) where it slides."""
         for k in range(6 * count):
             w[S + k] = 0.0
         for k in range(count):
