@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from flexclear.pipeline.core.numerics.rotations import axes_to_matrix, axis_to_matrix
 from flexclear.pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, given_once
-from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, check_interfaces
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
@@ -121,30 +121,22 @@ class NodeFrame(Part):
         return FRAME_ROTATION if self.axes is None else axes_to_matrix(self.axes)
 
 
-class BeamRecipe(Part):
+class BeamRecipe(BodyRecipe):
     """What all beams have.
 
     theory: of bending; Euler-Bernoulli has no rotary inertia, Rayleigh has it, Timoshenko has shear too.
     torsion, extension: degree of the twist and of the axial displacement in an element.
     pose: of the rod frame in the mesh frame.
     masses: lumped masses by name.
-    interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
-    title: what the body is, in words.  frames: named frames at nodes.
+    frames: named frames at nodes.
     """
 
-    title: str = ""
     theory: Literal["euler-bernoulli", "rayleigh", "timoshenko"] = "rayleigh"
     torsion: Literal["linear", "quadratic"] = "linear"
     extension: Literal["linear", "quadratic"] = "linear"
     pose: Pose = Pose()
     masses: dict[str, LumpedMass] = Field(default_factory=dict)
     frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
-    interfaces: tuple[str, ...] = ()
-
-    @model_validator(mode="after")
-    def _interfaces_are_frames(self) -> BeamRecipe:
-        check_interfaces(self.interfaces, self.frames)
-        return self
 
 
 class StraightBeamRecipe(BeamRecipe):

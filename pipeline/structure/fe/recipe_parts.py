@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, model_validator
 
@@ -49,10 +48,22 @@ class TurnedFrame(Part):
         return Pose(axes=self.axes, axis=self.axis)
 
 
-def check_interfaces(interfaces: tuple[str, ...], frames: Mapping[str, object]) -> None:
-    """ValueError unless every interface is a frame of the recipe, named once."""
-    for name in interfaces:
-        if name not in frames:
-            raise ValueError(f"interface '{name}' is no frame of the recipe; {suggestion(name, frames)}")
-    if len(set(interfaces)) < len(interfaces):
-        raise ValueError(f"interfaces {list(interfaces)} name a frame twice")
+class BodyRecipe(Part):
+    """What recipes of all bodies say.
+
+    title: what the body is, in words.  frames: named frames.
+    interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
+    """
+
+    title: str = ""
+    frames: Annotated[dict[str, Any], Field(min_length=1)]
+    interfaces: tuple[str, ...] = ()
+
+    @model_validator(mode="after")
+    def _interfaces_are_frames(self) -> BodyRecipe:
+        for name in self.interfaces:
+            if name not in self.frames:
+                raise ValueError(f"interface '{name}' is no frame of the recipe; {suggestion(name, self.frames)}")
+        if len(set(self.interfaces)) < len(self.interfaces):
+            raise ValueError(f"interfaces {list(self.interfaces)} name a frame twice")
+        return self

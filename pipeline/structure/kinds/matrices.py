@@ -6,7 +6,6 @@ from flexclear.pipeline.structure.fe.exchange import mesh as meshes
 from flexclear.pipeline.structure.fe.exchange.model import assemble
 from flexclear.pipeline.structure.kinds.kind import Kind
 
-
 KIND = Kind(
     build=meshes.build,
     vtu=meshes.as_vtu,

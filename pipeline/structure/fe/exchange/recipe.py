@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from flexclear.pipeline.core.scene.fields import Part
-from flexclear.pipeline.structure.fe.recipe_parts import TurnedFrame, check_interfaces
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, TurnedFrame
 
 
 class Matrices(Part):
@@ -50,18 +50,11 @@ class NodeFrame(TurnedFrame):
         return self
 
 
-class MatricesRecipe(Part):
-    """A body given by its matrices. interfaces: frames at which the body is joined to others.
+class MatricesRecipe(BodyRecipe):
+    """A body given by its matrices.
 
-    title: what the body is, in words.  shape: files of the matrices.  frames: named frames and their nodes.
+    shape: files of the matrices.  frames: named frames and their nodes.
     """
 
-    title: str = ""
     shape: Matrices
     frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
-    interfaces: tuple[str, ...] = ()
-
-    @model_validator(mode="after")
-    def _known(self) -> MatricesRecipe:
-        check_interfaces(self.interfaces, self.frames)
-        return self

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from flexclear.pipeline.core.scene.fields import Direction, Length, Part, Position
-from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, TurnedFrame, check_interfaces
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive, TurnedFrame
 
 Cells = Annotated[int, Field(ge=1, le=1000)]
 ElementName = Literal["hex8", "hex20", "hex27", "tet4", "tet10"]
@@ -141,25 +141,20 @@ class TiedFrame(TurnedFrame):
     position: Position | None = None
 
 
-class SolidRecipe(Part):
+class SolidRecipe(BodyRecipe):
     """A solid body.
 
     material: of all cells, or materials: by region.
-    interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
-    title: what the body is, in words.  shape: the solid.  materials: elastic constants and density by region.  frames:
-    named frames and their nodes.
+    shape: the solid.  materials: elastic constants and density by region.  frames: named frames and their nodes.
     """
 
-    title: str = ""
     shape: Annotated[Cylinder | Block | MeshFile, Field(discriminator="type")]
     material: Isotropic | None = None
     materials: dict[str, Isotropic] = Field(default_factory=dict)
     frames: Annotated[dict[str, TiedFrame], Field(min_length=1)]
-    interfaces: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _complete(self) -> SolidRecipe:
         if (self.material is None) == (not self.materials):
             raise ValueError("give either `material` for the whole body or `materials` by region")
-        check_interfaces(self.interfaces, self.frames)
         return self
