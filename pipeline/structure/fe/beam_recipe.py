@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.numerics.rotations import axes_to_matrix, axis_to_matrix
-from flexclear.pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, given_once
-from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive
+from flexclear.pipeline.core.scene.fields import Inertia, Length, Mass, Part, Pose, Position
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive, TurnedFrame
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
@@ -95,7 +94,7 @@ class LumpedMass(Part):
 FRAME_ROTATION = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-class NodeFrame(Part):
+class NodeFrame(TurnedFrame):
     """A named frame at a node.
 
     axes: as of a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod.
@@ -105,20 +104,7 @@ class NodeFrame(Part):
     """
 
     x: Length
-    axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
-    axis: Direction | None = None
-
-    @model_validator(mode="after")
-    def _orthogonal_axes(self) -> NodeFrame:
-        given_once(self, ("axes", "axis"))
-        self.orientation()
-        return self
-
-    def orientation(self) -> np.ndarray:
-        """Columns: x, y, z of the frame in rod axes."""
-        if self.axis is not None:
-            return axis_to_matrix(self.axis)
-        return FRAME_ROTATION if self.axes is None else axes_to_matrix(self.axes)
+    default: ClassVar[np.ndarray] = FRAME_ROTATION
 
 
 class BeamRecipe(BodyRecipe):

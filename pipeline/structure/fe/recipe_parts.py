@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Density, Direction, Number, Part, Pose, Pressure, given_once
+from flexclear.pipeline.core.numerics.rotations import axes_to_matrix, axis_to_matrix
+from flexclear.pipeline.core.scene.fields import Density, Direction, Number, Part, Pressure, given_once
 from flexclear.pipeline.core.scene.registry import suggestion
 
 Positive = Field(gt=0.0)
@@ -36,6 +38,7 @@ class TurnedFrame(Part):
 
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
     axis: Direction | None = None
+    default: ClassVar[np.ndarray] = np.eye(3)
 
     @model_validator(mode="after")
     def _orthogonal_axes(self) -> TurnedFrame:
@@ -43,9 +46,11 @@ class TurnedFrame(Part):
         self.orientation()
         return self
 
-    def orientation(self) -> Pose:
-        """The orientation as a pose at the origin."""
-        return Pose(axes=self.axes, axis=self.axis)
+    def orientation(self) -> np.ndarray:
+        """Columns: x, y, z of the frame in those of the mesh."""
+        if self.axis is not None:
+            return axis_to_matrix(self.axis)
+        return self.default if self.axes is None else axes_to_matrix(self.axes)
 
 
 class BodyRecipe(Part):
