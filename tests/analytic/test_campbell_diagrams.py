@@ -10,15 +10,15 @@ import xarray as xr
 
 from flexclear.commands.__main__ import main
 from flexclear.commands.frequencies import speeds
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics.linear.campbell import campbell
 from tests.analytic.test_unbalanced_rotors import ACROSS, ALONG, MASS, MIXED, SIDE, SLOPE, TURNS, Table, rotor
 
 
 def diagram(table: Table, at: list[float]) -> xr.Dataset:
-    return dynamics.campbell(Scene.model_validate(table), {}, silent, at)
+    return campbell(Scene.model_validate(table), {}, silent, at)
 
 
 def whirls(speed: float) -> np.ndarray:

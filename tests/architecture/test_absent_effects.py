@@ -37,7 +37,7 @@ from tests.analytic.mechanism_runs import bundles
 DYNAMICS = "flexclear.pipeline.dynamics"
 CONTACT = (
     "flexclear.pipeline.dynamics.contact",
-    "flexclear.pipeline.dynamics.joints.clearance_spherical",
+    "flexclear.pipeline.dynamics.contact.surfaces.clearance_spherical",
     "flexclear.pipeline.dynamics.integrate.contact_events",
     "flexclear.pipeline.dynamics.integrate.contact_phases",
 )
@@ -133,7 +133,7 @@ def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
     laws = {n for n in below(names, CONTACT) if re.search(r"\.(normal|friction)\.\w+$", n)}
     normal = {"flexclear.pipeline.dynamics.contact.normal.lankarani_nikravesh"}
     friction = "flexclear.pipeline.dynamics.contact.friction"
-    assert laws == normal | {f"{friction}.{n}" for n in ("modified_coulomb", "memoryless")}
+    assert laws == normal | {f"{friction}.{n}" for n in ("law", "modified_coulomb")}
     assert below(names, (*FLEXIBLE, *SINGULAR)) == set()
 
 
@@ -165,7 +165,7 @@ def reached(texts: dict[str, str]) -> set[str]:
 
 #: effect -> word that its generated source must have, modules it must reach
 EFFECTS = {
-    "contact": ("clearance_spherical", "flexclear.pipeline.dynamics.joints.clearance_spherical"),
+    "contact": ("clearance_spherical", "flexclear.pipeline.dynamics.contact.surfaces.clearance_spherical"),
     "normal law": ("import hysteretic", "flexclear.pipeline.dynamics.contact.form.hysteretic"),
     "friction": ("modified_coulomb", "flexclear.pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("flexible_bodies", "flexclear.pipeline.dynamics.bodies.flexible"),
@@ -239,10 +239,6 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     modules = reached(generated(found))
     requested = {module_of(JOINTS, n) for n in found.joints}
     requested.add("flexclear.pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
-    if "contact" in present:
-        requested.add("flexclear.pipeline.dynamics.joints.clearance_spherical")
-    if "joint friction" in present:
-        requested.add("flexclear.pipeline.dynamics.joints.bearings")
     assert below(modules, ("flexclear.pipeline.dynamics.joints",)) == requested
     if not {"contact", "stops", "joint friction"} & present:
         assert below(modules, CONTACT) == set()
