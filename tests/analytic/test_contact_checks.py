@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.analytic.mechanism_runs import impacts, run
+from tests.analytic.mechanism_runs import falls_through, impacts, run
 from tests.reference import contact_solutions as exact
 from tests.reference import sps4
 
@@ -34,19 +34,6 @@ def test_free_impact_gives_the_closed_forms_rebound_depth_and_time(restitution: 
         assert found["peak_force"] == pytest.approx([STIFFNESS * deep**1.5], rel=1e-4)
 
 
-def test_penetration_is_the_closed_forms() -> None:
-    dataset = run(BOUNCE, FREE)
-    deep = exact.largest_depth(MASS, SPEED, STIFFNESS, exact.hysteresis(0.7))
-    assert np.nanmax(dataset.event_peak_penetration) == pytest.approx(deep, rel=1e-4)
-
-
-def test_falling_ball_bounces_as_in_one_dimension() -> None:
-    found = impacts(run(BOUNCE))
-    known = exact.bounces(MASS, STIFFNESS, 0.7, 9.81, CLEARANCE, 0.99)
-    for name in ("start", "approach", "separation"):
-        assert found[name] == pytest.approx([getattr(b, name) for b in known], abs=1e-8)
-
-
 def test_falling_ball_stays_on_the_vertical() -> None:
     position = run(BOUNCE).position.sel(body="ball").values
     assert np.abs(position[:, :2]).max() <= 1e-15
@@ -58,8 +45,7 @@ def test_swing_on_the_floor_has_the_pendulums_period() -> None:
     depth = exact.resting_depth(0.36, contact.stiffness, 9.81)
     period = exact.swing_period(contact.clearance, depth, 9.81, 0.1)
     x = dataset.position.sel(body="ball", axis="x").values
-    falls = np.flatnonzero((x[:-1] > 0.0) & (x[1:] <= 0.0))
-    crossings = dataset.time.values[falls] + np.diff(dataset.time.values)[falls] * x[falls] / (x[falls] - x[falls + 1])
+    crossings = falls_through(dataset.time.values, x)
     # it chatters on the contact 2 kHz above the swing, which lightens it by its amplitude over the clearance
     assert np.diff(crossings) == pytest.approx(period, rel=1e-3)
     assert crossings[0] == pytest.approx(0.25 * period, rel=1e-3)

@@ -5,22 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.analytic.mechanism_runs import run
+from tests.analytic.mechanism_runs import of_kind, run
 from tests.reference.cantilever_contact import Pin, rod, simulate
 
 SCENE, COUNT = "checks/clearance_cantilever", 4
 PIN = Pin(0.05, 2.5e-6, 0.01, 2e-5, 5e9, 0.8, 0.1, 0.08, 1e-3, 2e-2)
 
 
-def rows(kind: str) -> np.ndarray:
-    dataset = run(SCENE)
-    return np.flatnonzero(dataset.event_kind.values == kind)
-
-
 def test_contacts_of_the_bent_rod_begin_and_end_as_those_of_its_modes() -> None:
     # the scene's eight coordinates: three pairs of bending shapes, one of torsion, one axial
     known = simulate(rod(bending=3, axial=1), PIN, 100.0, 4e-3, COUNT)
-    dataset, begun, ended = run(SCENE), rows("closing")[:COUNT], rows("opening")[:COUNT]
+    dataset = run(SCENE)
+    begun, ended = (of_kind(dataset, kind)[:COUNT] for kind in ("closing", "opening"))
     time, speed = dataset.event_time.values, dataset.event_approach_speed.values
     # the rod's slopes of 1e-4 rad turn the pin by squares that the modes leave out, and 20 um are a ten-thousandth of
     # the rod, at whose size rtol is 1e-10

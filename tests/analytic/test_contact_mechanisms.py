@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tests.analytic.mechanism_runs import TREE, run
+from tests.analytic.mechanism_runs import TREE, require_coulomb, run, tangential_force
 from tests.reference.loose_contacts import Impact, simulate
 
 #: scene -> contacts to compare, all within the scene's time
@@ -18,6 +18,7 @@ SCENES = {
     "checks/clearance_arm": 5,
     "checks/clearance_shaft": 3,
     "checks/clearance_four_bar": 2,
+    "checks/clearance_slider_crank": 3,
 }
 every_scene = pytest.mark.parametrize("scene", SCENES)
 
@@ -28,14 +29,14 @@ def known(scene: str) -> list[Impact]:
     return simulate(TREE / "scenes" / f"{scene}.toml", float(run(scene).time[-1]), count)[:count]
 
 
-def found(dataset: xr.Dataset, count: int) -> list[Impact]:
+def first(dataset: xr.Dataset, count: int) -> list[Impact]:
     """The first contacts of a run."""
-    told = list(zip(dataset.event_kind.values.tolist(), dataset.event_contact.values.tolist(), strict=True))
+    events = list(zip(dataset.event_kind.values.tolist(), dataset.event_contact.values.tolist(), strict=True))
     time, speed = dataset.event_time.values, dataset.event_approach_speed.values
     contacts = []
-    for k, (kind, name) in enumerate(told):
+    for k, (kind, name) in enumerate(events):
         if kind == "closing":
-            end = next(i for i in range(k, len(told)) if told[i] == ("opening", name))
+            end = next(i for i in range(k, len(events)) if events[i] == ("opening", name))
             contacts.append(Impact(name, time[k], speed[k], time[end], speed[end]))
         if len(contacts) == count:
             break
@@ -44,7 +45,7 @@ def found(dataset: xr.Dataset, count: int) -> list[Impact]:
 
 @every_scene
 def test_contacts_begin_and_end_when_and_as_hard_as_in_the_second_derivation(scene: str) -> None:
-    ours, theirs = found(run(scene), SCENES[scene]), known(scene)
+    ours, theirs = first(run(scene), SCENES[scene]), known(scene)
     assert len(theirs) == SCENES[scene]
     assert [i.contact for i in ours] == [i.contact for i in theirs]
     # two codes at 1e-10 and 1e-11, whose errors every impact multiplies; asked for are 5 us and 0.5 %
@@ -67,9 +68,5 @@ def test_energy_never_rises_where_nothing_drives(scene: str) -> None:
 @every_scene
 def test_friction_only_takes_and_stays_below_its_limit_at_every_output(scene: str) -> None:
     dataset = run(scene)
-    assert dataset.contact_friction_power.max() <= 0.0
-    force, normal = dataset.contact_force.values, dataset.contact_normal_force.values
-    tangential = np.sqrt(np.maximum(0.0, (force**2).sum(axis=2) - normal**2))
-    # mu_s; the difference of two squares keeps half of the digits
-    assert (tangential <= 0.15 * normal + 1e-6 * normal.max()).all()
-    assert tangential.max() > 0.05 * normal.max()
+    require_coulomb(dataset, 0.1 if scene == "checks/clearance_slider_crank" else 0.15)
+    assert tangential_force(dataset).max() > 0.05 * dataset.contact_normal_force.max()

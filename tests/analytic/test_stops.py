@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 from scipy.optimize import brentq
 
 from flexclear.pipeline.core.scene.load import load_scene
@@ -16,14 +15,6 @@ from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import TREE, impacts, run
 
 SCENE = "checks/stops"
-
-
-def impacts_of(dataset: xr.Dataset, contact: str) -> dict[str, np.ndarray]:
-    """Impacts of one end."""
-    kind = dataset.event_kind.values == "closing"
-    strong = kind & (dataset.event_approach_speed.values > 1e-4)
-    mine = dataset.event_contact.values[strong] == contact
-    return {key: values[mine] for key, values in impacts(dataset).items()}
 
 
 def test_a_slide_between_lossless_ends_repeats_itself_by_half_sines() -> None:
@@ -46,18 +37,18 @@ def test_a_slide_between_lossless_ends_repeats_itself_by_half_sines() -> None:
     known = [coordinate(t) for t in dataset.time.values]
     # six contacts at rtol 1e-10, each located to 1e-12 of the way
     assert dataset.joint_position.sel(coordinate="A").values == pytest.approx(known, abs=1e-8)
-    first = impacts_of(dataset, "A.upper")
+    first = impacts(dataset, contact="A.upper")
     assert first["start"][0] == pytest.approx(0.1, abs=1e-11)
     assert first["duration"] == pytest.approx(contact, rel=1e-7)
     assert first["peak_force"] == pytest.approx(np.sqrt(stiffness * mass), rel=1e-7)
     assert dataset.contact_impulse.sel(contact="A.lower").values[-1] == pytest.approx(
-        2.0 * mass * len(impacts_of(dataset, "A.lower")["start"]), rel=1e-7
+        2.0 * mass * len(impacts(dataset, contact="A.lower")["start"]), rel=1e-7
     )
 
 
 def test_a_linear_damper_gives_the_restitution_that_was_asked_for() -> None:
     dataset = run(SCENE)
-    found = impacts_of(dataset, "B.upper")
+    found = impacts(dataset, contact="B.upper")
     assert found["start"] == pytest.approx([0.05], abs=1e-11)
     speed = dataset.joint_velocity.sel(coordinate="B").values[-1]
     assert speed == pytest.approx(-0.6, rel=1e-7)
@@ -88,7 +79,7 @@ def test_a_linear_damper_gives_the_restitution_that_was_asked_for() -> None:
 def test_angles_reach_their_ends_beyond_a_full_turn(coordinate: str, ends: dict[str, float], speed: float) -> None:
     dataset, now, angle, velocity = run(SCENE), 0.0, 0.0, speed
     for name, limit in ends.items():
-        found = impacts_of(dataset, name)
+        found = impacts(dataset, contact=name)
         now += (limit - angle) / velocity
         # located at rtol 1e-10 of some radians
         assert found["start"][0] == pytest.approx(now, abs=1e-8)
