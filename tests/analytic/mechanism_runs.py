@@ -72,7 +72,7 @@ def falls_through(time: np.ndarray, value: np.ndarray) -> np.ndarray:
 
 
 def tangential_force(dataset: xr.Dataset) -> np.ndarray:
-    """Magnitudes of the contacts' friction forces [N], shape (time, contact), by a difference of squares: half the digits."""
+    """Magnitudes of friction [N], shape (time, contact); a difference of squares keeps half of the digits."""
     square = (dataset.contact_force.values**2).sum(axis=2) - dataset.contact_normal_force.values**2
     return np.sqrt(np.maximum(0.0, square))
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -13,6 +10,7 @@ from flexclear.commands import doctor, new
 from flexclear.commands.__main__ import main
 from flexclear.pipeline.dynamics.compile import files
 from flexclear.pipeline.post.render import gl
+from tests.processes import printed, python
 
 
 def test_the_doctor_finds_this_place_well(capsys: pytest.CaptureFixture[str]):
@@ -41,15 +39,11 @@ def test_graphics_are_well_only_where_something_was_drawn(
     assert line in capsys.readouterr().out
 
 
-def test_threads_that_somebody_asks_for_do_not_change_bytes(root: Path):
+def test_threads_that_somebody_asks_for_do_not_change_bytes():
     """Sums over several threads are added in another order; the libraries read this when they are loaded."""
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
     code = f"import os, flexclear; print([os.environ[name] for name in {names}])"
-    environment = {**os.environ, **dict.fromkeys(names, "2")}
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=root, env=environment, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "['1', '1']"
+    assert printed(code, **dict.fromkeys(names, "2")).strip() == "['1', '1']"
 
 
 def test_the_usual_kinds_are_compiled_where_no_scene_is_named(
@@ -62,13 +56,13 @@ def test_the_usual_kinds_are_compiled_where_no_scene_is_named(
     assert not (tmp_path / "results").exists()
 
 
-def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path, root: Path) -> None:
+def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path) -> None:
     """Also by the methods among which it chooses; in processes of their own, as a user has them."""
     kernels = tmp_path / "kernels"
-    environment = {**os.environ, "FLEXCLEAR_RESULTS": str(tmp_path / "results"), "FLEXCLEAR_KERNELS": str(kernels)}
+    own = {"FLEXCLEAR_RESULTS": str(tmp_path / "results"), "FLEXCLEAR_KERNELS": str(kernels)}
 
     def command(*words: str) -> None:
-        subprocess.run([sys.executable, "-m", "flexclear.commands", *words], cwd=root, env=environment, check=True)
+        python("-m", "flexclear.commands", *words, **own)
 
     def code() -> dict[Path, int]:
         return {path: path.stat().st_mtime_ns for path in kernels.rglob(f"*{files.CODE}")}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +16,7 @@ from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
 from flexclear.stages.graph import Graph
+from tests.processes import printed
 
 #: makes one equilibrium in a fresh process and prints the own modules that it loaded
 LOADED = """
@@ -93,11 +92,9 @@ def test_an_equilibrium_comes_from_the_cache_and_says_what_its_numbers_mean(root
 
 def test_every_module_that_an_equilibrium_takes_is_in_its_key(root: Path) -> None:
     path = path_of(root, "pendulum")
-    command = [sys.executable, "-c", LOADED, str(path)]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
     task = Graph(load_scene(path)).linear()
     closure = Sources(root).closure((task.run.partition(":")[0], STORE, *task.modules))
-    assert set(done.stdout.split()) <= closure.keys()
+    assert set(printed(LOADED, path).split()) <= closure.keys()
 
 
 def test_only_what_matters_is_in_the_key(root: Path) -> None:

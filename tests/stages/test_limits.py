@@ -195,8 +195,7 @@ def test_figures_need_no_home_folder(root: Path, tmp_path: Path) -> None:
     environment = {name: value for name, value in os.environ.items() if name not in removed}
     environment |= {"HOME": str(tmp_path / "file" / "home"), "FLEXCLEAR_RESULTS": str(tmp_path / "results")}
     environment |= {"FLEXCLEAR_KERNELS": str(tmp_path / "kernels")}
-    done = subprocess.run(
-        [sys.executable, "-c", DRAWN], cwd=root, env=environment, capture_output=True, text=True, check=False
-    )
+    command = [sys.executable, "-c", DRAWN]
+    done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=False)
     assert done.stdout == "[]\n", done.stderr
     assert list((tmp_path / "results").glob("cache/*/*.json"))

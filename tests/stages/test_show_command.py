@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +16,7 @@ from flexclear.pipeline.post.render import gl, surfaces
 from flexclear.pipeline.post.render.ruler import pixels_per_metre, project, round_length
 from flexclear.pipeline.post.render.start_picture import columns, heights
 from flexclear.pipeline.post.render.start_view import AXIS, page_view
+from tests.processes import printed
 
 SCENES = sorted(
     path.relative_to(TREE).as_posix()
@@ -49,7 +48,7 @@ def test_nothing_that_compiles_is_imported(root: Path):
         "assert not {'numba', 'llvmlite'} & set(sys.modules), 'something that compiles was imported'"
     )
     scenes = (str(root / name) for name in ("scenes/sps4/csj.toml", "stages/templates/slider_crank/slider_crank.toml"))
-    subprocess.run([sys.executable, "-c", program, *scenes], check=True)
+    printed(program, *scenes)
 
 
 def test_a_loop_that_does_not_close_is_a_gap_of_its_length(root: Path):
