@@ -15,10 +15,9 @@ from flexclear.pipeline.core.system import machine
 
 
 @pytest.fixture
-def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh: Path) -> Store:
     monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path / "kernels"))
-    return Store(tmp_path / "results")
+    return Store(fresh)
 
 
 def put(store: Store, letter: str, stage: str = "simulate", **facts: str) -> Record:

@@ -115,11 +115,6 @@ def test_the_answer_names_its_cost_its_error_and_the_next_digit(study: cost.Stud
     assert not np.isnan(found.own_error).any()
 
 
-def test_a_scene_without_a_quantity_is_refused(root: Path):
-    with pytest.raises(InputError, match=r"did you mean 'platform\.position'"):
-        load_scene(root / "scenes" / "sps4" / "csj.toml", {"accuracy": {"platform.positon": "1 um"}})
-
-
 TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"bob.position": [1e-6, 1e-7]}}
 
 

@@ -47,13 +47,12 @@ def test_threads_that_somebody_asks_for_do_not_change_bytes():
 
 
 def test_the_usual_kinds_are_compiled_where_no_scene_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, fresh: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     monkeypatch.setattr(doctor, "USUAL", ("pendulum",))
     assert main(["doctor", "--compile"]) == 0
     assert "compiled: all that runs of pendulum call" in capsys.readouterr().out
-    assert not (tmp_path / "results").exists()
+    assert not (fresh).exists()
 
 
 def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path) -> None:

@@ -59,10 +59,9 @@ def test_limits_of_the_scene_take_the_place_of_the_machines(tmp_path: Path, monk
 
 
 def test_rows_and_members_are_limits_that_a_scene_may_raise(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]
 ):
     """What is asked for is right, but too much: exit code 4, as for parts, cells and modes."""
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     path = written(tmp_path, SCENE + JOINT)
     for place, value, told in (
         ("output.interval", "1e-12 s", "more than the 10000000 that limits.rows allows"),

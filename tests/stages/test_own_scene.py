@@ -80,21 +80,17 @@ def test_nothing_that_the_project_ships_is_doubted(path: Path):
 
 @pytest.mark.parametrize("command", ["check", "show", "why"])
 def test_a_value_of_the_command_line_is_doubted_where_it_is_given(
-    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, fresh: Path
 ):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     monkeypatch.chdir(tmp_path)
     scene, _ = write("slider-crank", tmp_path)
     assert main([command, str(scene), "--set", "joint.pin.clearance=0.2"]) == 0
     assert "warning: --set joint.pin.clearance: 200 mm is more than the pin's radius, 10 mm" in capsys.readouterr().err
 
 
-def test_a_run_from_python_prints_plausibility_warnings(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-):
+def test_a_run_from_python_prints_plausibility_warnings(capsys: pytest.CaptureFixture[str], fresh: Path):
     import flexclear as fc
 
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     scene = fc.load_scene("scenes/checks/pendulum.toml", override={"output.interval": 50.0})
     run = fc.run(scene)
     assert "[output.interval], line" in capsys.readouterr().err
@@ -105,16 +101,15 @@ def test_a_run_from_python_prints_plausibility_warnings(
 
 
 def test_run_looks_first_and_computes_nothing_for_a_mistyped_frame(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], fresh: Path
 ):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     scene, _ = write("slider-crank", tmp_path / "own")
     scene.write_text(scene.read_text().replace('"rod.small_end"', '"rod.smal_end"'))
     assert main(["run", str(scene)]) == 2
     said = capsys.readouterr().err
     assert "[joint.wrist.between], line" in said
     assert "did you mean 'small_end'?" in said
-    assert not (tmp_path / "results").exists()
+    assert not fresh.exists()
 
 
 def test_mistakes_of_several_files_are_told_together_and_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -289,9 +284,8 @@ STRAY = {
 
 @pytest.mark.parametrize("case", STRAY)
 def test_a_file_that_a_command_does_not_take_is_named_with_the_command_that_does(
-    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    case: str, tmp_path: Path, fresh: Path, capsys: pytest.CaptureFixture[str]
 ):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     write("slider-crank", tmp_path)
     (tmp_path / "many.toml").write_text(SWEEP)
     command, name, said, hint = STRAY[case]
@@ -331,10 +325,7 @@ def test_the_sweeps_of_the_project_have_no_mistake(name: str, capsys: pytest.Cap
     assert "no error" in capsys.readouterr().out
 
 
-def test_results_are_printed_as_json_for_scripts(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+def test_results_are_printed_as_json_for_scripts(capsys: pytest.CaptureFixture[str], fresh: Path):
     assert main(["why", "checks/pendulum", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {
         "checks/pendulum": {"simulate": ["never run"], "post": ["never run"]}
@@ -380,9 +371,8 @@ MISSING = "nothing uses the frames 'a.end' and 'b.start', which start at the sam
 
 
 def test_check_and_run_warn_of_a_forgotten_joint(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, fresh: Path
 ):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "two.toml").write_text(TWO_BODIES)
     assert main(["check", "two.toml"]) == 0
