@@ -17,7 +17,7 @@ from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE
 from tests.analytic.beam_solutions import PAPER_ROD
-from tests.analytic.clouds import Cloud, same_integrals
+from tests.analytic.clouds import Cloud, same_energy, same_integrals
 
 ELEMENTS = 4
 START, END = (0.02, 0.013), (0.012, 0.01)
@@ -105,6 +105,10 @@ def body(request: pytest.FixtureRequest) -> tuple[xr.Dataset, Cloud]:
 
 def test_integrals_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
     same_integrals(*body, PAPER_ROD.length)
+
+
+def test_kinetic_energy_of_any_motion_is_that_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
+    same_energy(*body)
 
 
 def test_modal_mass_is_one(body: tuple[xr.Dataset, Cloud]) -> None:

@@ -7,48 +7,37 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.schema import Scene
+from tests.properties.mechanisms import Table, joint, rigid, simulate
 
 #: radius of the swing [m] and its rate [rad/s]; the period is 2 pi s
 SWING, RATE = 1.0, 1.0
 
 
-def scene(clearance: float, phase: float, solver: dict[str, Any]) -> Scene:
+def scene(clearance: float, phase: float, solver: dict[str, Any]) -> Table:
     """A ball on a spring along x, let go inside the socket at a phase of its swing, until it is back there."""
-    return Scene.model_validate(
-        {
-            "title": "sprung ball",
-            "time": {"end": 2.0 * np.pi / RATE},
-            "output": {"interval": 10.0},
-            "solver": {**solver, "ledger_tolerance": 1.0},  # loose on purpose
-            "body": {
-                "ground": {
-                    "type": "ground",
-                    "frames": {"socket": {}, "rail": {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}},
-                },
-                "ball": {
-                    "type": "rigid",
-                    "mass": 1.0,
-                    "inertia": [0.1, 0.1, 0.1],
-                    "pose": {"position": [SWING * np.sin(phase), 0.0, 0.0]},
-                    "velocity": [SWING * RATE * np.cos(phase), 0.0, 0.0],
-                    "frames": {"centre": {}, "rail": {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}},
-                },
-            },
-            "joint": {
-                "rail": {"type": "prismatic", "between": ["ground.rail", "ball.rail"]},
-                "contact": {
-                    "type": "clearance-spherical",
-                    "between": ["ground.socket", "ball.centre"],
-                    "clearance": clearance,
-                    "ball_radius": 0.5,
-                    "normal": {"law": "hertz", "stiffness": 1e6},
-                },
-            },
-            "load": {"spring": {"type": "joint-spring", "joint": "rail", "stiffness": RATE**2}},
-        }
-    )
+    along = {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}
+    start = {
+        "pose": {"position": [SWING * np.sin(phase), 0.0, 0.0]},
+        "velocity": [SWING * RATE * np.cos(phase), 0.0, 0.0],
+    }
+    contact = {
+        **joint("clearance-spherical", "ground.socket", "ball.centre"),
+        "clearance": clearance,
+        "ball_radius": 0.5,
+        "normal": {"law": "hertz", "stiffness": 1e6},
+    }
+    return {
+        "title": "sprung ball",
+        "time": {"end": 2.0 * np.pi / RATE},
+        "output": {"interval": 10.0},
+        "solver": {**solver, "ledger_tolerance": 1.0},  # loose on purpose
+        "body": {
+            "ground": {"type": "ground", "frames": {"socket": {}, "rail": along}},
+            "ball": rigid(1.0, 0.1, {"centre": {}, "rail": along}, **start),
+        },
+        "joint": {"rail": joint("prismatic", "ground.rail", "ball.rail"), "contact": contact},
+        "load": {"spring": {"type": "joint-spring", "joint": "rail", "stiffness": RATE**2}},
+    }
 
 
 @pytest.mark.parametrize("clearance", [0.9, 0.97, 0.995])
@@ -58,7 +47,7 @@ def scene(clearance: float, phase: float, solver: dict[str, Any]) -> Scene:
 )
 def test_the_first_touch_is_found_at_any_tolerance(clearance: float, phase: float, solver: dict[str, Any]) -> None:
     """Steps of order 8 at loose tolerances are longer than the swing takes to and from the wall."""
-    run = dynamics.simulate(scene(clearance, phase, solver), {}, lambda fraction, text: None)
+    run = simulate(scene(clearance, phase, solver))
     touch = (np.arcsin(clearance / SWING) - phase) / RATE
     assert len(run.event_time) > 0
     # the error of a step is rtol of the swing, and the ball meets the wall at sqrt(1 - c^2) of its largest speed
@@ -73,13 +62,13 @@ def test_the_first_touch_is_found_in_a_step_of_many_clearances(clearance: float,
     gravity, below = 10.0, 0.3 * clearance
     up = np.sqrt(2.0 * gravity * (1.02 * clearance + below))
     touch = (up - np.sqrt(up**2 - 2.0 * gravity * (clearance + below))) / gravity
-    parts = scene(clearance, 0.0, solver).model_dump(exclude_unset=True)
+    parts = scene(clearance, 0.0, solver)
     del parts["joint"]["rail"]
     parts["load"] = {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -gravity]}}
     parts["body"]["ground"]["frames"]["socket"] = {"position": [3.0, 0.0, 0.0]}
     parts["body"]["ball"] |= {"pose": {"position": [3.0, 0.0, -below]}, "velocity": [0.0, 0.0, up]}
     parts["time"] = {"end": 1000.0 * touch}  # the first step may be that long
-    run = dynamics.simulate(Scene.model_validate(parts), {}, lambda fraction, text: None)
+    run = simulate(parts)
     # every method integrates a parabola exactly, and the ball stays exactly 3 m away: left are the root, to 1e-12
     # of the clearance, and the rounding of differences where the ball has an eighth of its speed left
     assert float(run.event_time[0]) == pytest.approx(touch, rel=1e-8)
