@@ -99,3 +99,12 @@ def platform_deviations(scene: str, ideal: str) -> tuple[float, float, float]:
     tilt = [np.arcsin(quaternion_to_matrix(d["quaternion"].values)[:, 0, 2]) for d in (tight, other)]
     place, speed = (np.abs(other[name].values - tight[name].values).max() for name in ("position", "velocity"))
     return float(np.abs(tilt[0] - tilt[1]).max()), float(place), float(speed)
+
+
+@cache
+def frequencies(name: str, overrides: Overrides = (), time: float | None = None, *, moving: bool = False) -> xr.Dataset:
+    """The equilibrium and the natural vibrations of a scene; overrides as of runs."""
+    from flexclear.pipeline import dynamics
+
+    scene = load_scene(TREE / "scenes" / f"{name}.toml", override=dict(overrides))
+    return dynamics.frequencies(scene, bundles(scene), silent, time, None, moving)

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from tests.analytic.mechanism_runs import TREE, require_coulomb, run, tangential_force
+from tests.analytic.mechanism_runs import TREE, of_kind, require_coulomb, run, tangential_force
+from tests.reference.cantilever_contact import Pin, rod
+from tests.reference.cantilever_contact import simulate as modal_contacts
 from tests.reference.loose_contacts import Impact, simulate
 
 #: scene -> contacts to compare, all within the scene's time
@@ -70,3 +72,71 @@ def test_friction_only_takes_and_stays_below_its_limit_at_every_output(scene: st
     dataset = run(scene)
     require_coulomb(dataset, 0.1 if scene == "checks/clearance_slider_crank" else 0.15)
     assert tangential_force(dataset).max() > 0.05 * dataset.contact_normal_force.max()
+
+
+# A clearance pin at 5000 rpm: planar motion in space, energy, momentum ----------------------------------------------
+
+SLIDER_CRANK = "checks/clearance_slider_crank"
+#: three impacts that end, and the begin of a fourth
+BRIEFLY = (("time.end", "1 ms"), ("output.interval", "1 us"))
+
+
+def test_pin_stays_in_the_plane_of_its_journal() -> None:
+    dataset = run(SLIDER_CRANK, BRIEFLY)
+    # the closure's tolerance is rtol 1e-10 of a mechanism of 0.2 m; recorded states are a thousand times closer
+    assert np.abs(dataset.contact_offset.values[..., 2]).max() <= 1e-12
+    assert np.abs(dataset.position.values[..., 2]).max() <= 1e-10
+
+
+def test_ledger_of_the_slider_crank_closes() -> None:
+    dataset = run(SLIDER_CRANK, BRIEFLY)
+    assert np.abs(dataset.energy_error).max() <= 1e-9 * dataset.kinetic.max()
+    lost = dataset.contact_damping_loss + dataset.contact_friction_loss
+    assert lost[-1, 0] == pytest.approx(float(dataset.dissipated[-1]), rel=1e-12)
+    assert (dataset.contact_friction_loss.diff("time") >= 0.0).all()
+
+
+def test_impulse_of_the_contact_is_the_change_of_the_cranks_angular_momentum() -> None:
+    """Nothing but the pin has a moment about the main bearing's axis."""
+    dataset = run(SLIDER_CRANK, BRIEFLY)
+    spin = 0.02 * dataset.angular_velocity.sel(body="crank", axis="z").values
+    # the pin is the joint's second frame: force and moment on the crank, there
+    pin = dataset.frame_position.sel(frame="crank.pin").values
+    force, moment = (dataset[n].sel(joint="pin").values for n in ("joint_force", "joint_moment"))
+    about_axis = moment[:, 2] + pin[:, 0] * force[:, 1] - pin[:, 1] * force[:, 0]
+    time = dataset.time.values
+    impulse = float(np.sum(0.5 * (about_axis[1:] + about_axis[:-1]) * np.diff(time)))
+    # trapezia of 1 us on pulses of 100 us and more
+    assert spin[-1] - spin[0] == pytest.approx(impulse, rel=1e-4)
+    assert abs(impulse) > 1e-3
+
+
+def test_contact_that_is_too_large_for_hertz_is_said() -> None:
+    assert "holds below 0.3" in run(SLIDER_CRANK, BRIEFLY).attrs["warnings"]
+
+
+# A pin on a flexible body in a journal, against modes of separately written beam elements ---------------------------
+
+CANTILEVER, COUNT = "checks/clearance_cantilever", 4
+PIN = Pin(0.05, 2.5e-6, 0.01, 2e-5, 5e9, 0.8, 0.1, 0.08, 1e-3, 2e-2)
+
+
+def test_contacts_of_the_bent_rod_begin_and_end_as_those_of_its_modes() -> None:
+    # the scene's eight coordinates: three pairs of bending shapes, one of torsion, one axial
+    known = modal_contacts(rod(bending=3, axial=1), PIN, 100.0, 4e-3, COUNT)
+    dataset = run(CANTILEVER)
+    begun, ended = (of_kind(dataset, kind)[:COUNT] for kind in ("closing", "opening"))
+    time, speed = dataset.event_time.values, dataset.event_approach_speed.values
+    # the rod's slopes of 1e-4 rad turn the pin by squares that the modes leave out, and 20 um are a ten-thousandth of
+    # the rod, at whose size rtol is 1e-10
+    assert time[begun] == pytest.approx([k[0] for k in known], abs=1e-9)
+    assert time[ended] == pytest.approx([k[2] for k in known], abs=1e-9)
+    assert speed[begun] == pytest.approx([k[1] for k in known], rel=1e-6)
+    assert speed[ended] == pytest.approx([k[3] for k in known], rel=5e-6)
+
+
+def test_energy_of_the_bent_rod_only_falls() -> None:
+    dataset = run(CANTILEVER)
+    energy = (dataset.kinetic + dataset.potential + dataset.elastic).values
+    assert np.diff(energy).max() <= 1e-7 * dataset.kinetic.max()  # the pin's place is known to 1e-7 of the clearance
+    assert energy[0] - energy[-1] > 0.1 * dataset.kinetic.max()
