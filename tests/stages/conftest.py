@@ -13,10 +13,11 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
+from flexclear.commands.__main__ import main
 from flexclear.stages.sweeps import sweep_engine
 from tests.processes import copied
 
@@ -204,6 +205,30 @@ def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder of results."""
     monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     return tmp_path / "results"
+
+
+class Printed(NamedTuple):
+    out: str
+    err: str
+
+
+Command = Callable[..., Printed]
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str]) -> Command:
+    """Run the command in this process, which has to end with the code; what it printed."""
+
+    def run(*arguments: str | Path, code: int = 0) -> Printed:
+        try:
+            ended = main([str(argument) for argument in arguments])
+        except SystemExit as end:
+            ended = int(end.code or 0)
+        printed = Printed(*capsys.readouterr())
+        assert ended == code, printed.err
+        return printed
+
+    return run
 
 
 @pytest.fixture

@@ -7,36 +7,33 @@ from pathlib import Path
 import pytest
 
 from flexclear.commands import doctor, new
-from flexclear.commands.__main__ import main
 from flexclear.pipeline.dynamics.compile import files
 from flexclear.pipeline.post.render import gl
 from tests.processes import printed, python
+from tests.stages.conftest import Command
 
 
-def test_the_doctor_finds_this_place_well(capsys: pytest.CaptureFixture[str]):
-    assert main(["doctor"]) == 0
-    told = capsys.readouterr().out
+def test_the_doctor_finds_this_place_well(command: Command):
+    told = command("doctor").out
     assert "WRONG" not in told
     assert "a free fall of 0.1 s ends at -0.04905 m" in told
 
 
-def test_the_doctor_says_what_is_wrong(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+def test_the_doctor_says_what_is_wrong(command: Command, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(doctor, "_self_test", lambda: ("it fell upwards", False))
-    assert main(["doctor"]) == 4
-    told = capsys.readouterr()
+    told = command("doctor", code=4)
     assert "WRONG  self-test  it fell upwards" in told.out
     assert "not well: self-test" in told.err
 
 
 @pytest.mark.parametrize("draws, line", [(True, "ok     graphics"), (False, "lacks  graphics")])
 def test_graphics_are_well_only_where_something_was_drawn(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, draws: bool, line: str
+    command: Command, monkeypatch: pytest.MonkeyPatch, draws: bool, line: str
 ):
     """Libraries that load may fail when they draw; they are not needed, so that the machine is well without them."""
     monkeypatch.setattr(gl, "works", lambda: draws)
     monkeypatch.setattr(gl, "state", lambda: "GL: libGL.so.1")
-    assert main(["doctor"]) == 0
-    assert line in capsys.readouterr().out
+    assert line in command("doctor").out
 
 
 def test_threads_that_somebody_asks_for_do_not_change_bytes():
@@ -47,11 +44,10 @@ def test_threads_that_somebody_asks_for_do_not_change_bytes():
 
 
 def test_the_usual_kinds_are_compiled_where_no_scene_is_named(
-    monkeypatch: pytest.MonkeyPatch, fresh: Path, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, fresh: Path, command: Command
 ) -> None:
     monkeypatch.setattr(doctor, "USUAL", ("pendulum",))
-    assert main(["doctor", "--compile"]) == 0
-    assert "compiled: all that runs of pendulum call" in capsys.readouterr().out
+    assert "compiled: all that runs of pendulum call" in command("doctor", "--compile").out
     assert not (fresh).exists()
 
 
@@ -74,11 +70,8 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path) -> 
     assert code() == before
 
 
-def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["doctor", "--compile", str(tmp_path / "none.toml")]) == 2
-    assert "none.toml" in capsys.readouterr().err
+def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(tmp_path: Path, command: Command) -> None:
+    assert "none.toml" in command("doctor", "--compile", tmp_path / "none.toml", code=2).err
 
 
 @pytest.mark.parametrize(
@@ -89,6 +82,5 @@ def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(
         (("--out", "x.zip"), "--bundle writes, which is not given"),
     ],
 )
-def test_out_is_a_bundle_or_refused(options: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["doctor", *options]) == 2
-    assert words in capsys.readouterr().err
+def test_out_is_a_bundle_or_refused(options: tuple[str, ...], words: str, command: Command) -> None:
+    assert words in command("doctor", *options, code=2).err
