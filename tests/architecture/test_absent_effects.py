@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
@@ -33,6 +31,7 @@ from flexclear.pipeline.dynamics.effects.effect import PACKAGE
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import bundles
+from tests.processes import printed
 
 DYNAMICS = "flexclear.pipeline.dynamics"
 CONTACT = (
@@ -83,9 +82,7 @@ def path_of(root: Path, scene: str) -> Path:
 
 
 def imported_by_a_run(root: Path, scene: str) -> set[str]:
-    command = [sys.executable, "-c", RUN, str(path_of(root, scene))]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    return set(done.stdout.split())
+    return set(printed(RUN, path_of(root, scene)).split())
 
 
 def below(names: set[str], families: tuple[str, ...]) -> set[str]:
@@ -105,8 +102,7 @@ def code_of_effects(names: set[str]) -> set[str]:
 
 def test_declarations_of_effects_are_read_without_their_code() -> None:
     text = "import sys; from flexclear.pipeline.dynamics import effects; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
-    names = set(done.stdout.split())
+    names = set(printed(text).split())
     assert {f"{PACKAGE}.{effect.name}.effect" for effect in DECLARED} <= names
     assert code_of_effects(names) == set()
     assert below(names, ("numba", f"{DYNAMICS}.kernels", f"{DYNAMICS}.memory")) == set()
@@ -139,9 +135,7 @@ def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
 
 def test_parts_are_built_with_their_scene_and_not_one_by_one(root: Path) -> None:
     """But for those that stand as defaults in others: to build all seventy takes as long as to import NumPy."""
-    command = [sys.executable, "-c", BUILT, str(path_of(root, CSJ))]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    number, *built = done.stdout.split()
+    number, *built = printed(BUILT, path_of(root, CSJ)).split()
     assert int(number) > 70
     assert set(built) == {"Scene", "Limits", "Output", "PlainIntegrator", "Pose"}
 
@@ -409,7 +403,4 @@ def test_two_topologies_from_the_disk_cache_keep_their_own_code(root: Path, orde
     """Numba names symbols by a counter of each process; the loader takes the first of two that are named alike."""
     paths = [str(path_of(root, name)) for name in order]
     for scenes in ([paths[0]], [paths[1]], paths):  # each compiled by a process of its own, if at all
-        done = subprocess.run(
-            [sys.executable, "-c", BOTH, *scenes], cwd=root, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr[-500:]
+        printed(BOTH, *scenes)

@@ -96,21 +96,13 @@ def test_every_normal_law_is_tried_here() -> None:
 
 @every_law
 @given(stiffness=STIFF, exponent=EXPONENT, depth=DEPTH, rate=RATE, impact=IMPACT)
-def test_normal_force_never_pulls(
+def test_normal_force_never_pulls_and_damping_never_feeds_energy(
     law: Law, stiffness: float, exponent: float, depth: float, rate: float, impact: float
 ) -> None:
     """However fast the surfaces part, far faster than they met included."""
     elastic, damping = Law(law.name, law.restitution, stiffness, exponent).parts(depth, rate, impact)
     assert damping >= -elastic
-
-
-@every_law
-@given(stiffness=STIFF, exponent=EXPONENT, depth=DEPTH, rate=RATE, impact=IMPACT)
-def test_damping_never_feeds_energy(
-    law: Law, stiffness: float, exponent: float, depth: float, rate: float, impact: float
-) -> None:
-    tried = Law(law.name, law.restitution, stiffness, exponent)
-    assert tried.parts(depth, rate, impact)[1] * rate >= 0.0
+    assert damping * rate >= 0.0
 
 
 @pytest.mark.parametrize("law", [law for law in laws() if law.name != "kelvin-voigt"], ids=called)

@@ -6,7 +6,6 @@ import ast
 import datetime
 import json
 import re
-import shutil
 from pathlib import Path
 
 import pytest
@@ -29,6 +28,7 @@ from flexclear.pipeline.core.workflow.fingerprint import (
 from flexclear.pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
 from flexclear.stages import derived_series, simulation
 from flexclear.stages.graph import Graph
+from tests.processes import copied
 
 LEAVES = (
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=4)
@@ -175,11 +175,9 @@ def sources(root: Path) -> Sources:
 
 
 @pytest.fixture
-def copy(root: Path, tmp_path: Path) -> Path:
+def copy(tmp_path: Path) -> Path:
     """Source and scenes, to be edited."""
-    for name in ("flexclear", "papers", "pipeline", "stages", "scenes", "meshes"):
-        shutil.copytree(root / name, tmp_path / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
-    return tmp_path
+    return copied(tmp_path, "scenes", "meshes")
 
 
 RERUN = {

@@ -19,12 +19,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
@@ -38,9 +38,6 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: the motion is examined so often
 BOUND_TIMES = 32
