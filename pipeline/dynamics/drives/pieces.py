@@ -12,7 +12,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from math import comb, inf, perm, pi, sin
 
 import numpy as np
@@ -39,6 +39,20 @@ class Piece:
         d, c = start - self.start, self.coefficients
         shifted = tuple(sum(comb(n, k) * c[n] * d ** (n - k) for n in range(k, len(c))) for k in range(len(c)))
         return Piece(start, shifted, tuple((a, w, phase + w * d) for a, w, phase in self.terms))
+
+    def later(self, delay: float) -> Piece:
+        """The same course, from a later time on."""
+        return Piece(self.start + delay, self.coefficients, self.terms)
+
+    def times(self, factor: float) -> Piece:
+        """The function multiplied by a factor."""
+        terms = tuple((factor * size, w, phase) for size, w, phase in self.terms)
+        return Piece(self.start, tuple(factor * c for c in self.coefficients), terms)
+
+    def plus(self, other: Piece) -> Piece:
+        """The sum of two functions, both written from the same time on."""
+        pairs = zip_longest(self.coefficients, other.coefficients, fillvalue=0.0)
+        return Piece(self.start, tuple(a + b for a, b in pairs), self.terms + other.terms)
 
     def value(self, t: float, order: int = 0) -> float:
         """A derivative at time t."""
@@ -76,15 +90,7 @@ class Pieces:
 
     def times(self, factor: float) -> Pieces:
         """The law multiplied by a factor."""
-        scaled = (
-            Piece(
-                p.start,
-                tuple(factor * c for c in p.coefficients),
-                tuple((factor * a, w, phase) for a, w, phase in p.terms),
-            )
-            for p in self.pieces
-        )
-        return Pieces(tuple(scaled), self.span)
+        return Pieces(tuple(p.times(factor) for p in self.pieces), self.span)
 
     def table(self) -> tuple[np.ndarray, list[Terms]]:
         """Rows (start, eight coefficients), shape (n, 9), and the harmonics of each piece."""

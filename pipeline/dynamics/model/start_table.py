@@ -70,23 +70,14 @@ def _measure(value: float | str | None, dimension: str, path: str) -> float | No
         raise InputError(path, str(error)) from None
 
 
-def given_modes(scene: Scene, bundles: Mapping[str, Labelled]) -> dict[str, np.ndarray]:
-    """Modal coordinates at the start of the flexible bodies that the scene gives some, [m], shape (mode,).
+def given_modes(scene: Scene, bundles: Mapping[str, Labelled], key: str = "coordinate") -> dict[str, np.ndarray]:
+    """Modal coordinates [m], or by another key velocities [m/s], of the bodies that the scene gives some; (mode,).
 
     Raises InputError for bodies that are not flexible, and for more numbers than modes.
     """
     given = scene.start.modal if scene.start is not None else {}
-    return {name: _padded(scene, bundles, name, "coordinate", start.coordinate) for name, start in given.items()}
-
-
-def given_modal_velocities(scene: Scene, bundles: Mapping[str, Labelled]) -> dict[str, np.ndarray]:
-    """The same for their rates [m/s], of the bodies that the scene gives some."""
-    given = scene.start.modal if scene.start is not None else {}
-    return {
-        name: _padded(scene, bundles, name, "velocity", start.velocity)
-        for name, start in given.items()
-        if start.velocity is not None
-    }
+    values = {name: getattr(start, key) for name, start in given.items()}
+    return {name: _padded(scene, bundles, name, key, one) for name, one in values.items() if one is not None}
 
 
 def _padded(
