@@ -10,10 +10,9 @@ import numpy as np
 
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import coordinate_of
+from flexclear.pipeline.dynamics.model.driving import coordinate_of, measured
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
@@ -52,7 +51,7 @@ def given_coordinates(scene: Scene) -> list[Given]:
             _, number, coordinate = coordinate_of(scene, joint, name or None, path)
             rate = "angular velocity" if coordinate.turning else "velocity"
             values = [
-                _measure(getattr(start, key), dimension, f"{path[:-1]}.{key}]")
+                None if getattr(start, key) is None else measured(getattr(start, key), dimension, f"{path[:-1]}.{key}]")
                 for key, dimension in (
                     ("position", coordinate.dimension),
                     ("near", coordinate.dimension),
@@ -61,13 +60,6 @@ def given_coordinates(scene: Scene) -> list[Given]:
             ]
             rows.append(Given(joint, number, coordinate, path, *values))
     return rows
-
-
-def _measure(value: float | str | None, dimension: str, path: str) -> float | None:
-    try:
-        return None if value is None else quantity(value, dimension)
-    except ValueError as error:
-        raise InputError(path, str(error)) from None
 
 
 def given_modes(scene: Scene, bundles: Mapping[str, Labelled], key: str = "coordinate") -> dict[str, np.ndarray]:
