@@ -13,8 +13,8 @@ import xarray as xr
 
 from flexclear.commands import scenes
 from flexclear.commands.__main__ import main
-from flexclear.commands.as_json import as_json
 from flexclear.commands.check import examined
+from flexclear.commands.export import as_json
 from flexclear.commands.new import KINDS, TEMPLATES, write
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene import lines
