@@ -158,9 +158,9 @@ def keys(graph: Graph, sources: Sources) -> dict[str, str]:
     """Key of each task when every input is as its own key says: no stage is run for that."""
     found: dict[int, str] = {}
     for task in in_order(graph.up_to("post")):
-        above = {name: found[id(t)] for name, t in task.inputs.items()}
-        found[id(task)] = key(facts(task, above, sources))
-    return {task.label: found[id(task)] for task in in_order(graph.up_to("post"))}
+        above = {name: found[t] for name, t in task.inputs.items()}
+        found[task] = key(facts(task, above, sources))
+    return {task.label: found[task] for task in in_order(graph.up_to("post"))}
 
 
 def changed(before: dict[str, str], after: dict[str, str]) -> set[str]:

@@ -247,7 +247,16 @@ def _arrays(left: Handover | None) -> Iterator[np.ndarray]:
     if left is None:
         return
     here = left.here
-    yield from (here.y, here.modes, here.latched, here.watched, left.counters, left.lasting, left.tape.rows, here.events)
+    yield from (
+        here.y,
+        here.modes,
+        here.latched,
+        here.watched,
+        left.counters,
+        left.lasting,
+        left.tape.rows,
+        here.events,
+    )
     for time, rows in left.tape.selections:
         yield np.array([time])
         yield rows
