@@ -112,7 +112,7 @@ def test_a_run_imports_the_code_of_no_effect_that_its_scene_lacks(root: Path) ->
     """But for what contacts and closures may be: ends of stops, and gears."""
     kinds = {"stops.model", "gears.model"}
     assert code_of_effects(imported_by_a_run(root, IDEAL)) == kinds
-    assert code_of_effects(imported_by_a_run(root, "checks/bushing")) == {*kinds, "bushings.run"}
+    assert code_of_effects(imported_by_a_run(root, "checks/bushing")) == {*kinds, "bushings.bushing", "bushings.run"}
 
 
 def test_every_function_that_a_declaration_names_is_there() -> None:

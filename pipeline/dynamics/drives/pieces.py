@@ -8,7 +8,7 @@ start of a piece, where integration stops and starts anew.
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -79,14 +79,13 @@ class Pieces:
         """Whether a piece has more than a polynomial."""
         return any(p.terms for p in self.pieces)
 
-    def at(self, t: float, side: str = "right") -> Piece:
-        """The piece that holds just right (or left) of t."""
-        before = bisect_right if side == "right" else bisect_left
-        return self.pieces[max(before(self.starts, t) - 1, 0)]
+    def at(self, t: float) -> Piece:
+        """The piece that holds at t, of two that meet there the later."""
+        return self.pieces[max(bisect_right(self.starts, t) - 1, 0)]
 
-    def value(self, t: float, order: int = 0, side: str = "right") -> float:
-        """A derivative at t, from its right or its left."""
-        return self.at(t, side).value(t, order)
+    def value(self, t: float, order: int = 0) -> float:
+        """A derivative at t."""
+        return self.at(t).value(t, order)
 
     def times(self, factor: float) -> Pieces:
         """The law multiplied by a factor."""
