@@ -10,7 +10,10 @@ from pathlib import Path
 import grimp
 import pytest
 
+from flexclear.pipeline.dynamics import loads
+
 DYNAMICS = "flexclear.pipeline.dynamics"
+LOADS = {name.rpartition(".")[2] for name in loads.NAMES.values() if name.startswith(".effects.")}
 Arrows = set[tuple[str, str]]
 
 
@@ -26,16 +29,15 @@ def drawn(root: Path) -> Arrows:
     return set(re.findall(r"^ +(\w+) --> (\w+)$", chart[1], re.MULTILINE))
 
 
-#: modules of effects that are parts of a family, or of its parts
-FAMILIES = {"bushing": "loads", "pid": "loads", "sampled_pid": "loads", "bearings": "joints"}
-
-
 def drawn_as(module: str) -> str:
-    """The folder or module of the tower; for a module of an effect, but its declaration, the one it is called like."""
+    """The folder or module of the tower; for a module of an effect, but its declaration, the one whose name it has.
+
+    Loads that come with an effect have the names of their types; tables that several of its modules read are its own.
+    """
     parts = module.split(".")[3:]
-    if parts[0] == "effects" and len(parts) > 2 and parts[2] != "effect":
-        return FAMILIES.get(parts[2], parts[2])
-    return parts[0]
+    if parts[0] != "effects" or len(parts) < 3 or parts[2] in ("effect", "bearings"):
+        return parts[0]
+    return "loads" if parts[2] in LOADS else parts[2]
 
 
 def imports() -> Arrows:
