@@ -23,10 +23,10 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.driving import prescribed
-from flexclear.pipeline.dynamics.run.displacement import askew
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
 from flexclear.pipeline.dynamics.run.pieces import Handover, Moment, Tape
+from flexclear.pipeline.dynamics.run.states import askew, rows_of
 from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, integrate
 
 #: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together
@@ -188,10 +188,8 @@ def handed(part: Engine, here: Moment) -> Handover:
         counters[index - m.STATUS] = value
     lasting = np.zeros(len(LASTING))
     lasting[0] = part.start
-    rows = m.empty_record(1, len(part.model.contacts), len(here.y))
-    first = m.record(rows, len(part.model.contacts))
-    first.time[:], first.state[:] = part.start, here.y
-    first.modes[:], first.latched[:] = here.modes[: len(part.model.contacts)], here.latched[: len(part.model.contacts)]
+    contacts = slice(len(part.model.contacts))
+    rows = rows_of(part, here.y[None], part.start, here.modes[contacts], here.latched[contacts])
     recorded = Tape(np.zeros(0), rows, here.events, [(part.start, part.selected.copy())])
     return Handover(here, counters, lasting, recorded)
 
