@@ -30,7 +30,7 @@ from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.effects import CONTACTS, NORMAL_LAWS
+from flexclear.pipeline.dynamics.effects import NORMAL_LAWS, SURFACES
 from flexclear.pipeline.dynamics.model.closing import misfit
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -89,7 +89,7 @@ def _play(joint: Clearance, force: float) -> float:
     """How far the points may separate [m]: the clearance, and how deep a force presses the surfaces."""
     law = lookup(NORMAL_LAWS, joint.normal.law, where="[normal]")
     exponent = law.exponent if joint.normal.exponent is None else joint.normal.exponent
-    stiffness = lookup(CONTACTS, joint.type, where="[joint]").stiffness(joint, exponent)
+    stiffness = lookup(SURFACES, joint.type, where="[joint]").stiffness(joint, exponent)
     return float(joint.clearance + (KNOCK * force / stiffness) ** (1.0 / exponent))
 
 

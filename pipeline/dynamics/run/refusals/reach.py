@@ -39,6 +39,8 @@ TIMES_AHEAD = 60
 BOXES, HALF_WIDTH = 60, 0.1
 #: a depth is the least when another box takes off less than this fraction of it
 LEAST_GAIN = 1e-3
+#: of the search in a box, in which depths are fractions of that in its middle, so that no size of a mechanism matters
+OPTIONS: Any = {"eps": 1e-6}
 
 
 @contextmanager
@@ -204,16 +206,16 @@ def _shallowest(engine: Engine, y: np.ndarray, contact: int, enough: float) -> t
     for _ in range(BOXES):
         if depth <= enough:
             break
-        there, less = _shallower(engine, y, contact)
+        there, less = _shallower(engine, y, contact, depth)
         if not less < (1.0 - LEAST_GAIN) * depth:
             break
         y, depth = there, less
     return y, depth
 
 
-def _shallower(engine: Engine, y: np.ndarray, contact: int) -> tuple[np.ndarray, float]:
-    """The same in the box about a state."""
-    from scipy.optimize import Bounds, minimize  # slow to import, and few runs come here
+def _shallower(engine: Engine, y: np.ndarray, contact: int, depth: float) -> tuple[np.ndarray, float]:
+    """The same in the box about a state in which it is so deep."""
+    from scipy.optimize import minimize  # slow to import, and few runs come here
 
     nq, scales = engine.model.nq, engine.model.speed_scales[: engine.model.nv]
     ways = per_speed(engine, y, lambda rates: rates[:nq]) * scales
@@ -223,12 +225,12 @@ def _shallower(engine: Engine, y: np.ndarray, contact: int) -> tuple[np.ndarray,
         moved[:nq] += ways @ x
         return project(engine, moved)
 
-    def depth(x: np.ndarray, *_: Any, **__: Any) -> float:
-        return _depth(engine, there(x), contact)
+    def fraction(x: np.ndarray) -> float:
+        return _depth(engine, there(x), contact) / depth
 
-    box: Any = Bounds(-HALF_WIDTH, HALF_WIDTH)
-    least = minimize(depth, np.zeros(len(scales)), method="L-BFGS-B", bounds=box)
-    return there(least.x), float(least.fun)
+    box = [(-HALF_WIDTH, HALF_WIDTH)] * len(scales)
+    least = minimize(fraction, np.zeros(len(scales)), method="L-BFGS-B", bounds=box, options=OPTIONS)
+    return there(least.x), float(least.fun) * depth
 
 
 def _depth(engine: Engine, y: np.ndarray, contact: int) -> float:
