@@ -117,11 +117,16 @@ def basis(d):
 # Exponential quadrature -----------------------------------------------------------------------------------------------
 @kernel
 def find_phi(d, j, step, theta):
-    """The phi functions of all oscillators at a fraction of the step, for quadrature j, and what the sources add."""
-    o, tau, slope_too = basis(d), theta * step, 1.0 if j < THIRD else 0.0
+    """The phi functions of all oscillators at a fraction of the step, for quadrature j, and what the sources add.
+
+    Error estimates are of the whole step, as its last node is, whose functions they take.
+    """
+    o, tau, whole = basis(d), theta * step, j >= THIRD
+    slope_too = 0.0 if whole else 1.0
     for i in range(count(d)):
-        at = phi(d, j, i)
-        phi_functions.phi_functions(d.w, at, d.w[square(d, o, i)] * tau * tau, d.w[damping(d, o, i)] * tau)
+        at = phi(d, NODES - 1 if whole else j, i)
+        if not whole:
+            phi_functions.phi_functions(d.w, at, d.w[square(d, o, i)] * tau * tau, d.w[damping(d, o, i)] * tau)
         first = share(d, j, i) + 2 * NODES
         d.w[first], d.w[first + 1] = slope_too * tau * (d.w[at + 2] - 1.0), slope_too * tau * tau * d.w[at + 3]
         for e in range(NODES):
