@@ -18,7 +18,6 @@ import numpy as np
 
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.contact.validity import SHALLOW, pressed_through
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
@@ -73,6 +72,8 @@ def require_shallow(engine: Engine) -> None:
     Contacts give way where ideal joints do not, so that a drive leads a loop with clearance beyond its reach in ever
     shorter steps: the run would be refused at its end, if it ever came there.  The memory stays as it is.
     """
+    from flexclear.pipeline.dynamics.contact.validity import SHALLOW, pressed_through
+
     model, t = engine.model, float(engine.control[m.TIME])
     with preserved(engine):
         engine.attempt(engine.view(m.Y).copy(), t)
@@ -83,10 +84,11 @@ def require_shallow(engine: Engine) -> None:
         if text := pressed_through(contact.words, contact.joint, float(depth)):
             remedy = "choose a stiffer contact, a slower impact or smaller loads"
             raise SolverError(f"at t = {t:.6g} s: {text}: {f'{away}; else {remedy}' if pulled else remedy}")
-        if not (pulled and model.mechanism.all_rigid and depth > SHALLOW * contact.joint.radius > 0.0):
+        shallow = SHALLOW * contact.joint.radius
+        if not (pulled and model.mechanism.all_rigid and depth > shallow > 0.0):
             continue
         with preserved(engine):
-            time, least = forced_depth(engine, k)
+            time, least = forced_depth(engine, k, shallow)
         if least:
             raise SolverError(
                 f"at t = {t:.6g} s: {contact.words}: the surfaces are {depth:.3g} m deep in each other, and "
@@ -177,18 +179,17 @@ def _shorten(drive: str) -> str:
     return f"shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"
 
 
-def forced_depth(engine: Engine, contact: int) -> tuple[float, float]:
+def forced_depth(engine: Engine, contact: int, shallow: float) -> tuple[float, float]:
     """When contact number `contact` must be deeper [m] than its inner radius, and how deep then; else (inf, 0).
 
-    From the stepper's state on, if the contact is deep already; rigid bodies only, since others bend instead.
-    Searches are local, as the motion is.  The memory is not preserved.
+    From the stepper's state on, if the contact is deeper than `shallow` [m] already; rigid bodies only, since others
+    bend instead. Searches are local, as the motion is.  The memory is not preserved.
     """
     model, t = engine.model, float(engine.control[m.TIME])
     radius, y = model.contacts[contact].joint.radius, engine.view(m.Y).copy()
-    deep = SHALLOW * radius
     try:
         for time in np.linspace(t, engine.end, TIMES_AHEAD + 1)[:-1]:
-            y, depth = _shallowest(replace(engine, start=float(time)), y, contact, deep)
+            y, depth = _shallowest(replace(engine, start=float(time)), y, contact, shallow)
             if depth > radius:
                 return float(time), depth
     except SolverError:
