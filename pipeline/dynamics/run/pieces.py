@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -21,8 +21,10 @@ from flexclear.pipeline.dynamics.compile.folder import processor
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.progress_rate import Look
-from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
-from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
 
 #: arrays of an engine that change as it works
 MEMORY = ("w", "n", "h", "selected")
@@ -167,6 +169,9 @@ class Piece:
 
     def restore(self, state: State, outputs: np.ndarray) -> None:
         """Put engine and tape into the state that was found."""
+        from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
+        from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
+
         arrays, notes = state.arrays, state.notes
         remember(self.engine, arrays)
         rows, events = (int(count) for count in notes["room"])
