@@ -95,7 +95,7 @@ def _loaded(engine: Engine, y: np.ndarray) -> np.ndarray:
     There modal coordinates do not accelerate, as far as loops leave them free.  Where rods buckle or the pose is
     singular there is no such state, and y is returned.
     """
-    speeds = [engine.model.nq + k for mine in engine.model.numbering.modal_coordinates.values() for k in mine]
+    speeds = _modal_speeds(engine)
     if not speeds or engine.mobility.singular_start:
         return y
     try:
@@ -127,6 +127,12 @@ def _bent(engine: Engine, y: np.ndarray, change: np.ndarray) -> np.ndarray:
 def _pulled(engine: Engine, y: np.ndarray, speeds: list[int]) -> np.ndarray:
     """Return the accelerations of the modal coordinates, shape (n,)."""
     return closure_rows.evaluate(engine, y, engine.start)[speeds].copy()
+
+
+def _modal_speeds(engine: Engine) -> list[int]:
+    """Return where in the state the speeds of modal coordinates are."""
+    model = engine.model
+    return [model.nq + k for mine in model.numbering.modal_coordinates.values() for k in mine]
 
 
 def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray]:
