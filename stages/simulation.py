@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene import provenance
-from flexclear.pipeline.core.scene.appearance import UNSEEN
+from flexclear.pipeline.core.scene.parts import UNSEEN
 from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.workflow import stopping

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import scenes
 from flexclear.pipeline.core.scene import lines
-from flexclear.pipeline.core.scene.file_kinds import RECIPE, SCENE, SWEEP, kind_of_file
 from flexclear.pipeline.core.scene.limits import Limits
-from flexclear.pipeline.core.scene.load import compose, read_toml
+from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, kind_of_file, read_toml
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError, InputErrors, ResourceError
 from flexclear.stages import meshing, rigid_body

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 from flexclear.commands import export, scenes
 from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.coupling import lessened
 from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.variants import lessened
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.stages import effect_plan, watched_quantities
 from flexclear.stages.workplace import FailedTasksError, Made, Workplace, open_workplace, seconds

@@ -5,18 +5,16 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from flexclear.pipeline.core.scene.fields import FrameName, Part
+from flexclear.pipeline.core.scene.fields import FrameName, OnCoordinate, Part, given
 from flexclear.pipeline.core.scene.laws import Bare
 
 
-class JointDrive(Part):
+class JointDrive(OnCoordinate):
     """Prescribes one coordinate of a joint; joints with several freedoms need its name.
 
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  law: position over time.
+    law: position over time.
     """
 
-    joint: str
-    coordinate: str | None = None
     law: Bare
 
 
@@ -32,7 +30,7 @@ class Components(Part):
 
     def laws(self) -> dict[str, Any]:
         """The laws that there are, by axis."""
-        return {axis: getattr(self, axis) for axis in "xyz" if getattr(self, axis) is not None}
+        return {axis: getattr(self, axis) for axis in given(self, ("x", "y", "z"))}
 
 
 class PathDrive(Part):

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, TypeAdapter, ValidationError, WithJsonSche
 from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import Drive, JointDrive, PathDrive
 from flexclear.pipeline.core.scene.event_kinds import CHANGES
-from flexclear.pipeline.core.scene.fields import Part, PartName
+from flexclear.pipeline.core.scene.fields import Part, PartName, given, require_one
 from flexclear.pipeline.core.scene.formulas import formula
 from flexclear.pipeline.core.scene.loads import Load, SampledPid
 from flexclear.pipeline.core.scene.owners import COORDINATES
@@ -57,11 +57,7 @@ class Event(Part):
 
     @model_validator(mode="after")
     def _one_change(self) -> Self:
-        given = [key for key in CHANGES if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise ValueError(
-                f"one of {', '.join(CHANGES)} says what changes; here {' and '.join(given) or 'none'} does"
-            )
+        require_one(self, CHANGES, "says what changes")
         if (self.switch is None) != (self.to is None):
             raise ValueError("switch and to belong together: a part, and the keys of it that change")
         return self
@@ -69,7 +65,7 @@ class Event(Part):
     @property
     def kind(self) -> str:
         """Which of `CHANGES` it is."""
-        return next(key for key in CHANGES if getattr(self, key) is not None)
+        return given(self, CHANGES)[0]
 
     @property
     def part(self) -> tuple[str, str]:

@@ -178,11 +178,33 @@ class Part(BaseModel):
         return schema
 
 
+class OnCoordinate(Part):
+    """What is about a joint coordinate.
+
+    joint: name of the joint.  coordinate: name of its coordinate, where it has several.
+    """
+
+    joint: str
+    coordinate: str | None = None
+
+
+def given(part: Part, keys: tuple[str, ...]) -> list[str]:
+    """Those of the keys that a part has."""
+    return [key for key in keys if getattr(part, key) is not None]
+
+
+def require_one(part: Part, keys: tuple[str, ...], says: str) -> None:
+    """ValueError unless a part has exactly one of these keys; says: what they do, as "says where"."""
+    there = given(part, keys)
+    if len(there) != 1:
+        text = f"{' and '.join(there)} do" if there else "nothing does"
+        raise ValueError(f"one of {', '.join(keys)} {says}; here {text}")
+
+
 def given_once(part: Part, ways: tuple[str, ...]) -> None:
     """ValueError when an orientation is given in more than one of these ways."""
-    given = [name for name in ways if getattr(part, name) is not None]
-    if len(given) > 1:
-        raise ValueError(f"an orientation is given once, not by {' and '.join(given)}")
+    if len(there := given(part, ways)) > 1:
+        raise ValueError(f"an orientation is given once, not by {' and '.join(there)}")
 
 
 class Pose(Part):

@@ -15,9 +15,8 @@ from typing import Annotated, Any
 from pydantic import TypeAdapter, ValidationError
 
 from flexclear.pipeline.core.scene.fields import LONGEST_NAME
-from flexclear.pipeline.core.scene.file_kinds import SCENE, require_kind
 from flexclear.pipeline.core.scene.limits import check_parts
-from flexclear.pipeline.core.scene.not_toml import not_toml
+from flexclear.pipeline.core.scene.lines import not_toml
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import NAMING
@@ -39,6 +38,20 @@ LONGEST_CHAIN = 50
 #: keys of parts that name files, which are searched for where the scene is
 FILES = ("mesh", "file")
 EDITS = ("extends", "replace", "set", "remove")
+#: what a TOML file may be
+SCENE, SWEEP, RECIPE = "a scene", "a sweep of a scene", "a mesh recipe"
+#: keys that only files of a kind have
+TELLING = {
+    SCENE: {"body", "joint", "extends", "time"},
+    SWEEP: {"vary", "keep", "scene"},
+    RECIPE: {"shape", "material", "section", "interfaces", "elements"},
+}
+#: what each kind is for, after its path
+USE = {
+    SCENE: "flexclear run {path}",
+    SWEEP: "flexclear sweep {path}",
+    RECIPE: 'flexclear check {path} looks at it; bodies of scenes name it: mesh = "{path}"',
+}
 
 
 def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
@@ -278,6 +291,19 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(str(path), "nests tables or lists too deeply to be read") from None
     except ValueError as error:  # a NUL in the path, a number of more digits than Python reads
         raise InputError(str(path), f"cannot be read: {error}", "name a TOML file") from None
+
+
+def kind_of_file(table: Mapping[str, Any]) -> str:
+    """SCENE, SWEEP or RECIPE: the kind that most of a file's keys belong to; SCENE where none decides."""
+    matches = {kind: len(keys & set(table)) for kind, keys in TELLING.items()}
+    return max(matches, key=lambda kind: matches[kind])
+
+
+def require_kind(table: Mapping[str, Any], path: Path, requested: str) -> None:
+    """InputError when the table in a file is of another kind than requested."""
+    kind = kind_of_file(table)
+    if kind != requested and (kind != SCENE or TELLING[SCENE] & set(table)):
+        raise InputError(str(path), f"is {kind}, not {requested}", USE[kind].format(path=path))
 
 
 def _neighbours(path: Path) -> str | None:

@@ -10,7 +10,16 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from flexclear.pipeline.core.scene.expression import BENT
-from flexclear.pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness, Time
+from flexclear.pipeline.core.scene.fields import (
+    Acceleration,
+    Damping,
+    FrameName,
+    Length,
+    OnCoordinate,
+    Part,
+    Stiffness,
+    Time,
+)
 from flexclear.pipeline.core.scene.laws import Bare, Value
 from flexclear.pipeline.core.scene.units import quantity
 
@@ -160,16 +169,13 @@ class SpringDamper(Part):
         return self
 
 
-class JointForce(Part):
+class JointForce(OnCoordinate):
     """Force [N] or torque [N m] along a joint coordinate, on the joint's second body: a motor of given strength.
 
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  force: force or torque over
-    time.
+    force: force or torque over time.
     """
 
     type: Literal["joint-force"]
-    joint: str
-    coordinate: str | None = None
     force: Bare
 
 
@@ -193,16 +199,13 @@ class _ByExpression(Part):
         return any(f"{name}(" in text.replace(" ", "") for name in BENT for text in self.texts)
 
 
-class JointExpression(_ByExpression):
+class JointExpression(OnCoordinate, _ByExpression):
     """Force [N] or torque [N m] along a joint coordinate, on the joint's second body, by an expression.
 
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  force: the expression, as
-    ``-k * max(0, guide.position - 10 mm)^1.5``.  values: named constants, each a number or text with its unit.
+    force: the expression, as ``-k * max(0, guide.position - 10 mm)^1.5``.
     """
 
     type: Literal["joint-expression"]
-    joint: str
-    coordinate: str | None = None
     force: str
 
 
@@ -210,7 +213,7 @@ class LineExpression(_ByExpression):
     """Tension between the origins of two frames, along the line between them, by an expression.
 
     between: the two frames.  force: the expression; positive pulls them together.  `length` is their distance, `rate`
-    that of the length.  values: named constants, each a number or text with its unit.
+    that of the length.
     """
 
     type: Literal["line-expression"]
@@ -222,7 +225,7 @@ class PointExpression(_ByExpression):
     """Force [N] at the origin of a frame by an expression for each component, or by one whose value is a vector.
 
     axes: those of the world, or those of the frame, with which the force then turns.
-    force: components x, y, z, or one vector.  values: named constants, each a number or text with its unit.
+    force: components x, y, z, or one vector.
     """
 
     type: Literal["point-expression"]
@@ -231,17 +234,15 @@ class PointExpression(_ByExpression):
     axes: Literal["world", "frame"] = "world"
 
 
-class JointSpring(Part):
+class JointSpring(OnCoordinate):
     """Spring and damper along a joint coordinate: -stiffness (coordinate - rest) - damping (its rate).
 
     Turns are counted: an angle may grow beyond 180 deg.
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  stiffness: per unit of the
-    coordinate.  damping: per unit of its rate.  rest: coordinate at which the spring does nothing.
+    stiffness: per unit of the coordinate.  damping: per unit of its rate.  rest: coordinate at which the spring does
+    nothing.
     """
 
     type: Literal["joint-spring"]
-    joint: str
-    coordinate: str | None = None
     stiffness: Value = 0.0
     damping: Value = 0.0
     rest: Value = 0.0
@@ -260,16 +261,13 @@ class Coulomb(Part):
     v_dynamic: Value
 
 
-class JointFriction(Part):
+class JointFriction(OnCoordinate):
     """Friction along a joint coordinate: viscous coefficient times the rate, and Coulomb's of given strength.
 
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  viscous: friction per unit of
-    the rate.  coulomb: friction of given strength.
+    viscous: friction per unit of the rate.  coulomb: friction of given strength.
     """
 
     type: Literal["joint-friction"]
-    joint: str
-    coordinate: str | None = None
     viscous: Value = 0.0
     coulomb: Coulomb | None = None
 
@@ -301,7 +299,7 @@ class Bushing(Part):
         return self
 
 
-class _Controller(Part):
+class _Controller(OnCoordinate):
     """What controllers have. They push `joint` along its coordinate by a law of the error = reference - measured.
 
     measured: the coordinate that is measured, ``A`` or ``A.rotation``; default: the one that is pushed.
@@ -310,11 +308,8 @@ class _Controller(Part):
     1/s of it; s of it].
     limits: least and largest force.  tracking_time: how fast the integral follows a limited output [s]; default
     proportional/integral.
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.
     """
 
-    joint: str
-    coordinate: str | None = None
     measured: str | None = None
     reference: Bare
     proportional: Value = 0.0

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Part, Position, Time
+from flexclear.pipeline.core.scene.fields import Part, Position, Time, require_one
 from flexclear.pipeline.core.scene.variable import Schema, table
 
 
@@ -27,10 +27,7 @@ class Gauge(Part):
 
     @model_validator(mode="after")
     def _one_rule(self) -> Self:
-        rules = ("position", "frame", "region")
-        given = [name for name in rules if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise ValueError(f"one of {', '.join(rules)} says where, not {' and '.join(given) or 'none'}")
+        require_one(self, ("position", "frame", "region"), "says where")
         return self
 
 

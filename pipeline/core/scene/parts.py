@@ -1,12 +1,21 @@
-"""The parts of a scene: bodies and joints. An effect is a part; absent means not there."""
+"""The parts of a scene: bodies and what they look like, joints, stops and gears. An effect is a part; absent means not
+there."""
 
 import math
+import re
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from flexclear.pipeline.core.scene.appearance import Seen
-from flexclear.pipeline.core.scene.clearance import BallOnPlane, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
+from flexclear.pipeline.core.scene.clearance import (
+    BallOnPlane,
+    ClearanceRevolute,
+    ClearanceSlot,
+    ClearanceSpherical,
+    JointFriction,
+    NormalLaw,
+    require_fitting,
+)
 from flexclear.pipeline.core.scene.fields import (
     AngularVelocity,
     FrameName,
@@ -14,6 +23,7 @@ from flexclear.pipeline.core.scene.fields import (
     Length,
     Mass,
     Number,
+    OnCoordinate,
     Part,
     PartName,
     Pose,
@@ -21,9 +31,76 @@ from flexclear.pipeline.core.scene.fields import (
     Positive,
     Time,
     Velocity,
+    given,
+    require_one,
 )
-from flexclear.pipeline.core.scene.joint_friction import JointFriction, require_fitting
+from flexclear.pipeline.core.scene.laws import Value
 from flexclear.pipeline.core.scene.units import quantity
+
+#: keys of a body that only pictures see
+UNSEEN = ("geometry", "color")
+
+
+class BoxShape(Part):
+    """A box about the origin of `pose`."""
+
+    type: Literal["box"]
+    size: Position = Field(description="lengths of the edges along x, y and z")
+    pose: Pose = Field(default=Pose(), description="of the box's middle in the body frame")
+
+    @model_validator(mode="after")
+    def _extended(self) -> Self:
+        if min(self.size) <= 0.0:
+            raise ValueError(f"the edges of a box are longer than zero, not {list(self.size)} m")
+        return self
+
+
+class CylinderShape(Part):
+    """A cylinder about the origin of `pose`, its axis along z."""
+
+    type: Literal["cylinder"]
+    radius: Annotated[Length, Positive] = Field(description="of the cylinder")
+    length: Annotated[Length, Positive] = Field(description="along z")
+    pose: Pose = Field(default=Pose(), description="of the cylinder's middle in the body frame")
+
+
+class SphereShape(Part):
+    """A sphere about the origin of `pose`."""
+
+    type: Literal["sphere"]
+    radius: Annotated[Length, Positive] = Field(description="of the sphere")
+    pose: Pose = Field(default=Pose(), description="of the sphere's middle in the body frame")
+
+
+class FileShape(Part):
+    """A surface from a file that meshio reads: STL, VTK, PLY, OBJ; of volume meshes their boundary."""
+
+    type: Literal["file"]
+    file: str = Field(description="the file, searched for next to the scene")
+    unit: Annotated[Length, Positive] = Field(default=1.0, description='length of one unit of the file, as "1 mm"')
+    pose: Pose = Field(default=Pose(), description="of the file's axes in the body frame")
+
+
+Shape = Annotated[BoxShape | CylinderShape | SphereShape | FileShape, Field(discriminator="type")]
+
+
+def _color(value: Any) -> Any:
+    if isinstance(value, str) and not re.fullmatch("#[0-9a-fA-F]{6}", value):
+        raise ValueError(f"a colour is written as '#0072B2' (red, green and blue, hexadecimal), not '{value}'")
+    return value
+
+
+Color = Annotated[str, BeforeValidator(_color)]
+
+
+class Seen(Part):
+    """What pictures show of a body instead of what follows from its joints."""
+
+    geometry: tuple[Shape, ...] | None = Field(
+        default=None,
+        description="shapes that pictures show, [] for none; default: bars and plates between the joints",
+    )
+    color: Color | None = Field(default=None, description='in pictures, as "#0072B2"')
 
 
 class Ground(Seen):
@@ -36,7 +113,19 @@ class Ground(Seen):
     frames: dict[PartName, Pose] = Field(default_factory=dict)
 
 
-class RigidBody(Seen):
+class Moving(Seen):
+    """What all bodies that move have.
+
+    pose: start pose of the body frame; without it, it follows from a joint.  velocity: start velocity of the centre of
+    mass, world axes.  angular_velocity: start angular velocity of the body frame, world axes.
+    """
+
+    pose: Pose | None = None
+    velocity: Velocity | None = None
+    angular_velocity: AngularVelocity | None = None
+
+
+class RigidBody(Moving):
     """Mass, centre of mass and inertia about it, all in the body frame.
 
     mass: mass of the body.  com: centre of mass in the body frame.  frames: named points with axes on the body, in the
@@ -48,11 +137,6 @@ class RigidBody(Seen):
     mass: Annotated[Mass, Positive]
     com: Position = (0.0, 0.0, 0.0)
     inertia: Inertia
-    pose: Pose | None = Field(
-        default=None, description="start pose of the body frame; without it, it follows from a joint"
-    )
-    velocity: Velocity | None = Field(default=None, description="start velocity of the centre of mass, world axes")
-    angular_velocity: AngularVelocity | None = Field(default=None, description="start angular velocity, world axes")
     frames: dict[PartName, Pose] = Field(default_factory=dict)
     frame_tolerance: Annotated[Length, Field(ge=0.0)] = 0.0
 
@@ -93,11 +177,7 @@ class Modes(Part):
 
     @model_validator(mode="after")
     def _one_choice(self) -> Self:
-        ways = ("count", "up_to", "compliance", "mass")
-        given = [name for name in ways if getattr(self, name) is not None]
-        if len(given) != 1:
-            shown = "nothing does" if not given else f"{' and '.join(given)} do"
-            raise ValueError(f"one of {', '.join(ways)} says how many modes are retained; here {shown}")
+        require_one(self, ("count", "up_to", "compliance", "mass"), "says how many modes are retained")
         return self
 
 
@@ -126,15 +206,12 @@ class Stiffening(Part):
     """Bending shortens a beam: centrifugal and axial loads then stiffen it (or soften, in compression)."""
 
 
-class FlexibleBody(Seen):
-    """A body reduced from a mesh; its frames are those of the recipe.
+class FlexibleBody(Moving):
+    """A body reduced from a mesh; its frames are those of the recipe, its body frame is that of the undeformed mesh.
 
-    pose: start pose of the undeformed mesh frame.
     damping: one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh's; absent means none.
     stiffening: ``{}`` for a beam that turns fast or carries large axial loads; absent means linear shapes.
-    mesh: file of the mesh recipe, relative to the scene.  modes: which elastic coordinates are retained.  velocity:
-    start
-    velocity of the centre of mass, world axes.  angular_velocity: start angular velocity of the body frame, world axes.
+    mesh: file of the mesh recipe, relative to the scene.  modes: which elastic coordinates are retained.
     """
 
     type: Literal["flexible"]
@@ -142,26 +219,18 @@ class FlexibleBody(Seen):
     modes: Modes
     damping: Annotated[Number, Field(gt=0.0)] | RatioPerMode | Rayleigh | None = None
     stiffening: Stiffening | None = None
-    pose: Pose | None = None
-    velocity: Velocity | None = None
-    angular_velocity: AngularVelocity | None = None
 
 
-class MeshedRigidBody(Seen):
+class MeshedRigidBody(Moving):
     """A rigid body with the mass, the inertia and the frames of a mesh recipe: a flexible body without its modes.
 
     ``modes = { count = 0 }`` of a flexible body says the same; damping and stiffening then have nothing to act on.
 
-    mesh: file of the mesh recipe, relative to the scene.  pose: start pose of the mesh frame; without it, it follows
-    from a joint.  velocity: start velocity of the centre of mass, world axes.  angular_velocity: start angular
-    velocity, world axes.
+    mesh: file of the mesh recipe, relative to the scene; the body frame is that of the mesh.
     """
 
     type: Literal["rigid"]
     mesh: str
-    pose: Pose | None = None
-    velocity: Velocity | None = None
-    angular_velocity: AngularVelocity | None = None
 
     @model_validator(mode="before")
     @classmethod
@@ -221,3 +290,57 @@ IDEAL: tuple[str, ...] = get_args(IdealJoint.model_fields["type"].annotation)
 Joint = Annotated[
     IdealJoint | ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane, Field(discriminator="type")
 ]
+
+
+class Stop(OnCoordinate):
+    """Contact where a joint coordinate reaches an end; the coordinate's zero and sign are those of the joint.
+
+    lower, upper: the ends, one or both; angles continue beyond half a turn, from within half a turn of zero at the
+    start.
+    normal: a normal law of contacts with its stiffness, of angles in N m and rad.  floor: least approach speed used as
+    impact rate; without it 1e-6 rad/s, or of lengths that of contacts.  initial_approach_speed: of an end that the
+    scene's start has passed; without it, such a start is refused.
+    """
+
+    lower: Value | None = None
+    upper: Value | None = None
+    normal: NormalLaw
+    floor: Value | None = None
+    initial_approach_speed: Value | None = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.lower is None and self.upper is None:
+            raise ValueError("a stop needs an end: give lower, upper or both; it has neither")
+        if self.normal.stiffness is None:
+            raise ValueError("the stiffness of a stop is unknown: give normal.stiffness")
+        mass = (self.normal.restitution, self.normal.delivered_restitution) != (None, None)
+        if self.normal.law == "kelvin-voigt" and mass and self.normal.effective_mass is None:
+            raise ValueError(
+                "the mass that meets a stop depends on the pose, so a linear stop needs a damping, "
+                "or a restitution with the effective_mass [kg or kg m^2] that is to rebound with it"
+            )
+        return self
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Which ends there are."""
+        return tuple(given(self, ("lower", "upper")))
+
+
+class Gear(Part):
+    """A joint coordinate that follows another one: change of `second` = ratio times change of `first`.
+
+    first, second: joints (``A``), with the coordinate where there are several (``A.rotation``).
+    ratio: a number; of a slide that follows an angle a length per angle ("10 mm/rad"), and the other way round.
+    """
+
+    first: str
+    second: str
+    ratio: Value
+
+    @model_validator(mode="after")
+    def _two(self) -> Self:
+        if self.first == self.second:
+            raise ValueError(f"a gear couples two coordinates; first and second are both '{self.first}'")
+        return self

@@ -24,16 +24,17 @@ from flexclear.pipeline.core.scene.owners import owners
 from flexclear.pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
+    Gear,
     Ground,
     IdealJoint,
     Joint,
     MeshedRigidBody,
     RigidBody,
+    Stop,
 )
 from flexclear.pipeline.core.scene.quantity import Quantity, parse, usual
 from flexclear.pipeline.core.scene.solver import NAMING, PlainIntegrator, Solver
 from flexclear.pipeline.core.scene.start import Start
-from flexclear.pipeline.core.scene.stops import Gear, Stop
 from flexclear.pipeline.core.scene.units import any_quantity, measured, quantity
 from flexclear.pipeline.core.system import file_names
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
 
-from flexclear.pipeline.core.scene.fields import Number, Part, PartName
+from flexclear.pipeline.core.scene.fields import Number, OnCoordinate, Part, PartName, given
 
 #: the keys of one joint coordinate
 KEYS = ("position", "near", "velocity")
@@ -27,7 +27,7 @@ class JointStart(Part):
 
     @model_validator(mode="after")
     def _something(self) -> Self:
-        if all(getattr(self, key) is None for key in KEYS):
+        if not given(self, KEYS):
             raise ValueError(f"one of {', '.join(KEYS)} says how the coordinate starts; here none does")
         if self.position is not None and self.near is not None:
             raise ValueError("position says where the coordinate starts, near only about where; give one of them")
@@ -63,15 +63,13 @@ class _Either:
 JointStarts = Annotated[dict[str, JointStart], BeforeValidator(_coordinates), _Either()]
 
 
-class Branch(Part):
+class Branch(OnCoordinate):
     """One way out of a change point: on which this joint coordinate changes most in the direction of `sign`.
 
-    joint, coordinate: as of a drive.  sign: 1 takes the branch on which the coordinate grows most, or falls least; -1
+    sign: 1 takes the branch on which the coordinate grows most, or falls least; -1
     that on which it falls most, or grows least.
     """
 
-    joint: str
-    coordinate: str | None = None
     sign: Literal[1, -1]
 
 

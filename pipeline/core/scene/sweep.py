@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from flexclear.pipeline.core.scene.fields import Part
-from flexclear.pipeline.core.scene.file_kinds import SWEEP, require_kind
-from flexclear.pipeline.core.scene.load import read_toml
+from flexclear.pipeline.core.scene.load import SWEEP, read_toml, require_kind
 from flexclear.pipeline.core.scene.units import any_quantity
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 

@@ -17,12 +17,11 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
 from flexclear.pipeline.core.scene.integrators import DEFAULT
 from flexclear.pipeline.core.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
 from flexclear.pipeline.core.scene.quantity import KINDS, OF_CLEARANCE, parse
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
+from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, lessened, uncoupled
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE, bounds
 from flexclear.pipeline.dynamics.linear.response import Response, response
