@@ -10,7 +10,6 @@ from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from math import ceil, inf
-from pathlib import Path
 from typing import Any
 
 from flexclear.pipeline.core.artifacts.points import Point
@@ -30,8 +29,6 @@ WORTH, WORTH_CODE = 5_000, 5_000_000
 ABREAST, BATCH_SECONDS_TOGETHER = 8, 5.0
 #: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
 PER_WORKER = 5e-3
-#: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
-LONG = 5.0
 #: seconds in which a scheduler must have answered
 PATIENCE = 10.0
 #: seconds after which a cluster is asked again how many workers it has
@@ -42,18 +39,17 @@ LOSSES = 3
 
 @dataclass(frozen=True)
 class Job:
-    """A point to be run. family: its key; point: path in the scene -> value; journal: where it keeps its work."""
+    """A point to be run. family: its key; point: path in the scene -> value."""
 
     key: str
     family: str
     point: dict[str, Any]
-    journal: Path
 
 
 Done = Callable[[Sequence[tuple[Job, Point]], float], None]
 Points = list[dict[str, Any]]
-#: gives `stages.sweeps.sweep_points.work` to whoever does it, with its first six arguments
-Submit = Callable[[str, bytes, Points, bool, Sequence[Path | None], bool], Future[Any]]
+#: gives `stages.sweeps.sweep_points.work` to whoever does it, with its first five arguments
+Submit = Callable[[str, bytes, Points, bool, bool], Future[Any]]
 
 
 @dataclass(frozen=True)
@@ -85,8 +81,7 @@ class Engine:
                 enough = abreast or (left >= ABREAST * width and left * evaluations >= WORTH_CODE)
                 abreast = evaluations >= WORTH and enough
                 mine = _take(waiting, _portion(left, pace, width, abreast) if pace else 1)
-                keep = self.here and not 0.0 < pace < LONG
-                running[self._given(mine, families, alone=not pace, keep=keep, abreast=abreast)] = mine
+                running[self._given(mine, families, alone=not pace, abreast=abreast)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 mine = running.pop(future)
@@ -108,13 +103,10 @@ class Engine:
                 first, lost = not pace, 0  # what the first one took held compiling and fetching
                 pace = max(1e-6, seconds / len(mine)) if not first else BATCH_SECONDS / 2.0
 
-    def _given(
-        self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool, abreast: bool
-    ) -> Future[Any]:
+    def _given(self, mine: list[Job], families: dict[str, bytes], *, alone: bool, abreast: bool) -> Future[Any]:
         family, points = mine[0].family, [job.point for job in mine]
-        journals = [job.journal if keep else None for job in mine]
         try:
-            return self.submit(family, families[family], points, alone, journals, abreast)
+            return self.submit(family, families[family], points, alone, abreast)
         except (BrokenProcessPool, ConnectionError, EOFError) as error:  # the others: of one killed while it starts
             if not self.here:
                 raise

@@ -13,7 +13,6 @@ from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
 from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.record import point as points_of
 from flexclear.pipeline.dynamics.record.point import Runner
@@ -113,45 +112,13 @@ def test_sections_and_members_of_points_are_the_same_to_the_last_bit(root: Path)
     assert_same(abreast(ball, points, members=2), known)
 
 
-def test_each_point_keeps_its_unfinished_work_in_a_journal_of_its_own(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What is done of a batch is kept until all of it is; then nothing is left."""
-    ball = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.3})
-    points = [{"joint.contact.normal.restitution": 0.5 + 0.1 * k} for k in range(4)]
-    proper, seen, made = Runner.run, dict[float, str](), runner(ball)
-
-    def noted(self: Runner, scene: Scene, *rest: Any) -> Point:
-        own = journal.current()
-        assert own is not None
-        seen[scene.contacts()["contact"].normal.restitution] = own.key
-        return proper(self, scene, *rest)
-
-    monkeypatch.setattr(Runner, "run", noted)
-    monkeypatch.setattr(sweep_points, "_opened", lambda *_: (ball, made))
-    left = list[set[str]]()
-    remove = journal.remove
-    monkeypatch.setattr(
-        journal, "remove", lambda task: (left.append({p.name[:1] for p in tmp_path.glob("*.part")}), remove(task))
-    )
-    places: list[Path | None] = [tmp_path / str(k) for k in range(4)]
-    found, _ = sweep_points.work("key", b"", points, True, places, abreast=True)
-    assert seen == {
-        with_numbers(ball, p).contacts()["contact"].normal.restitution: str(k) for k, p in enumerate(points)
-    }
-    assert left[0] == {"0", "1", "2", "3"}
-    assert list(tmp_path.glob("*.part")) == []
-    monkeypatch.undo()
-    assert_same(found, alone(ball, points))
-
-
 def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() -> None:
     """Where they take many evaluations and there are many of them; they still end together."""
 
     def handed_out(evaluations: int, count: int = 200) -> tuple[list[int], list[bool], float]:
         busy, sizes, told = [0.0, 0.0], list[int](), list[bool]()
 
-        def submit(family: str, packed: bytes, points: list[Any], alone: bool, journals: Any, abreast: bool) -> Any:
+        def submit(family: str, packed: bytes, points: list[Any], alone: bool, abreast: bool) -> Any:
             from concurrent.futures import Future
 
             seconds = 0.1 * len(points)

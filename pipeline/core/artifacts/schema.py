@@ -335,5 +335,5 @@ def require_complete(run: xr.Dataset | LabelledArrays, what: str = "the run") ->
             what,
             f"it is not complete: it was stopped at t = {run.attrs.get('stopped_at', float('nan')):.6g} s "
             f"({run.attrs.get('stopped_by', 'nobody knows why')})",
-            "run the scene again, which continues from there",
+            "run the scene again",
         )

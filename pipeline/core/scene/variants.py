@@ -1,8 +1,8 @@
 """Variants of a scene: which of its effects can be taken away, the scene without some of them, as the ideal mechanism,
 and that as a file.
 
-Parts that nothing couples to what is asked for can be left out without any error. Joints, drives, loads, stops and gears
-couple the bodies and joints that they name; the fixed world couples nothing, and gravity acts on each body by itself.
+Parts that nothing couples to what is asked for can be left out without any error. Joints, drives, loads, stops and
+gears couple the bodies and joints that they name; the fixed world couples nothing, gravity acts on each body by itself.
 
 An effect is named by the path that goes with it: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
 ``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant differs from its scene by parts

@@ -300,11 +300,12 @@ def attempt(
 
 
 def _left(task: Task, stopped: StoppedError, store: Store) -> str:
-    """Message about a task that was stopped: what there is of it, and that it can continue."""
-    text = f"{stopped}; run it again, and it continues from there"
+    """Message about a task that was stopped, and what there is of it."""
     time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
-    if time is not None:  # else it is of a part of the work, such as a member of an ensemble, and no dataset
-        path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
-        if path is not None:
-            text += f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)"
-    return text
+    if time is None:  # it is of a part of the work, such as a member of an ensemble, and no dataset
+        return f"{stopped}; run it again, and what is finished of it is not computed again"
+    path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
+    there = (
+        f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)" if path is not None else ""
+    )
+    return f"{stopped}; run it again{there}"
