@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,6 +13,7 @@ from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
 from flexclear.pipeline.core.workflow.task import Task, facts, in_order, key
 from flexclear.stages.workplace import Workplace
+from tests.processes import printed, python
 
 #: what such a command may import: its own code, and what checks scenes
 ALLOWED = {"flexclear", "pydantic", "pydantic_core", "annotated_types", "typing_extensions"}
@@ -31,20 +30,11 @@ sys.exit(code)"""
 
 def imported(*arguments: str, results: Path) -> set[str]:
     """Top-level names of what a command imports, the standard library left out."""
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", COMMAND, *arguments],
-        cwd=TREE,
-        env={**os.environ, "FLEXCLEAR_RESULTS": str(results)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = python("-W", "ignore", "-c", COMMAND, *arguments, FLEXCLEAR_RESULTS=str(results))
     names = {name.partition(".")[0] for name in done.stderr.splitlines()[-1].split()} - set(sys.stdlib_module_names)
     # the interpreter's own: its configuration, whose name tells the machine, and what its site loads at every start
-    own = subprocess.run(
-        [sys.executable, "-c", "import sys; print(*sys.modules)"], capture_output=True, text=True, check=True
-    )
-    return {name for name in names - set(own.stdout.split()) if not name.startswith(("_sysconfigdata", "__"))}
+    own = printed("import sys; print(*sys.modules)").split()
+    return {name for name in names - set(own) if not name.startswith(("_sysconfigdata", "__"))}
 
 
 def stand_in(tasks: Iterable[Task], place: Workplace) -> dict[Task, Record]:

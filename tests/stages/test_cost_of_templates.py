@@ -39,9 +39,8 @@ def _spent() -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_the_first_answer_comes_soon_and_its_errors_are_those_of_a_converged_run_of_another_method(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    kind: str, tmp_path: Path, fresh: Path
 ):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     scene, workplace = load_scene(write(kind, tmp_path)[0]), open_workplace()
     workplace = Workplace(workplace.store, workplace.sources, jobs=1)
     begun, first = _spent(), list[float]()

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from flexclear.commands import cost, cost_design, scenes
-from flexclear.commands.__main__ import main
 from flexclear.commands.cost_design import Setting
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.artifacts.store import Store
@@ -21,6 +20,7 @@ from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.pipeline.post.cost.answer import sentences
 from flexclear.stages.workplace import Workplace
+from tests.stages.conftest import Command
 
 OWN = Setting("dop853", 1e-6)
 
@@ -115,11 +115,6 @@ def test_the_answer_names_its_cost_its_error_and_the_next_digit(study: cost.Stud
     assert not np.isnan(found.own_error).any()
 
 
-def test_a_scene_without_a_quantity_is_refused(root: Path):
-    with pytest.raises(InputError, match=r"did you mean 'platform\.position'"):
-        load_scene(root / "scenes" / "sps4" / "csj.toml", {"accuracy": {"platform.positon": "1 um"}})
-
-
 TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"bob.position": [1e-6, 1e-7]}}
 
 
@@ -165,11 +160,10 @@ def test_points_keep_the_limits_of_the_scene(csj: Scene):
     assert {design.scene.solver.evaluations for design in designs} == {1234}
 
 
-def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    assert main(["cost", "sps4/csj", "--page", str(tmp_path / "nowhere" / "page.md")]) == 2
-    assert "its folder does not exist" in capsys.readouterr().err
+def test_a_page_that_cannot_be_written_is_refused_before_the_work(tmp_path: Path, command: Command):
+    page = tmp_path / "nowhere" / "page.md"
+    assert "its folder does not exist" in command("cost", "sps4/csj", "--page", page, code=2).err
 
 
-def test_a_budget_that_is_no_time_is_refused(capsys: pytest.CaptureFixture[str]):
-    assert main(["cost", "checks/pendulum", "--budget", "soon"]) == 2
-    assert "--budget soon" in capsys.readouterr().err
+def test_a_budget_that_is_no_time_is_refused(command: Command):
+    assert "--budget soon" in command("cost", "checks/pendulum", "--budget", "soon", code=2).err

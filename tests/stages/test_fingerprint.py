@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +10,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources, library_version
 from flexclear.pipeline.core.workflow.task import STORE, in_order
 from flexclear.stages.graph import Graph
+from tests.processes import printed
 
 #: runs one task in a fresh process and prints the own modules that it loaded
 LOADED = """
@@ -57,9 +56,7 @@ CASES = [
 @pytest.mark.parametrize("scene, label", CASES)
 def test_every_module_that_runs_is_in_the_key(root: Path, tmp_path: Path, scene: str, label: str):
     path = root / "scenes" / f"{scene}.toml"
-    command = [sys.executable, "-c", LOADED, str(tmp_path / "results"), label, str(path), '{"time.end": 0.001}']
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.split())
+    loaded = set(printed(LOADED, tmp_path / "results", label, path, '{"time.end": 0.001}').split())
     (task,) = (task for task in in_order(Graph(load_scene(path)).up_to("post")) if task.label == label)
     known = Sources(root).closure([task.run.partition(":")[0], STORE, *task.modules]).keys()
     assert len(loaded) > 2

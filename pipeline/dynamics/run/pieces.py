@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -18,10 +18,8 @@ from flexclear.pipeline.dynamics.compile.folder import processor
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.progress_rate import Look
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
-    from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
+from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
+from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
 
 #: arrays of an engine that change as it works
 MEMORY = ("w", "n", "h", "selected")
@@ -76,25 +74,41 @@ def in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Handover:
-    """What the next method must know, copied, at the end of the last accepted step.
+class Moment:
+    """All that a motion continues from.
 
-    y: state.  modes, latched, watched: of the contacts, as in the work space.  counters: integers from m.STATUS on.
-    lasting: control floats LASTING.  rows, events: what was recorded.  selections, collocations, passes: as of a
-    trajectory.
+    y: state.  modes, latched, watched: of the contacts, as in the work space.  events: of the event table, among them
+    those of the contacts that are closed, to which `watched` refers.
     """
 
     y: np.ndarray
     modes: np.ndarray
     latched: np.ndarray
     watched: np.ndarray
+    events: np.ndarray
+
+    @staticmethod
+    def of(engine: Engine, watched: np.ndarray, events: np.ndarray) -> Moment:
+        """Where the stepper is, copied."""
+        return Moment(engine.view(m.Y).copy(), engine.modes.copy(), engine.latched.copy(), watched.copy(), events)
+
+    def enter(self, engine: Engine) -> None:
+        """Put it into the work space."""
+        engine.view(m.Y)[:], engine.view(m.WATCH.place)[:] = self.y, self.watched
+        engine.modes[:], engine.latched[:] = self.modes, self.latched
+
+
+@dataclass(frozen=True)
+class Handover:
+    """What the next method must know, copied, at the end of the last accepted step.
+
+    counters: integers from m.STATUS on.  lasting: control floats LASTING.  tape: what was recorded.
+    """
+
+    here: Moment
     counters: np.ndarray
     lasting: np.ndarray
-    rows: np.ndarray
-    events: np.ndarray
-    selections: Selections
-    collocations: tuple[Collocation, ...] = ()
-    passes: tuple[Pass, ...] = ()
+    tape: Tape
 
     @property
     def time(self) -> float:
