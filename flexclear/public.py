@@ -151,8 +151,8 @@ def sweep(
     >>> import flexclear as fc
     >>> where = {"load.gravity.acceleration.1": [-9.81, -1.62]}  # on the earth, and on the moon
     >>> kept, short = ["bob.velocity.largest"], {"time.end": "0.2 s"}
-    >>> found = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
-    >>> found["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
+    >>> result = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
+    >>> result["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
     [1.954, 0.324]
     """
     from flexclear.commands import sweep as sweep_command
@@ -189,8 +189,8 @@ def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str
 
     >>> import flexclear as fc
     >>> short = fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"})
-    >>> found = fc.sensitivities(short, ["bob.velocity.final"], ["load.gravity.acceleration.1"])
-    >>> found["bob.velocity.final"].sel(parameter="load.gravity.acceleration.1").values.shape
+    >>> result = fc.sensitivities(short, ["bob.velocity.final"], ["load.gravity.acceleration.1"])
+    >>> result["bob.velocity.final"].sel(parameter="load.gravity.acceleration.1").values.shape
     (3,)
     """
     from flexclear.commands import scenes
@@ -250,8 +250,8 @@ def frequencies(
     vibrations about steady motion at each of them (schema CAMPBELL).  drive: its name, where several drives move.
 
     >>> import flexclear as fc
-    >>> found = fc.frequencies("scenes/checks/oscillator.toml")
-    >>> round(found["frequency"].item(), 4), round(found["damping_ratio"].item(), 6)  # [Hz], [-]
+    >>> result = fc.frequencies("scenes/checks/oscillator.toml")
+    >>> round(result["frequency"].item(), 4), round(result["damping_ratio"].item(), 6)  # [Hz], [-]
     (1.5836, 0.1)
     """
     from flexclear.commands import scenes

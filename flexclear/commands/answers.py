@@ -35,7 +35,7 @@ TIMES, LEAST = 3.0, 30.0
 AT_ONCE, COMPILING = 2.0, 4.0
 #: of variants without a clearance or a flexible body, the kernels of so many are compiled next to the scene's own run
 AHEAD = 2
-#: tolerance of members with contacts, at most so tight: they start a thousandth of the clearance apart
+#: tolerance of members with contacts, at most so tight: their starts differ by a thousandth of the clearance
 MEANS = 1e-7
 #: members with which effects are compared: more of them until the difference is decided or the budget is used
 MEMBERS = (4, 8, 16, 32)

@@ -46,7 +46,7 @@ BUDGET, POINT, COMPILING = 100.0, 0.6, 8.0
 #: a point may take so many times the evaluations of the scene's own run, or this fraction of the budget if that is more
 MOST_EVALUATIONS = 10.0
 #: of runs that were left undone, so many are named
-LISTED = 6
+LISTED_RUNS = 6
 #: tables of a study, in the order in which they are printed
 PRINTED = ("price.md", "quantities.md", "causes.md", "statistics.md")
 #: figures of a study and their titles
@@ -342,8 +342,8 @@ def _highest(scene: Scene, workplace: Workplace) -> float:
 
 def _listed(keys: Sequence[str]) -> str:
     """The first of many, and how many more there are."""
-    more = f" and {len(keys) - LISTED} more" if len(keys) > LISTED else ""
-    return "; ".join(keys[:LISTED]) + more
+    more = f" and {len(keys) - LISTED_RUNS} more" if len(keys) > LISTED_RUNS else ""
+    return "; ".join(keys[:LISTED_RUNS]) + more
 
 
 def _bundles(design: cost_design.Design) -> dict[str, Task]:

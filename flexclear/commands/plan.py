@@ -239,8 +239,8 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
     print(as_markdown(verified(compared)))
     if planned.scene.accuracy is not None and planned.scene.accuracy.allow_missed:
         return []
-    found = [agreement_of(compared, k) for k in range(compared.sizes["quantity"])]
-    columns = zip(compared["quantity"].values, compared["unit"].values, found, strict=True)
+    verdicts = [agreement_of(compared, k) for k in range(compared.sizes["quantity"])]
+    columns = zip(compared["quantity"].values, compared["unit"].values, verdicts, strict=True)
     return [
         f"{planned.scene.name}: the plan misses {name}: {one.error:.3g} instead of {one.allowed:.3g} {unit}"
         for name, unit, one in columns
@@ -285,7 +285,7 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
         return time.monotonic() - begun + first[0] * members / MEMBERS[0] <= budget
 
     loose = planned.scene.contacts() or planned.scene.stop
-    found, members = until_decided(compared, MEMBERS if loose else MEMBERS[:1], affordable)
+    verdicts, members = until_decided(compared, MEMBERS if loose else MEMBERS[:1], affordable)
     for name in ("error", "chance", "allowed", "horizon"):
-        result[name] = (("quantity",), [getattr(one, name) for one in found])
+        result[name] = (("quantity",), [getattr(one, name) for one in verdicts])
     return result.assign_attrs(members=members if loose else 0)

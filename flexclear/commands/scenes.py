@@ -1,4 +1,4 @@
-"""Scenes that a command or a function of Python names: found, examined, brought up to date."""
+"""Scenes that a command or a function of Python names: read, examined, brought up to date."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.scene.schema import Scene
-#: bytes of what `--set` changes that stand in the name of a folder
+#: bytes of what `--set` changes that are in the name of a folder
 LONGEST_EDITS = 100
 #: folder below a scene's results that is not for users
 FACTS = ".facts"
@@ -216,7 +216,7 @@ def sensitivities(scene: Scene, of: Sequence[str], to: Sequence[str], workplace:
 
 
 def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
-    """Tell what the scenes' runs are to be doubted for, as the last thing that a command says.
+    """Report what the scenes' runs are to be doubted for, as the last thing that a command says.
 
     Raises MissedAccuracyError, after that, for runs that are not as accurate as asked, and for what `plans` miss.
     """

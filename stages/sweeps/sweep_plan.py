@@ -177,7 +177,7 @@ def _check_values(base: Scene, made: Design, where: str) -> None:
     """InputError for a value that the scene does not take; of many points of a sample the extreme ones are examined.
 
     In a grid each value is next to the first ones of the others: what some combinations mean for the mechanism is
-    found when they are run.
+    known when they are run.
     """
     points = made.points()
     try:

@@ -59,13 +59,13 @@ def work(
     packed: bytes,
     points: Sequence[Mapping[str, Any]],
     alone: bool,
-    abreast: bool = False,
+    together: bool = False,
     sources: str = "",
 ) -> tuple[list[Point], float]:
     """Points of a family, and the processor time that they took [s].
 
     packed: the pickled `Family`.  points: path in the scene -> value.  alone: whether no other worker is busy.
-    abreast: whether they are worth to be run side by side; no point depends on it.
+    together: whether they are evaluated together; no point depends on it.
     sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as
     of a worker that has joined since.
     """
@@ -76,11 +76,11 @@ def work(
 
     if sources and sources != source_digest():
         raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
-    cores.tell(alone)
+    cores.set_idle(alone)
     threadpool_limits(1)  # whoever loaded NumPy first, with however many threads
     scene, runner = _opened(key, packed)
     begun = time.process_time()
-    results = _together(runner, scene, points) if abreast else [_point(runner, scene, point) for point in points]
+    results = _together(runner, scene, points) if together else [_point(runner, scene, point) for point in points]
     return results, time.process_time() - begun
 
 

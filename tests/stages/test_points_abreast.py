@@ -136,8 +136,8 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
 
     sizes, told, together = handed_out(evaluations=100_000)
     assert told == [False] + [True] * (len(sizes) - 1)  # the first tells how many it takes
-    assert all(size % sweep_engine.ABREAST == 0 for size in sizes[1:-4])
-    assert max(sizes) >= 4 * sweep_engine.ABREAST
+    assert all(size % sweep_engine.POINTS_TOGETHER == 0 for size in sizes[1:-4])
+    assert max(sizes) >= 4 * sweep_engine.POINTS_TOGETHER
     assert together >= 1.85  # found 2.00
     assert not any(handed_out(evaluations=1_000)[1])
     assert not any(handed_out(evaluations=100_000, count=20)[1])

@@ -21,7 +21,7 @@ Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJso
 
 
 def _listed(value: Any) -> Any:
-    """One entry may stand without its list."""
+    """One entry may be written without its list."""
     return [value] if isinstance(value, (int, float, str)) else value
 
 

@@ -19,7 +19,7 @@ _DOTTED = rf"{_KEY}(?:[ \t]*\.[ \t]*{_KEY})*"
 _HEADER = re.compile(rf"^[ \t]*\[\[?[ \t]*({_DOTTED})[ \t]*\]\]?[ \t]*(?:#.*)?$")
 _VALUE = re.compile(rf"^[ \t]*({_DOTTED})[ \t]*=")
 _PLACE = re.compile(r"^(?P<file>.+\.toml) \[(?P<keys>[^\[\]]+)\]$")
-#: tables of edits that a path may stand below
+#: tables of edits that a path may be written below
 EDITS: tuple[tuple[str, ...], ...] = ((), ("replace",), ("set",))
 
 
@@ -96,7 +96,7 @@ def _keys(dotted: str) -> tuple[str, ...]:
 LONGEST_MENDED = 300
 _NUMBER = re.compile(r"\(at line (\d+)")
 _AT = re.compile(r" \(at (?:line \d+, column \d+|end of document)\)$")
-_OTHER = "names with other characters than letters A to z, digits, - and _ stand in quotation marks"
+_OTHER = "names with other characters than letters A to z, digits, - and _ are written in quotation marks"
 #: text in quotation marks, or a comment, both left alone; or a number and what is after it like a unit
 _PARTS = re.compile(
     r"""("[^"]*"|'[^']*'|\#.*)"""
@@ -122,7 +122,10 @@ def _guessed(line: str) -> tuple[str, str] | None:
     if bare.startswith(("//", ";", "/*")):
         return f"a comment begins with #: {bare}", f"write # {bare.lstrip('/;* ')}"
     if len(re.findall(r"(?<!\\)\"", bare.partition(" #")[0])) % 2:
-        return f"a quotation mark is missing: {bare}", 'text and quantities with units stand between two marks: "1 mm"'
+        return (
+            f"a quotation mark is missing: {bare}",
+            'text and quantities with units are written between two marks: "1 mm"',
+        )
     quoted = _quoted(line) if len(line) <= LONGEST_MENDED else line
     if quoted != line:
         return f"a quantity with a unit needs quotation marks: {bare}", f"write {quoted.strip()}"

@@ -335,7 +335,7 @@ class Scene(Part):
         return [parse(one.name, self.owners()) for one in chosen]
 
     def _prescribed(self) -> set[str]:
-        """Rigid bodies whose motion drives tell: from the ground on by fixed joints and driven ones of one freedom."""
+        """Rigid bodies whose motion drives determine: fixed to the ground, or by driven joints of one freedom."""
         driven = {getattr(drive, "joint", None) for drive in self.drive.values()}
         prescribed = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
         known = {name for name, body in self.body.items() if isinstance(body, Ground)}

@@ -24,8 +24,8 @@ class Stepping(Part):
     evaluations: most right-hand sides of one run.  step: present means steps of this length.
     events: where contacts begin and end, ``at step ends`` only with fixed steps.
     integrator: name, as docs/integrators.md lists them.
-    by_need: whether a dear run gets another integrator and tolerance, where the scene has no `[accuracy]`; by default
-        it does where `[solver]` gives neither of them and no step.
+    by_need: whether an expensive run gets another integrator and tolerance, where the scene has no `[accuracy]`; by
+        default it does where `[solver]` gives neither of them and no step.
     """
 
     integrator: str

@@ -38,7 +38,7 @@ OWNED = {CLEARANCE: ("contact", "worn"), "stop": ("contact",), FLEXIBILITY: ("mo
 #: joint with clearance -> the joint that connects the same frames without; slots and planes have none
 WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
 #: keys of a flexible body that a rigid one from the same recipe has, too
-KEPT = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
+SHARED_KEYS = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
 #: settings that follow the parts: quantities of parts that are gone are no longer asked for or shown
 FOLLOWING = ("accuracy", "view", "ensemble")
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
@@ -189,7 +189,7 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
         if effect.kind == CLEARANCE:
             changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[part.type], "between": list(part.between)}
         elif effect.kind == FLEXIBILITY:
-            unchanged = part.model_dump(mode="json", include=set(KEPT), exclude_none=True)
+            unchanged = part.model_dump(mode="json", include=set(SHARED_KEYS), exclude_none=True)
             changes[f"body.{name}"] = {"type": "rigid", **unchanged}
         elif effect.name.count(".") == 1:
             changes[effect.name] = None

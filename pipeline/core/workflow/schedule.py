@@ -1,4 +1,4 @@
-"""Brings tasks up to date over the cores there are: fresh ones are found, stale ones run as soon as
+"""Brings tasks up to date over the cores there are: fresh ones are recognised, stale ones run as soon as
 their inputs are there."""
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ GRACE = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A task that could not be done: the exit code and what to tell the user."""
+    """A task that could not be done: the exit code and what the user reads."""
 
     task: Task
     exit_code: int
@@ -272,7 +272,7 @@ def _work(
 ) -> Record | Failure:
     """In a worker: the same as in `_alone`, with progress sent home."""
     root, source, memo = where
-    cores.tell(others_idle)
+    cores.set_idle(others_idle)
 
     def progress(fraction: float | None, text: str) -> None:
         reports.put((name, fraction, text))
