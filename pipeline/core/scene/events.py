@@ -37,23 +37,21 @@ When = Annotated[float | str, BeforeValidator(_at), WithJsonSchema(_WHEN)]
 
 
 class Event(Part):
-    """Something that changes once in the run: when a time has come, or a comparison of quantities becomes true.
-
-    at: a time, or a comparison of quantities with < or >; vectors count by their magnitude.
-    after: another event, which happens first.
-    release: part that ceases: joint.NAME, drive.NAME, load.NAME, stop.NAME, gear.NAME, or event.NAME of a lock.
-    lock: joint.NAME, whose coordinates stop and stay where they are.
-    switch: load.NAME, or drive.NAME of a joint, that becomes another one.
-    to: the keys that change; with another type, all keys of the part; laws and expressions count time from the event,
-    and laws of drives positions from where the coordinate is.
-    """
+    """Something that changes once in the run: when a time has come, or a comparison of quantities becomes true."""
 
     at: When
+    """a time, or a comparison of quantities with < or >; vectors count by their magnitude"""
     after: PartName | None = None
+    """another event, which happens first"""
     release: str | None = None
+    """part that ceases: joint.NAME, drive.NAME, load.NAME, stop.NAME, gear.NAME, or event.NAME of a lock"""
     lock: str | None = None
+    """joint.NAME, whose coordinates stop and stay where they are"""
     switch: str | None = None
+    """load.NAME, or drive.NAME of a joint, that becomes another one"""
     to: dict[str, Any] | None = None
+    """the keys that change; with another type, all keys of the part; laws and expressions count time from the event,
+    and laws of drives positions from where the coordinate is"""
 
     @model_validator(mode="after")
     def _one_change(self) -> Self:

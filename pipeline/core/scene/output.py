@@ -14,16 +14,16 @@ from flexclear.pipeline.core.scene.variable import Schema, table
 
 
 class Gauge(Part):
-    """Where on the surface of a solid its stress is recorded: one of position, frame and region.
-
-    body: the solid, one of those in `stress`.  position: of the nearest node, body frame.  frame: a frame of its
-    recipe, for the nodes that are tied to it.  region: a named region of its mesh.
-    """
+    """Where on the surface of a solid its stress is recorded: one of position, frame and region."""
 
     body: str
+    """the solid, one of those in `stress`"""
     position: Position | None = None
+    """of the nearest node, body frame"""
     frame: str | None = None
+    """a frame of its recipe, for the nodes that are tied to it"""
     region: str | None = None
+    """a named region of its mesh"""
 
     @model_validator(mode="after")
     def _one_rule(self) -> Self:
@@ -32,16 +32,14 @@ class Gauge(Part):
 
 
 class Output(Part):
-    """Regular output interval; drive breaks and events are always added.
-
-    stress: flexible bodies whose stresses are recorded: section forces and peaks of rods, surfaces of solids.
-    gauges: where on solids stress is recorded next to the peak.
-    interval: time between two regular outputs.
-    """
+    """Regular output interval; drive breaks and events are always added."""
 
     interval: Annotated[Time, Field(gt=0.0)] = 1e-4
+    """time between two regular outputs"""
     stress: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """flexible bodies whose stresses are recorded: section forces and peaks of rods, surfaces of solids"""
     gauges: Annotated[dict[str, Gauge], Field(min_length=1)] | None = None
+    """where on solids stress is recorded next to the peak"""
 
     @model_validator(mode="after")
     def _gauges_are_on_stressed_bodies(self) -> Self:

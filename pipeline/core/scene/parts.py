@@ -45,8 +45,10 @@ class BoxShape(Part):
     """A box about the origin of `pose`."""
 
     type: Literal["box"]
-    size: Position = Field(description="lengths of the edges along x, y and z")
-    pose: Pose = Field(default=Pose(), description="of the box's middle in the body frame")
+    size: Position
+    """lengths of the edges along x, y and z"""
+    pose: Pose = Pose()
+    """of the box's middle in the body frame"""
 
     @model_validator(mode="after")
     def _extended(self) -> Self:
@@ -59,26 +61,34 @@ class CylinderShape(Part):
     """A cylinder about the origin of `pose`, its axis along z."""
 
     type: Literal["cylinder"]
-    radius: Annotated[Length, Positive] = Field(description="of the cylinder")
-    length: Annotated[Length, Positive] = Field(description="along z")
-    pose: Pose = Field(default=Pose(), description="of the cylinder's middle in the body frame")
+    radius: Annotated[Length, Positive]
+    """of the cylinder"""
+    length: Annotated[Length, Positive]
+    """along z"""
+    pose: Pose = Pose()
+    """of the cylinder's middle in the body frame"""
 
 
 class SphereShape(Part):
     """A sphere about the origin of `pose`."""
 
     type: Literal["sphere"]
-    radius: Annotated[Length, Positive] = Field(description="of the sphere")
-    pose: Pose = Field(default=Pose(), description="of the sphere's middle in the body frame")
+    radius: Annotated[Length, Positive]
+    """of the sphere"""
+    pose: Pose = Pose()
+    """of the sphere's middle in the body frame"""
 
 
 class FileShape(Part):
     """A surface from a file that meshio reads: STL, VTK, PLY, OBJ; of volume meshes their boundary."""
 
     type: Literal["file"]
-    file: str = Field(description="the file, searched for next to the scene")
-    unit: Annotated[Length, Positive] = Field(default=1.0, description='length of one unit of the file, as "1 mm"')
-    pose: Pose = Field(default=Pose(), description="of the file's axes in the body frame")
+    file: str
+    """the file, searched for next to the scene"""
+    unit: Annotated[Length, Positive] = 1.0
+    """length of one unit of the file, as "1 mm"."""
+    pose: Pose = Pose()
+    """of the file's axes in the body frame"""
 
 
 Shape = Annotated[BoxShape | CylinderShape | SphereShape | FileShape, Field(discriminator="type")]
@@ -96,49 +106,45 @@ Color = Annotated[str, BeforeValidator(_color)]
 class Seen(Part):
     """What pictures show of a body instead of what follows from its joints."""
 
-    geometry: tuple[Shape, ...] | None = Field(
-        default=None,
-        description="shapes that pictures show, [] for none; default: bars and plates between the joints",
-    )
-    color: Color | None = Field(default=None, description='in pictures, as "#0072B2"')
+    geometry: tuple[Shape, ...] | None = None
+    """shapes that pictures show, [] for none; default: bars and plates between the joints"""
+    color: Color | None = None
+    """in pictures, as "#0072B2"."""
 
 
 class Ground(Seen):
-    """The fixed world; listed only to give it frames.
-
-    frames: named frames fixed in the world.
-    """
+    """The fixed world; listed only to give it frames."""
 
     type: Literal["ground"]
     frames: dict[PartName, Pose] = Field(default_factory=dict)
+    """named frames fixed in the world"""
 
 
 class Moving(Seen):
-    """What all bodies that move have.
-
-    pose: start pose of the body frame; without it, it follows from a joint.  velocity: start velocity of the centre of
-    mass, world axes.  angular_velocity: start angular velocity of the body frame, world axes.
-    """
+    """What all bodies that move have."""
 
     pose: Pose | None = None
+    """start pose of the body frame; without it, it follows from a joint"""
     velocity: Velocity | None = None
+    """start velocity of the centre of mass, world axes"""
     angular_velocity: AngularVelocity | None = None
+    """start angular velocity of the body frame, world axes"""
 
 
 class RigidBody(Moving):
-    """Mass, centre of mass and inertia about it, all in the body frame.
-
-    mass: mass of the body.  com: centre of mass in the body frame.  frames: named points with axes on the body, in the
-    body frame.  frame_tolerance: how far its frames may be moved so that the joints fit, where they nearly do; of
-    bodies from a mesh a thousandth of the distance of their frames, as the nodes of a hole know its middle no better.
-    """
+    """Mass, centre of mass and inertia about it, all in the body frame."""
 
     type: Literal["rigid"]
     mass: Annotated[Mass, Positive]
+    """mass of the body"""
     com: Position = (0.0, 0.0, 0.0)
+    """centre of mass in the body frame"""
     inertia: Inertia
     frames: dict[PartName, Pose] = Field(default_factory=dict)
+    """named points with axes on the body, in the body frame"""
     frame_tolerance: Annotated[Length, Field(ge=0.0)] = 0.0
+    """how far its frames may be moved so that the joints fit, where they nearly do; of bodies from a mesh a thousandth
+    of the distance of their frames, as the nodes of a hole know its middle no better"""
 
 
 def _hertz(value: Any) -> float:
@@ -153,27 +159,25 @@ Frequency = Annotated[
 
 
 class Modes(Part):
-    """Which elastic coordinates a flexible body keeps: one of count, up_to, compliance and mass says how many.
-
-    count: number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete
-    basis; 0 makes a rigid body with the recipe's mass and inertia.
-    up_to: highest frequency of the retained normal modes, e.g. "5000 Hz".
-    compliance: least fraction of the static compliance between the interfaces, in each of the six directions.
-    mass: least fraction of the body's mass that moves with the basis, in each direction.
-    interfaces: the recipe's frames that a basis is built for; default: the recipe's own list.
-    held: motions held by the reference "constrained", as "top.rz": frame and x, y, z, rx, ry or rz in its axes.
-    of: the reference whose shapes "mean-axis" is based on.
-    reference: name of the reference condition, as docs/structure.md lists them.
-    """
+    """Which elastic coordinates a flexible body keeps: one of count, up_to, compliance and mass says how many."""
 
     reference: str
+    """name of the reference condition, as docs/structure.md lists them"""
     count: Annotated[int, Field(ge=0)] | Literal["all"] | None = None
+    """number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete basis; 0
+    makes a rigid body with the recipe's mass and inertia"""
     up_to: Annotated[Frequency, Positive] | None = None
+    """highest frequency of the retained normal modes, e.g. "5000 Hz"."""
     compliance: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
+    """least fraction of the static compliance between the interfaces, in each of the six directions"""
     mass: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
+    """least fraction of the body's mass that moves with the basis, in each direction"""
     interfaces: tuple[str, ...] | None = None
+    """the recipe's frames that a basis is built for; default: the recipe's own list"""
     held: tuple[FrameName, ...] = ()
+    """motions held by the reference "constrained", as "top.rz": frame and x, y, z, rx, ry or rz in its axes"""
     of: str | None = None
+    """the reference whose shapes "mean-axis" is based on"""
 
     @model_validator(mode="after")
     def _one_choice(self) -> Self:
@@ -182,24 +186,22 @@ class Modes(Part):
 
 
 class RatioPerMode(Part):
-    """Damping ratio of each elastic coordinate, in the order of the bundle's modes.
-
-    ratios: of each mode, of critical damping.
-    """
+    """Damping ratio of each elastic coordinate, in the order of the bundle's modes."""
 
     ratios: tuple[Annotated[Number, Field(ge=0.0)], ...]
+    """of each mode, of critical damping"""
 
 
 class Rayleigh(Part):
     """Damping matrix alpha M + beta K of the deformation; rigid motion of the body is not damped.
 
     alpha [1/s], beta [s]: the ratio of a mode with frequency omega is (alpha/omega + beta omega)/2.
-
-    alpha: of the mass [1/s].  beta: of the stiffness [s].
     """
 
     alpha: Annotated[Number, Field(ge=0.0)] = 0.0
+    """of the mass [1/s]"""
     beta: Annotated[Time, Field(ge=0.0)] = 0.0
+    """of the stiffness [s]"""
 
 
 class Stiffening(Part):
@@ -207,30 +209,28 @@ class Stiffening(Part):
 
 
 class FlexibleBody(Moving):
-    """A body reduced from a mesh; its frames are those of the recipe, its body frame is that of the undeformed mesh.
-
-    damping: one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh's; absent means none.
-    stiffening: ``{}`` for a beam that turns fast or carries large axial loads; absent means linear shapes.
-    mesh: file of the mesh recipe, relative to the scene.  modes: which elastic coordinates are retained.
-    """
+    """A body reduced from a mesh; its frames are those of the recipe, its body frame is that of the undeformed mesh."""
 
     type: Literal["flexible"]
     mesh: str
+    """file of the mesh recipe, relative to the scene"""
     modes: Modes
+    """which elastic coordinates are retained"""
     damping: Annotated[Number, Field(gt=0.0)] | RatioPerMode | Rayleigh | None = None
+    """one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh's; absent means none"""
     stiffening: Stiffening | None = None
+    """``{}`` for a beam that turns fast or carries large axial loads; absent means linear shapes"""
 
 
 class MeshedRigidBody(Moving):
     """A rigid body with the mass, the inertia and the frames of a mesh recipe: a flexible body without its modes.
 
     ``modes = { count = 0 }`` of a flexible body says the same; damping and stiffening then have nothing to act on.
-
-    mesh: file of the mesh recipe, relative to the scene; the body frame is that of the mesh.
     """
 
     type: Literal["rigid"]
     mesh: str
+    """file of the mesh recipe, relative to the scene; the body frame is that of the mesh"""
 
     @model_validator(mode="before")
     @classmethod
@@ -269,13 +269,14 @@ class IdealJoint(Part):
     """Two frames; the axes of motion are those of the first, its axis is z.
 
     A free joint holds nothing: it says that a body shall fly. The motion of each type is in `pipeline.dynamics.joints`.
-    type: which motion it leaves free.  between: first frame, whose axes are those of motion, and second frame, each as
-    body.FRAME.  friction: follows the force that the joint carries; absent means none.
     """
 
     type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
+    """which motion it leaves free"""
     between: tuple[FrameName, FrameName]
+    """first frame, whose axes are those of motion, and second frame, each as body.FRAME"""
     friction: JointFriction | None = None
+    """follows the force that the joint carries; absent means none"""
 
     @model_validator(mode="after")
     def _rubs(self) -> Self:
@@ -292,20 +293,18 @@ Joint = Annotated[
 
 
 class Stop(OnCoordinate):
-    """Contact where a joint coordinate reaches an end; the coordinate's zero and sign are those of the joint.
-
-    lower, upper: the ends, one or both; angles continue beyond half a turn, from within half a turn of zero at the
-    start.
-    normal: a normal law of contacts with its stiffness, of angles in N m and rad.  floor: least approach speed used as
-    impact rate; without it 1e-6 rad/s, or of lengths that of contacts.  initial_approach_speed: of an end that the
-    scene's start has passed; without it, such a start is refused.
-    """
+    """Contact where a joint coordinate reaches an end; the coordinate's zero and sign are those of the joint."""
 
     lower: Value | None = None
+    """the ends, one or both; angles continue beyond half a turn, from within half a turn of zero at the start"""
     upper: Value | None = None
+    """the ends, one or both; angles continue beyond half a turn, from within half a turn of zero at the start"""
     normal: NormalLaw
+    """a normal law of contacts with its stiffness, of angles in N m and rad"""
     floor: Value | None = None
+    """least approach speed used as impact rate; without it 1e-6 rad/s, or of lengths that of contacts"""
     initial_approach_speed: Value | None = None
+    """of an end that the scene's start has passed; without it, such a start is refused"""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -328,15 +327,14 @@ class Stop(OnCoordinate):
 
 
 class Gear(Part):
-    """A joint coordinate that follows another one: change of `second` = ratio times change of `first`.
-
-    first, second: joints (``A``), with the coordinate where there are several (``A.rotation``).
-    ratio: a number; of a slide that follows an angle a length per angle ("10 mm/rad"), and the other way round.
-    """
+    """A joint coordinate that follows another one: change of `second` = ratio times change of `first`."""
 
     first: str
+    """joints (``A``), with the coordinate where there are several (``A.rotation``)"""
     second: str
+    """joints (``A``), with the coordinate where there are several (``A.rotation``)"""
     ratio: Value
+    """a number; of a slide that follows an angle a length per angle ("10 mm/rad"), and the other way round"""
 
     @model_validator(mode="after")
     def _two(self) -> Self:

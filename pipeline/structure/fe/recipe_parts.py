@@ -14,14 +14,14 @@ Positive = Field(gt=0.0)
 
 
 class Isotropic(Part):
-    """A linear elastic, isotropic material.
-
-    density: mass density.  youngs_modulus: Young's modulus.  poisson: Poisson's ratio.
-    """
+    """A linear elastic, isotropic material."""
 
     density: Annotated[Density, Positive]
+    """mass density"""
     youngs_modulus: Annotated[Pressure, Positive]
+    """Young's modulus"""
     poisson: Annotated[Number, Field(gt=-1.0, lt=0.5)]
+    """Poisson's ratio"""
 
     @property
     def shear_modulus(self) -> float:
@@ -30,13 +30,12 @@ class Isotropic(Part):
 
 
 class TurnedFrame(Part):
-    """A named frame with axes of its own, as of a pose (`axes`, or `axis` for z alone); default: the mesh's.
-
-    axes: as of a pose.  axis: as of a pose, the direction of z alone.
-    """
+    """A named frame with axes of its own, as of a pose (`axes`, or `axis` for z alone); default: the mesh's."""
 
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+    """as of a pose"""
     axis: Direction | None = None
+    """as of a pose, the direction of z alone"""
 
     @model_validator(mode="after")
     def _orthogonal_axes(self) -> TurnedFrame:
