@@ -192,10 +192,10 @@ def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[s
 
 
 def code_digest(tree: ast.Module) -> str:
-    """Digest of what a module does: its syntax tree, from which docstrings and words of raised errors are taken."""
+    """Digest of what a module does: its syntax tree without docstrings, those of attributes too, and words of errors."""
     for node in ast.walk(tree):
-        if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
-            del node.body[0]
+        if isinstance(node, _DOCUMENTED):
+            node.body = [one for one in node.body if not _is_text(one)]
         elif isinstance(node, ast.Raise):
             for part in ast.walk(node):
                 if isinstance(part, ast.JoinedStr):
@@ -203,6 +203,12 @@ def code_digest(tree: ast.Module) -> str:
                 elif isinstance(part, ast.Constant) and isinstance(part.value, str):
                     part.value = ""
     return hashlib.sha256(_dumped(tree).encode()).hexdigest()
+
+
+def _is_text(statement: ast.stmt) -> bool:
+    """Whether a statement is a text alone, which does nothing."""
+    value = statement.value if isinstance(statement, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
 def _dumped(tree: ast.Module) -> str:
