@@ -338,7 +338,7 @@ for _effect in EFFECTS:
     for _array, _tables in (("h", _effect.wiring), ("f", _effect.numbers)):
         OF_EFFECTS |= {name: _table(_array, rows) for name, rows in _tables.items()}
     OF_EFFECTS |= {name: work(rows, number) for name, (number, rows) in _effect.work.items()}
-    _stretches(_effect.stretches)
+    _stretches(" ".join(_effect.stretches))
 HEADER = next(_place)
 
 # the ledger before the contacts' slots (three deflections of each contact with bristles come after them):

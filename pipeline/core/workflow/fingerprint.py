@@ -192,7 +192,7 @@ def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[s
 
 
 def code_digest(tree: ast.Module) -> str:
-    """Digest of what a module does: its syntax tree without docstrings, those of attributes too, and words of errors."""
+    """Digest of what a module does: its syntax tree without docstrings, also of attributes, and words of errors."""
     for node in ast.walk(tree):
         if isinstance(node, _DOCUMENTED):
             node.body = [one for one in node.body if not _is_text(one)]

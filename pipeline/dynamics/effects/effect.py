@@ -27,7 +27,7 @@ class Effect:
     named: parts of families that it names in a scene: family, name, and where the scene says so.
     wiring, numbers: rows of its tables in h and f by their names (`memory`). A table in h adds a size ``n_<table>`` to
     the header, a ledger the size ``<name>_slot``.  work: the same in w, each after how many rows there are.
-    stretches: of w, with their lengths; both as `memory` writes them.
+    stretches: of w, each with its length; both as `memory` writes them.
     compose: arguments that it adds to generated files, or replaces there, by the point in `compile.sources` at which
     it does.  In their texts, ``<module.name>`` is a name in its folder, ``{file}`` the `compile.sources.Composition`,
     and ``{kinds}`` the tuple of the modules of its kinds.
@@ -56,7 +56,7 @@ class Effect:
     wiring: Mapping[str, str] = field(default_factory=dict)
     numbers: Mapping[str, str] = field(default_factory=dict)
     work: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    stretches: str = ""
+    stretches: tuple[str, ...] = ()
     compose: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     changeable: tuple[str, ...] = ()
     touches: bool = False

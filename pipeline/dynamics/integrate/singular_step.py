@@ -6,8 +6,7 @@ are. So what an integrator may err grows as the pose comes near: its steps shrin
 at last rounding chooses the branch. What is smooth there is the motion itself, on its branch. So no method steps near
 the pose: where the zero of :math:`\sigma` is ahead the stepper stops, `run.singular_poses.collocation` lays the motion
 over the pose from states that are closed on both sides, and the stepper goes along that polynomial in one step,
-whatever the method and its tolerance. Contacts are searched on it as on any dense output. A tree has no closure rows,
-and so no poses.
+whatever the method and its tolerance. Contacts are searched on it as on any dense output.
 """
 
 from __future__ import annotations
@@ -20,6 +19,7 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.envelope import base
 from flexclear.pipeline.dynamics.equations.projection import BLIND
+from flexclear.pipeline.dynamics.integrate.poses import Poses
 from flexclear.pipeline.dynamics.kernels import kernel
 
 NEVER = 1e300
@@ -254,3 +254,6 @@ def make_arrive(evaluate: Callable, project: Callable, attempt: Callable, method
             d.evaluation, d.left = m.OK, 0.0
 
     return arrive
+
+
+OVER_POSES = Poses(note, stand, steer, ready, done, make_foresee, make_along, make_arrive)

@@ -16,22 +16,13 @@ from flexclear.pipeline.dynamics.equations.projection import keep_scales, larges
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.integrate.method import AWAITS, LOST, await_rates, make_at_once, make_attempt
 from flexclear.pipeline.dynamics.integrate.norms import finite
+from flexclear.pipeline.dynamics.integrate.poses import NO_POSES, Poses, never
 from flexclear.pipeline.dynamics.integrate.recording import (
     hold_modes,
     holds_outputs,
     make_record_outputs,
     share_of_records,
     snapshot,
-)
-from flexclear.pipeline.dynamics.integrate.singular_step import (
-    done,
-    make_along,
-    make_arrive,
-    make_foresee,
-    note,
-    ready,
-    stand,
-    steer,
 )
 from flexclear.pipeline.dynamics.integrate.stiffness import make_detect_stiffness
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -63,12 +54,6 @@ def plan(d, step, following):
     """The step to try next; one that was cut short says little about how long it may be."""
     least = d.step if step < CUT * d.step else 0.0
     d.step = max(following, least)
-
-
-@kernel
-def never(d):
-    """No contact is closed."""
-    return False
 
 
 @kernel
@@ -109,6 +94,7 @@ def make_advance(
     method: Any,
     stepping: Any,
     events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
+    poses: Poses = NO_POSES,
     complete: Callable | None = None,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
@@ -123,7 +109,7 @@ def make_advance(
     begin, step_itself, error, extend_itself, keep = method.make_kernels(*given)
     proceed = step_itself if method.staged else make_at_once(step_itself)
     attempt_itself = make_attempt(evaluate, proceed) if method.staged else step_itself
-    attempt, extend, interpolate = make_along(method, attempt_itself, extend_itself)
+    attempt, extend, interpolate = poses.make_along(method, attempt_itself, extend_itself)
     last, ends = method.last, method.ends
     watch_start, make_resolve_events, any_closed = events
     dense = replace(method, interpolate=interpolate)
@@ -131,7 +117,8 @@ def make_advance(
     record_outputs = make_record_outputs(extend, interpolate)
     detect_stiffness = make_detect_stiffness(method)
     first_step, error_norm, after_rejection, next_step = stepping.make_step_control(evaluate, any_closed, error, method)
-    foresee, arrive = make_foresee(evaluate), make_arrive(evaluate, project, attempt, method)
+    note, stand, steer, ready, done = poses.note, poses.stand, poses.steer, poses.ready, poses.done
+    foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, attempt, method)
 
     @kernel
     def must_stop(d, outputs, rows, events):

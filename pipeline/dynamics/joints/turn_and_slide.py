@@ -46,7 +46,7 @@ def joint(*coordinates: Coordinate) -> Joint:
 
     @kernel
     def motion(w, q, u, S):
-        """Motion of frame G in frame F (see `spherical.motion`)."""
+        """Motion of frame G in frame F (see `spherical.motion`); eqs. (30), (31) where it slides along one axis."""
         for k in range(6 * count):
             w[S + k] = 0.0
         for k in range(count):

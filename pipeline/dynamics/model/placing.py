@@ -61,7 +61,7 @@ def assemblies(
     for k in range(GUESSES):
         guess = _guess(mechanism, joints, placed, targets, random if k else None, k / GUESSES)
         if k == 0:
-            aim = _coordinates(joints, guess) | hints
+            aim = {**_coordinates(joints, guess), **hints}
         poses = close(mechanism, joints, guess, placed)
         if poses is None and len(placed) > 1:
             poses = close(mechanism, joints, guess)

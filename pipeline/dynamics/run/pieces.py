@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -18,8 +18,10 @@ from flexclear.pipeline.dynamics.compile.folder import processor
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.progress_rate import Look
-from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
-from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
 
 #: arrays of an engine that change as it works
 MEMORY = ("w", "n", "h", "selected")

@@ -33,7 +33,6 @@ from flexclear.pipeline.dynamics.run.evaluation.observation import observe_block
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.progress_rate import Judges, Panel
-from flexclear.pipeline.dynamics.run.singular_poses.collocation import CLEAR, NEARLY_CLEAR, blurred, observe_around
 from flexclear.pipeline.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
 
 if TYPE_CHECKING:
@@ -256,11 +255,8 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
         engine.keep(selected)
         out = observe_blocks(engine, trajectory.rows[part])
         for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
-            row, lost = trajectory.rows[part][k], out["status"][k, 0]
-            limit = observe_around(engine, row, motion, CLEAR)
-            if limit is None and lost:
-                limit = observe_around(engine, row, motion, NEARLY_CLEAR)
-            for name, values in (limit or {}).items():
+            limit = _limit(engine, trajectory.rows[part][k], motion, bool(out["status"][k, 0]))
+            for name, values in limit.items():
                 out[name][k] = values
         parts.append(out)
     # megabytes are copied only where there is something to join: that would take as long as a short run
@@ -280,11 +276,23 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
     return seen
 
 
+def _limit(engine: Engine, row: np.ndarray, motion: Collocation, lost: bool) -> dict[str, np.ndarray]:
+    """What is observed around a row next to a singular pose; nothing where the row itself is as good."""
+    from flexclear.pipeline.dynamics.run.singular_poses.collocation import CLEAR, NEARLY_CLEAR, observe_around
+
+    limit = observe_around(engine, row, motion, CLEAR)
+    if limit is None and lost:
+        limit = observe_around(engine, row, motion, NEARLY_CLEAR)
+    return limit or {}
+
+
 def _near_singular(
     engine: Engine, rows: np.ndarray, motions: tuple[Collocation, ...]
 ) -> Iterator[tuple[int, Collocation]]:
     """Rows, by number, that are too close to a singular pose, and the motion over it to which they belong."""
     for motion in motions:
+        from flexclear.pipeline.dynamics.run.singular_poses.collocation import blurred  # which few runs need
+
         engine.select_pieces_after(0.5 * (motion.start + motion.end))
         begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
         for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import reduce
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,8 +22,10 @@ from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Moment, Sele
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, crawls, look
 from flexclear.pipeline.dynamics.run.refusals import refusal
 from flexclear.pipeline.dynamics.run.refusals.reach import require_shallow
-from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
-from flexclear.pipeline.dynamics.run.singular_poses.passing import EQUAL_TIMES, Pass, foresee_at_start, lay_over
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import Pass
 
 #: evaluations between two looks at the clock and the keyboard
 SLICE = 20_000
@@ -346,6 +349,8 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     if engine.mobility.redundant and closure_rows.improve(engine, t, closure_rows.CLEARLY):
         tape.selections.append((t, engine.selected.copy()))
         return True
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import EQUAL_TIMES, lay_over  # which few runs need
+
     made, passes = lay_over(engine)
     if made is not None:
         tape.collocations.append(made)
@@ -359,6 +364,8 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
     control, status = engine.control, engine.n[m.STATUS]
     if status not in STOPPED or not engine.model.closures or control[m.MOST_REACH] == 0.0:
         return False
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import foresee_at_start
+
     ahead = control[m.PASS_TIME] < NEVER or control[m.LEFT] < TOO_LITTLE
     return (ahead or foresee_at_start(engine)) and _pass_over(engine, tape)
 

@@ -47,7 +47,11 @@ JOINT_FRICTION = Effect(
         "reactions": ("n_rubbing+n_rubbing*n_bearings", "moment:3 force:3"),
     },
     # of the bearings' loads: slopes of their equations, and residuals; of the closures: multipliers without friction
-    stretches="bearing_slopes:n_bearings*n_bearings bearing_residuals:n_bearings smooth_multiplier:n_closure_rows",
+    stretches=(
+        "bearing_slopes:n_bearings*n_bearings",
+        "bearing_residuals:n_bearings",
+        "smooth_multiplier:n_closure_rows",
+    ),
     compose={
         "evaluate": {
             "friction": "(<equations.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "

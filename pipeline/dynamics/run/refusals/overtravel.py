@@ -9,6 +9,7 @@ the run has come to along the drives' laws.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -24,8 +25,10 @@ TIMES_AHEAD = 60
 #: a search proceeds in so many boxes of this half width, in fractions of the mechanism's size or in rad: coordinates
 #: of a box are those of the loops' tangents in its middle
 BOXES, HALF_WIDTH = 60, 0.1
-#: a depth is the least when another box takes off less than this fraction of it; step of differences
-LEAST_GAIN, DIFFERENCE = 1e-3, 1e-6
+#: a depth is the least when another box takes off less than this fraction of it
+LEAST_GAIN = 1e-3
+#: of the search in a box, in which depths are fractions of that in its middle, so that no size of a mechanism matters
+OPTIONS: Any = {"eps": 1e-6}
 
 
 def forced_depth(engine: Engine, contact: int) -> tuple[float, float]:
@@ -66,16 +69,13 @@ def _shallowest(engine: Engine, y: np.ndarray, contact: int, enough: float) -> t
             moved[:nq] += ways @ x
             return project(engine, moved)
 
-        least = minimize(
-            lambda x: _depth(engine, there(x), contact),
-            np.zeros(len(scales)),
-            method="L-BFGS-B",
-            bounds=box,
-            options={"eps": DIFFERENCE},
-        )
-        if not least.fun < (1.0 - LEAST_GAIN) * depth:
+        def fraction(x: np.ndarray, now: float = depth) -> float:
+            return _depth(engine, there(x), contact) / now
+
+        least = minimize(fraction, np.zeros(len(scales)), method="L-BFGS-B", bounds=box, options=OPTIONS)
+        if not least.fun < 1.0 - LEAST_GAIN:
             break
-        y, depth = there(least.x), float(least.fun)
+        y, depth = there(least.x), float(least.fun) * depth
     return y, depth
 
 
