@@ -29,11 +29,11 @@ def runner(scene: Scene, keep: Sequence[str] = BALL, **asked: Any) -> Runner:
 
 def alone(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> list[Point]:
     """Each by a worker that has run nothing else."""
-    return [sweep_points._point(runner(scene, **asked), scene, point, None) for point in points]
+    return [sweep_points._point(runner(scene, **asked), scene, point) for point in points]
 
 
 def abreast(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> list[Point]:
-    return sweep_points._abreast(runner(scene, **asked), scene, points, [None] * len(points))
+    return sweep_points._together(runner(scene, **asked), scene, points)
 
 
 def assert_same(found: Sequence[Point], known: Sequence[Point]) -> None:
@@ -129,7 +129,7 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
             future.set_result(([Point({}, {}, {}, evaluations) for _ in points], seconds))
             return future
 
-        jobs = [sweep_engine.Job(str(n), "family", {}, Path(str(n))) for n in range(count)]
+        jobs = [sweep_engine.Job(str(n), "family", {}) for n in range(count)]
         sweep_engine.Engine(submit, lambda: 2).run(jobs, {"family": b""}, lambda *_: None)
         assert sum(sizes) == count
         return sizes, told, sum(busy) / max(busy)
