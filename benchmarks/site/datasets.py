@@ -7,7 +7,7 @@ from benchmarks.site.text import table
 from flexclear.pipeline.core.artifacts import schema as artifacts
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
 from flexclear.pipeline.core.artifacts.schema import Schema
-from flexclear.pipeline.core.scene.variable import Variable
+from flexclear.pipeline.core.scene.output import Variable
 from flexclear.pipeline.post.sections.verdict import VERDICT
 from flexclear.pipeline.post.single_run.schema import POST
 

@@ -108,6 +108,8 @@ def _explain(options: argparse.Namespace) -> None:
 
 
 def _prune(options: argparse.Namespace) -> None:
+    from flexclear.pipeline.dynamics.compile.folder import prune
+
     if not options.days >= 0.0:
         raise InputError(f"--days {options.days}", "must not be negative", "0 removes all that nothing shows")
     store = open_workplace().store
@@ -123,17 +125,11 @@ def _prune(options: argparse.Namespace) -> None:
             upkeep.remove(store, artifact)
         for path in (*inventory.orphans, *inventory.unreadable):
             upkeep.take_away(path)
-        kernels = _prune_kernels()
+        kernels = sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
     verb = "would remove" if options.dry_run else "removed"
     print(f"{verb} {len(chosen)} artifacts and {len(inventory.orphans)} files without a record,{_megabytes(size)}")
     if kernels:
         print(f"removed {kernels} compiled kernels")
-
-
-def _prune_kernels() -> int:
-    from flexclear.pipeline.dynamics.compile.folder import prune
-
-    return sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
 
 
 def _megabytes(size: int) -> str:

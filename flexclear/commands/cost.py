@@ -148,7 +148,8 @@ class Study:
         """Make the points farther away, the cheapest first, as far as the budget goes."""
         scene, more = self.scene, cost_design.wide(self.scene, self.integrators)
         if self.models and scene.flexible():
-            more += cost_design.models(scene, self.setting, _highest(scene, self.workplace))
+            bundles = scenes.bundles(scene, self.workplace, jobs=None).values()
+            more += cost_design.models(scene, self.setting, max(float(one["frequency"].max()) for one in bundles))
         there = {design.key for design in (*self.points, *self.undone)}
         more = [design for design in more if design.key not in there]
         self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
@@ -333,11 +334,6 @@ def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> No
             for path, file in pictures.items():
                 publish(page.parent / path, made.read(file))
         publish(page, markdown(tuple(sections), f"{page.as_posix()}{options}").encode())
-
-
-def _highest(scene: Scene, workplace: Workplace) -> float:
-    """The highest frequency in the bundles of a scene with flexible bodies [Hz]; they are made first."""
-    return max(float(bundle["frequency"].max()) for bundle in scenes.bundles(scene, workplace, jobs=None).values())
 
 
 def _listed(keys: Sequence[str]) -> str:

@@ -4,6 +4,7 @@ evidence."""
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -185,7 +186,7 @@ def bring(scene: Scene, workplace: Workplace) -> Planned:
 
 def of(scene: Scene, plan: xr.Dataset) -> Scene:
     """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities set."""
-    decided = effect_plan.from_dataset(plan)
+    decided = json.loads(plan.attrs["planned"])
     bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
     fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()

@@ -15,10 +15,10 @@ from flexclear.pipeline.core.artifacts.coordinates import AXES as AXES
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES, turning, with_names
 from flexclear.pipeline.core.artifacts.coordinates import QUATERNION as QUATERNION
 from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays, of
+from flexclear.pipeline.core.scene.output import Schema as Schema
+from flexclear.pipeline.core.scene.output import Variable as Variable
+from flexclear.pipeline.core.scene.output import table
 from flexclear.pipeline.core.scene.run_schema import RUN as RUN
-from flexclear.pipeline.core.scene.variable import Schema as Schema
-from flexclear.pipeline.core.scene.variable import Variable as Variable
-from flexclear.pipeline.core.scene.variable import table
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.version import DISTRIBUTION, version
 

@@ -221,11 +221,6 @@ class Scene(Part):
     view: View | None = None
     """what pictures and comparisons look at"""
 
-    def _amounts_are_allowed(self) -> None:
-        check_rows((self.time.end - self.time.start) / self.output.interval, self.output.interval, self.limits)
-        if self.ensemble is not None:
-            check_members(self.ensemble.members, self.limits)
-
     def _samples_can_be_made(self) -> None:
         for name, load in self.load.items():
             if not isinstance(load, SampledPid):
@@ -295,7 +290,9 @@ class Scene(Part):
     def check(self) -> None:
         """ValueError where parts and settings that are right by themselves do not go together; ResourceError where they
         ask for more than `[limits]` allows."""
-        self._amounts_are_allowed()
+        check_rows((self.time.end - self.time.start) / self.output.interval, self.output.interval, self.limits)
+        if self.ensemble is not None:
+            check_members(self.ensemble.members, self.limits)
         self._samples_can_be_made()
         self._quantities_are_there()
         check_formulas(self)
