@@ -20,11 +20,12 @@ import xarray as xr
 from numpy.polynomial.polynomial import polyder
 
 from benchmarks.errors import Samples
-from benchmarks.mechanisms import Mechanism, joint_laws
+from benchmarks.mechanisms import Mechanism
 from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
+from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics.contact.surfaces import BallInSocket
-from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 from flexclear.pipeline.dynamics.model.contacts import LEAST_RATE
 from flexclear.pipeline.dynamics.model.merge import (
     Frame,
@@ -257,6 +258,16 @@ def _joints(model: Model, scene: Scene) -> None:
         else:
             ends = [_marker(model, f, X_FROM_Z) for f in (a, b)]
             add(parts.ObjectJointPrismaticX(markerNumbers=ends))
+
+
+def joint_laws(scene: Scene) -> dict[str, Pieces]:
+    """The law of every driven joint's coordinate; ValueError for drives that prescribe something else."""
+    found, dimension = {}, {"prismatic": "length", "revolute": "angle"}
+    for name, drive in scene.drive.items():
+        if not isinstance(drive, JointDrive):
+            raise ValueError(f"[drive.{name}] does not prescribe a joint's coordinate")
+        found[drive.joint] = pieces_of(drive.law, dimension[scene.joint[drive.joint].type])
+    return found
 
 
 def _driven(model: Model, a: str, b: str, law: Pieces) -> None:
