@@ -24,7 +24,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     """
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.cost import answer, causes, price, statistics, work_precision
-    from flexclear.pipeline.post.cost.split import causes_of
+    from flexclear.pipeline.post.cost.causes import causes_of
     from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
     from flexclear.pipeline.post.plotting.table import files
 

@@ -10,8 +10,7 @@ import numpy as np
 
 from benchmarks.family import Case, Family, Record, each
 from benchmarks.geometry import identify, predict
-from benchmarks.geometry.identify import DANGLE, DZ, Member
-from benchmarks.geometry.kinematics import answer
+from benchmarks.geometry.identify import DANGLE, DZ, Member, answer
 from benchmarks.geometry.predict import FLEXIBLE, MEMBERS, RESTITUTION, STARTS, Open
 from benchmarks.page import Columns, table
 from flexclear.papers.wang_wang_2019.published import TABLE8, TABLE9

@@ -1,4 +1,7 @@
-"""Layouts that have the sensitivities of Table 8, in closed form, and the one that is taken.
+"""Layouts that are symmetric to both vertical planes: kinematics, and those that have the sensitivities of Table 8.
+
+Joints are at A = (+-ax, +-ay, 0) of the platform and B = (+-bx, +-by, 0) of the base; legs 1 and 2 at +x are driven
+together, 3 and 4 held, so that the platform rises and turns about y alone.
 
 At the start the platform is level. A change of leg 1 alone then lifts and turns it as half of that change in legs 1
 and 2 does (the other half twists it about x and z): legs 3 and 4 are held, so that the lines A3, A4 stay where they are
@@ -13,12 +16,138 @@ dangle.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 
-from benchmarks.geometry.kinematics import STROKE, Answer, Layout, answer
 from flexclear.papers.wang_wang_2019.published import TABLE3, TABLE8
+
+#: length in units of which turns are counted in condition numbers, as everywhere here [m]
+SCALE = 0.1
+#: stroke of legs 1 and 2, eq. (35) [m], and places on it that are looked at
+STROKE, PLACES = 0.06, 25
+#: of Newton's method for the height, and when it is there [m]
+ITERATIONS, CONVERGED = 30, 1e-14
+#: signs of x and y of the joints of legs 1 to 4
+SIGNS = np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Places of the joints and start height of the platform's [m]."""
+
+    ax: float
+    ay: float
+    bx: float
+    by: float
+    height: float
+
+    @property
+    def A(self) -> np.ndarray:
+        """Joints of the platform in its frame, (4, 3)."""
+        return np.column_stack([SIGNS * [self.ax, self.ay], np.zeros(4)])
+
+    @property
+    def B(self) -> np.ndarray:
+        """Joints of the base, (4, 3)."""
+        return np.column_stack([SIGNS * [self.bx, self.by], np.zeros(4)])
+
+    @property
+    def leg(self) -> float:
+        """Length of a leg between its ball centres at the start [m]."""
+        return float(np.linalg.norm(self.A[0] + [0.0, 0.0, self.height] - self.B[0]))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a layout does over the stroke.
+
+    dz, dangle: largest change of height [m/m] and of the angle about y [rad/m] per change of leg 1's length.
+    lift [m], tilt [rad]: of the whole stroke.  condition: the largest.  room: least distance of two legs' axes, or of
+    one and the central chain's [m].
+    """
+
+    dz: float
+    dangle: float
+    lift: float
+    tilt: float
+    condition: float
+    room: float
+
+
+def poses(layout: Layout, extensions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Heights [m] and angles about y [rad] of the platform when legs 1 and 2 are longer by so much [m]; both (n,).
+
+    Newton's method for the height; ValueError where the legs do not reach.
+    """
+    driven, held = (layout.leg + extensions) ** 2, layout.leg**2
+    ax, bx, across = layout.ax, layout.bx, (layout.ay - layout.by) ** 2
+    drop, mean = (driven - held) / (4.0 * ax), 0.5 * (driven + held)
+    z = layout.height + 0.5 * extensions
+    for _ in range(ITERATIONS):
+        sine = -drop / z
+        if not np.all(np.abs(sine) < 1.0):
+            break
+        cosine = np.sqrt(1.0 - sine**2)
+        miss = ax**2 + bx**2 - 2.0 * ax * bx * cosine + across + z**2 - mean
+        step = miss / (2.0 * z - 2.0 * ax * bx * sine**2 / (cosine * z))
+        z = z - step
+        if np.abs(step).max() < CONVERGED:
+            return z, np.arcsin(-drop / z)
+    raise ValueError(f"the legs of {layout} do not reach over the stroke")
+
+
+def turned(layout: Layout, angles: np.ndarray) -> np.ndarray:
+    """Joints of the platform from its centre, world axes, shape (n, 4, 3)."""
+    x, y = layout.A[:, 0], layout.A[:, 1]
+    c, s = np.cos(angles)[:, None], np.sin(angles)[:, None]
+    return np.stack([x * c, np.broadcast_to(y, (len(angles), 4)), -x * s], axis=2)
+
+
+def jacobians(layout: Layout, heights: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    """Rates of the legs' lengths per rate of the height and of the rotation vector, shape (n, 4, 4)."""
+    r = turned(layout, angles)
+    d = r + np.array([0.0, 0.0, 1.0]) * heights[:, None, None] - layout.B
+    n = d / np.linalg.norm(d, axis=2, keepdims=True)
+    return np.concatenate([n[:, :, 2:], np.cross(r, n)], axis=2)
+
+
+def answer(layout: Layout, stroke: float = STROKE) -> Answer:
+    """The layout's answer; ValueError where it cannot make the stroke."""
+    heights, angles = poses(layout, np.linspace(0.0, stroke, PLACES))
+    J = jacobians(layout, heights, angles)
+    moves = np.abs(np.linalg.inv(J)[:, :, 0]).max(axis=0)
+    condition = np.linalg.cond(J @ np.diag([1.0, 1.0 / SCALE, 1.0 / SCALE, 1.0 / SCALE])).max()
+    # of the angle asin R[0, 2] in a pose turned about y alone the rate is that of the rotation about y
+    motion = float(moves[0]), float(moves[2]), float(np.ptp(heights)), float(np.abs(angles).max())
+    return Answer(*motion, float(condition), _room(layout, heights, angles))
+
+
+def _room(layout: Layout, heights: np.ndarray, angles: np.ndarray) -> float:
+    """Least distance of the axes of two legs, or of a leg and the central chain."""
+    up = np.array([0.0, 0.0, 1.0])
+    tops = turned(layout, angles) + up * heights[:, None, None]
+    below, above = np.broadcast_to(-up, (len(heights), 3)), up * heights[:, None]
+    feet = np.broadcast_to(layout.B, tops.shape)
+    bars = [(feet[:, k], tops[:, k]) for k in range(4)] + [(below, above)]
+    return min(_apart(*one, *other) for one, other in combinations(bars, 2))
+
+
+def _apart(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray) -> float:
+    """Least distance of segments a-b and c-d, pairs of rows (n, 3): inside both, or from an end of one."""
+    u, v, w = b - a, d - c, a - c
+    uu, uv, vv, uw, vw = (np.sum(x * y, axis=1) for x, y in ((u, u), (u, v), (v, v), (u, w), (v, w)))
+    free = np.maximum(uu * vv - uv**2, 1e-300)
+    fractions = [((uv * vw - vv * uw) / free, (uu * vw - uv * uw) / free)]
+    fractions += [(np.full(len(a), e), np.clip((vw + e * uv) / vv, 0.0, 1.0)) for e in (0.0, 1.0)]
+    fractions += [(np.clip((e * uv - uw) / uu, 0.0, 1.0), np.full(len(a), e)) for e in (0.0, 1.0)]
+    least = np.inf
+    for s, t in fractions:
+        inside = (s >= 0.0) & (s <= 1.0) & (t >= 0.0) & (t <= 1.0)
+        distance = np.linalg.norm(w + s[:, None] * u - t[:, None] * v, axis=1)
+        least = min(least, float(distance[inside].min(initial=np.inf)))
+    return least
+
 
 CLEARANCE = TABLE3["socket_radius"] - TABLE3["ball_radius"]
 #: sensitivities that Table 8 has [m/m, rad/m]

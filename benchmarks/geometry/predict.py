@@ -10,7 +10,7 @@ import xarray as xr
 
 from benchmarks.family import REFUSED, Record
 from benchmarks.geometry import scenes
-from benchmarks.geometry.kinematics import Layout
+from benchmarks.geometry.identify import Layout
 from flexclear.commands import scenes as stages
 from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
 from flexclear.papers.wang_wang_2019.models import JOINT, PLATFORM

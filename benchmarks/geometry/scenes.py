@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.geometry.kinematics import Layout
+from benchmarks.geometry.identify import Layout
 from flexclear.commands.scenes import find_scene
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene

@@ -10,7 +10,7 @@ from typing import Any
 import xarray as xr
 
 from benchmarks.geometry import identify
-from benchmarks.geometry.kinematics import Layout
+from benchmarks.geometry.identify import Layout
 from benchmarks.geometry.scenes import edits
 from flexclear.commands.scenes import find_scene
 from flexclear.pipeline.core.scene.load import load_scene, read_toml

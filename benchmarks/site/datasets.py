@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from benchmarks.page import DOCS
-from benchmarks.site.text import table
+from benchmarks.site.keys import table
 from flexclear.pipeline.core.artifacts import schema as artifacts
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
 from flexclear.pipeline.core.artifacts.schema import Schema

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from benchmarks.site.text import table
+from benchmarks.site.keys import table
 from flexclear.pipeline.core.scene.quantity import CONTACT_REDUCTIONS, KINDS, OWNERS, SERIES, WORDS, Kind
 
 HEAD = """# Quantities

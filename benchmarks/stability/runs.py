@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from benchmarks import crew
+from benchmarks import processes
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Measured, Record
 from benchmarks.stability.scenes import Parameters, scene, sweep
 from flexclear.commands.scenes import Workplace, bundles, open_workplace
@@ -53,7 +53,7 @@ def modules(case: Case) -> set[str]:
 
 def measure(cases: Sequence[Case], jobs: int) -> Measured:
     """A record for each case; one that hangs or dies is an outcome, too."""
-    for case, found in crew.outcomes(list(cases), jobs, run_case, LIMIT):
+    for case, found in processes.outcomes(list(cases), jobs, run_case, LIMIT):
         yield case, [{"sweep": sweep(case.name), "parameters": asdict(case.of), **found}]
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.family import Case
-from benchmarks.geometry.kinematics import Layout
+from benchmarks.geometry.identify import Layout
 from benchmarks.geometry.scenes import ROD_CENTRE, ROD_END, edits
 from flexclear.pipeline.core.scene.load import compose, scene_of
 from flexclear.pipeline.core.scene.schema import Scene

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.post.overview.page import Part
+    from flexclear.pipeline.post.pages import Part
 
 #: what `--ideal` takes away: everything at once, one effect, or one after the other
 IDEAL = ("both", *EFFECTS, "each")
@@ -132,14 +132,14 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
 
 def page(comparison: Comparison, title: str) -> bytes:
     """The page of a comparison, all pictures inside."""
-    from flexclear.pipeline.post.overview.page import page as written
+    from flexclear.pipeline.post.pages import page as written
 
     return written(f"Compared: {title}", "The first run is the reference.", parts(comparison))
 
 
 def parts(comparison: Comparison) -> list[Part]:
     """What a page shows of a comparison."""
-    from flexclear.pipeline.post.overview.page import Part, media
+    from flexclear.pipeline.post.pages import Part, media
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
     tables = "".join(as_html(from_markdown(comparison.file(name).read_text(encoding="utf-8"))) for name in TABLES)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.post.cost.page import Studied
+    from flexclear.pipeline.post.cost.answer import Studied
 
 #: tolerances at which ensembles are compared, where a scene has one
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
@@ -299,7 +299,7 @@ def figures_and_tables(name: str, study: xr.Dataset, folder: Path, pictures: str
 
     study, folder: as `bring` returned them.  pictures: folder for them next to the page.
     """
-    from flexclear.pipeline.post.cost.page import Studied, advice
+    from flexclear.pipeline.post.cost.answer import Studied, advice
 
     tables = tuple((folder / file).read_text(encoding="utf-8") for file in PRINTED if (folder / file).is_file())
     files = {stem: folder / f"{stem}.png" for stem in FIGURES}
@@ -313,7 +313,7 @@ def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, optio
 
     studies: what `bring` returned, by scene.  options: the command's other options.
     """
-    from flexclear.pipeline.post.cost.page import markdown
+    from flexclear.pipeline.post.cost.answer import markdown
 
     sections = []
     with disk_limits(page.parent):

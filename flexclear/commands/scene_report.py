@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.post.overview.page import Part
+    from flexclear.pipeline.post.pages import Part
 
 #: what a report shows of the motion, by the names of `Graph.render`
 SHOWN = ("motion mp4", "motion html", "modes html")
@@ -100,7 +100,7 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
     if not folder:
         publish(where / f"{name}.html", page)
         return where / f"{name}.html"
-    from flexclear.pipeline.post.overview.page import in_folder
+    from flexclear.pipeline.post.pages import in_folder
 
     (where / name).mkdir(parents=True, exist_ok=True)
     for file, content in in_folder(page).items():
@@ -124,7 +124,7 @@ def _answers(answers: Answers, workplace: Workplace) -> dict[str, Answer]:
 
 def _answered(scene: Scene, result: Mapping[str, Answer]) -> list[Part]:
     """The three sections: each with a sentence that answers, a picture and a table."""
-    from flexclear.pipeline.post.overview.page import Part, media
+    from flexclear.pipeline.post.pages import Part, media
 
     parts = []
     for name, answer in result.items():
@@ -145,7 +145,7 @@ def _page(
 ) -> bytes:
     from flexclear.pipeline.post.answers.matters import ideal_sentences
     from flexclear.pipeline.post.answers.summary import answer, by_weight, effects
-    from flexclear.pipeline.post.overview.page import Part, downloads, listed, page
+    from flexclear.pipeline.post.pages import Part, downloads, listed, page
     from flexclear.pipeline.post.single_run.series import parameters
 
     scene = graph.scene
@@ -263,7 +263,7 @@ def _moving(graph: Graph, workplace: Workplace, records: Mapping[int, Record]) -
 def _media(
     workplace: Workplace, task: Task, records: Mapping[int, Record], captions: Mapping[str, tuple[str, str]]
 ) -> str:
-    from flexclear.pipeline.post.overview.page import media
+    from flexclear.pipeline.post.pages import media
 
     record = records.get(id(task))
     if record is None:

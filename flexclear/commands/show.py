@@ -130,7 +130,7 @@ def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False
 
 
 def _page(scene: Scene, seen: StartView) -> bytes:
-    from flexclear.pipeline.post.overview.page import viewer_page
+    from flexclear.pipeline.post.pages import viewer_page
     from flexclear.pipeline.post.pages import viewer
     from flexclear.pipeline.post.render.start_view import page_view
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from flexclear.papers.wang_wang_2019.discrepancies import DISCREPANCIES
 from flexclear.papers.wang_wang_2019.published import CITATION
-from flexclear.pipeline.post.overview.page import Part, downloads, media, page, prose
+from flexclear.pipeline.post.pages import Part, downloads, media, page, prose
 from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html
 
 #: the table with a verdict on each statement, and its words

@@ -11,7 +11,7 @@ import pytest
 from flexclear.papers.wang_wang_2019 import figures, report
 from flexclear.papers.wang_wang_2019.discrepancies import DISCREPANCIES
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.post.overview.page import in_folder
+from flexclear.pipeline.post.pages import in_folder
 from tests.paper.material import everything
 
 RENDERED = "sps4/far_csj_cb"

@@ -11,7 +11,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.post.cost import causes, page, price, split, work_precision
+from flexclear.pipeline.post.cost import answer, causes, price, work_precision
 from flexclear.pipeline.post.cost.study import Point, assemble, resolved
 
 POSITION = Quantity("slider", "position")
@@ -181,7 +181,7 @@ def test_a_scene_that_is_refused_as_it_stands_has_no_causes():
     _, points, runs = study()
     points.append(Point("as it is", "sampling", {"interval": 0.1}))
     runs["as it is"] = xr.Dataset(attrs={"refused": "no"})
-    found = split.causes_of(POSITION, points, runs, located=1e-12)
+    found = causes.causes_of(POSITION, points, runs, located=1e-12)
     assert np.isnan(found["time integration"])
     assert causes.dominant(found) == "–"
 
@@ -195,11 +195,11 @@ def test_the_spread_of_an_ensemble_is_a_cause():
         "standard_error": (("quantity",), [0.01]),
     }
     ensemble = xr.Dataset(data, {"contact": ["pin"], "quantity": ["slider.position"]})
-    found = split.causes_of(POSITION, points, runs, 1e-12, ensemble)
+    found = causes.causes_of(POSITION, points, runs, 1e-12, ensemble)
     assert found["ensemble spread"] == pytest.approx(1.96 * 0.01 / SIZE)
-    assert np.isnan(split.causes_of(TIMES, points, runs, 1e-12, ensemble)["ensemble spread"])
+    assert np.isnan(causes.causes_of(TIMES, points, runs, 1e-12, ensemble)["ensemble spread"])
     runs["best"]["event_peak_force"] = (("event",), np.full(3, 100.0))
-    peak = split.causes_of(Quantity("pin", "peak_force"), points, runs, 1e-12, ensemble)["ensemble spread"]
+    peak = causes.causes_of(Quantity("pin", "peak_force"), points, runs, 1e-12, ensemble)["ensemble spread"]
     assert peak == pytest.approx(1.96 * 0.05 / np.sqrt(members), rel=0.5)
 
 
@@ -224,13 +224,13 @@ def test_causes_come_from_pairs_that_differ_in_one_thing():
     for (key, factors), error in zip(variants.items(), (0.0, 3e-4, 2e-3), strict=True):
         points.append(Point(key, "model", factors))
         runs[key] = run(error)
-    found = split.causes_of(POSITION, points, runs, located=1e-12)
+    found = causes.causes_of(POSITION, points, runs, located=1e-12)
     assert found["time integration"] == pytest.approx(1e-5 / SIZE)
     assert found["mesh"] == pytest.approx(3e-4 / SIZE)
     assert found["beam theory"] == pytest.approx(2e-3 / SIZE)
     assert found["modal truncation"] == 0.0
     assert causes.dominant(found) == "beam theory"
-    located = split.causes_of(TIMES, points, runs, located=1e-12)["event location"]
+    located = causes.causes_of(TIMES, points, runs, located=1e-12)["event location"]
     assert located == pytest.approx(1e-12 * 1e-3 / 0.5 / 0.6)  # share of the clearance, over speed, over the span
 
 
@@ -257,8 +257,8 @@ def test_contacts_beyond_the_horizon_do_not_count():
 
 def written(found: xr.Dataset, tables: tuple[str, ...] = (), pictures: Mapping[str, str] | None = None) -> str:
     """The page of one scene."""
-    said = page.Studied("a/scene", page.advice(found, tables), tables, pictures or {})
-    return page.markdown((said,), "docs/accuracy.md")
+    said = answer.Studied("a/scene", answer.advice(found, tables), tables, pictures or {})
+    return answer.markdown((said,), "docs/accuracy.md")
 
 
 def test_the_page_says_what_each_digit_costs():

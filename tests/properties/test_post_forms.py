@@ -17,11 +17,10 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, surfaces, vibrations
-from flexclear.pipeline.post.render.forms import Seat, equivalent
+from flexclear.pipeline.post.render.forms import Seat, equivalent, wheels
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
 from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.render.vibrations import Vibrations
-from flexclear.pipeline.post.render.wheels import wheels
 from flexclear.pipeline.post.shapes.body_shape import surface
 from flexclear.pipeline.post.shapes.rod_shape import AROUND, PER_CELL
 from flexclear.pipeline.structure.kinds import kind

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import crew, errors, exudyn_apart, log, page, timing
+from benchmarks import errors, log, page, processes, timing
 from benchmarks.errors import SAMPLING, Error, Samples
 from benchmarks.exudyn_model import METHODS, Outcome, holds_at_zero, joint_laws, polynomials, solve
 from benchmarks.families import evaluation, exudyn, growth
@@ -135,16 +135,16 @@ def test_the_peer_s_crash_is_the_outcome_of_a_setting(monkeypatch: pytest.Monkey
         def take(self) -> Outcome:
             step = begun[-1][-1]
             if step == 1.0 or (step == 2.0 and len(begun[-1]) > 1):
-                raise crew.LostError("its process died (SIGSEGV)")
+                raise processes.LostError("its process died (SIGSEGV)")
             if step == 3.0:
-                raise crew.LostError("did not end within 120 s of processor time", 120.0)
+                raise processes.LostError("did not end within 120 s of processor time", 120.0)
             return Outcome(step, None if step == 4.0 else Samples(*np.zeros((3, 1))), "no way" if step == 4.0 else "")
 
         def dismiss(self) -> None:
             pass
 
-    monkeypatch.setattr(exudyn_apart, "Worker", Process)
-    peer = exudyn_apart.Peer(Mechanism("none", growth.four_bars(1), {}), "bar0")
+    monkeypatch.setattr(exudyn, "Worker", Process)
+    peer = exudyn.Peer(Mechanism("none", growth.four_bars(1), {}), "bar0")
     told = [peer.run("any", step, SAMPLING).failure for step in (5.0, 1.0, 5.0, 2.0, 5.0, 3.0, 4.0, 5.0)]
     died, late = "its process died (SIGSEGV)", "did not end within 120 s of processor time"
     assert told == ["", died, "", "", "", late, "no way", ""]

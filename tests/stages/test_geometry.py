@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.geometry import identify, kinematics, scenes
-from benchmarks.geometry.identify import DANGLE, DZ
-from benchmarks.geometry.kinematics import Layout, answer, jacobians, poses
+from benchmarks.geometry import identify, scenes
+from benchmarks.geometry.identify import DANGLE, DZ, Layout, answer, jacobians, poses
 from flexclear.commands.scenes import find_scene
 from flexclear.papers.wang_wang_2019.published import TABLE8
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
@@ -64,9 +63,9 @@ def test_crossing_legs_have_no_room() -> None:
     a, b = np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0]])
     up = np.array([[0.0, 0.0, 1.0]])
     below, above = np.array([[0.5, 0.3, -1.0]]), np.array([[0.5, 0.3, 1.0]])
-    assert kinematics._apart(a, b, below, above) == pytest.approx(0.3, abs=1e-12)
+    assert identify._apart(a, b, below, above) == pytest.approx(0.3, abs=1e-12)
     aside = np.array([[0.4, 0.0, 0.0]])
-    assert kinematics._apart(a, b, b + 0.5 * up + aside, b + up) == pytest.approx(_ends(), abs=1e-12)
+    assert identify._apart(a, b, b + 0.5 * up + aside, b + up) == pytest.approx(_ends(), abs=1e-12)
 
 
 def _ends() -> float:

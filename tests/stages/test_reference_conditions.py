@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.families import reference_conditions
 from benchmarks.family import Record as Row
-from benchmarks.geometry.kinematics import Layout
+from benchmarks.geometry.identify import Layout
 from benchmarks.reference_conditions import claims, design, figures, layouts
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, MOST_COMPLETE, PLACES, RIGID, Case
 

@@ -10,7 +10,7 @@ import xarray as xr
 
 from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.post.overview.overlay import colors
+from flexclear.pipeline.post.overview.comparison import colors
 from flexclear.stages.graph import Graph
 
 SCENE = "checks/clamped_rod"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from benchmarks import crew, log
+from benchmarks import log, processes
 from benchmarks.families.stability import FAMILY
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Record
 from benchmarks.stability import runs, scenes
@@ -115,7 +115,7 @@ def test_friction_that_feeds_energy_is_wrong():
 
 def test_a_case_that_hangs_and_one_that_dies_are_outcomes_and_the_others_go_on():
     todo = [Case(f"joints {n}", Parameters(joints=n)) for n in (1, 2, 3, 4, 5)]
-    found = {case.of.joints: record for case, record in crew.outcomes(todo, 1, hard_cases.work, limit=2)}
+    found = {case.of.joints: record for case, record in processes.outcomes(todo, 1, hard_cases.work, limit=2)}
     assert {n: record["verdict"] for n, record in found.items()} == {
         1: FINISHED,
         2: WRONG,

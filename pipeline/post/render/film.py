@@ -24,6 +24,7 @@ from flexclear.pipeline.post.render.mechanism import (
     placed,
     shade,
 )
+from flexclear.pipeline.post.render.pace import rate, write
 from flexclear.pipeline.post.render.panel import panel
 from flexclear.pipeline.post.render.ruler import (
     BAR,
@@ -37,7 +38,6 @@ from flexclear.pipeline.post.render.ruler import (
 )
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import ANGLE, eye
-from flexclear.pipeline.post.render.writing import rate, write
 from flexclear.pipeline.post.shapes.body_shape import faces, has_edges
 
 VIEW, SIDE, HEIGHT = 656, 304, 540

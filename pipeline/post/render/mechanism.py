@@ -14,10 +14,9 @@ from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.render import forms, surfaces
-from flexclear.pipeline.post.render.forms import Seat, Solid, equivalent
+from flexclear.pipeline.post.render.forms import Seat, Solid, Wheel, equivalent, wheels
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View, view
-from flexclear.pipeline.post.render.wheels import Wheel, wheels
 from flexclear.pipeline.post.shapes import body_stress
 from flexclear.pipeline.post.shapes.body_shape import faces, scale_to, surface
 from flexclear.pipeline.post.single_run.series import parameters

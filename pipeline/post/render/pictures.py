@@ -14,8 +14,7 @@ import xarray as xr
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.post.overview.page import media, viewer_page
-from flexclear.pipeline.post.pages import viewer
+from flexclear.pipeline.post.pages import media, viewer, viewer_page
 from flexclear.pipeline.post.plotting import mode_sheet
 from flexclear.pipeline.post.render import gl, gltf, joint_view, pace, paraview, player, vibrations
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
@@ -158,12 +157,12 @@ def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _mode_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.render import writing
+    from flexclear.pipeline.post.render import pace
 
     files = {}
     for body, bundle in _bodies(shown).items():
         seen = player.side(bundle)
-        suffix, content = writing.write(mode_sheet.frames(body, bundle, seen.direction, seen.up), 12, kind)
+        suffix, content = pace.write(mode_sheet.frames(body, bundle, seen.direction, seen.up), 12, kind)
         files[f"modes_{body}.{suffix}"] = content
     return files
 
@@ -219,12 +218,12 @@ def _joint_page(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _joint_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.render import joint_film, writing
+    from flexclear.pipeline.post.render import joint_view, pace
 
-    files, rate = {}, writing.rate(kind)
+    files, rate = {}, pace.rate(kind)
     for k, name in _joints(shown).items():
-        pictures = joint_film.frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
-        suffix, content = writing.write(pictures, rate, kind)
+        pictures = joint_view.frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
+        suffix, content = pace.write(pictures, rate, kind)
         files[f"joint_{name}.{suffix}"] = content
     return files
 
@@ -253,11 +252,11 @@ def _vibration_sheet(shown: Shown, kind: str) -> dict[str, bytes]:
 
 def _vibration_film(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
+    from flexclear.pipeline.post.render import pace
     from flexclear.pipeline.post.render import vibration_film as film
-    from flexclear.pipeline.post.render import writing
 
-    rate = writing.rate(kind)
-    suffix, content = writing.write(film.frames(*_vibrating(shown), rate, shown.progress), rate, kind)
+    rate = pace.rate(kind)
+    suffix, content = pace.write(film.frames(*_vibrating(shown), rate, shown.progress), rate, kind)
     return {f"vibrations.{suffix}": content}
 
 

@@ -15,7 +15,6 @@ import xarray as xr
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.post.overview.curves import scaled
 from flexclear.pipeline.post.render import joint_view, pace, surfaces
-from flexclear.pipeline.post.render.fields import fields_of, hertz, linear_fields
 from flexclear.pipeline.post.render.mechanism import (
     CLEARANCE_COLOR,
     COLORS,
@@ -30,7 +29,7 @@ from flexclear.pipeline.post.render.mechanism import (
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.view import View, axes_of, eye
 from flexclear.pipeline.post.shapes import body_stress
-from flexclear.pipeline.post.shapes.body_shape import box, faces, scale_to
+from flexclear.pipeline.post.shapes.body_shape import box, faces, fields_of, hertz, linear_fields, scale_to
 
 #: frames of a motion, and width over height of a picture that is neither wide nor narrow
 FRAMES, ASPECT = 240, 1.2

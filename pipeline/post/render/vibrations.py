@@ -9,8 +9,8 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.post.render import surfaces
-from flexclear.pipeline.post.render.fields import hertz, linear_fields
 from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose, rest, skin
+from flexclear.pipeline.post.shapes.body_shape import hertz, linear_fields
 
 #: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size
 FRACTION = 0.12

@@ -1,10 +1,12 @@
-"""Processes that take cases in turn; one that takes too long or dies is replaced, and that is an outcome."""
+"""Processes that take work in turn; one that takes too long or dies is replaced, and that is an outcome."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import suppress
 from multiprocessing import connection, get_context
+from queue import SimpleQueue
 from typing import Any
 
 from benchmarks import system
@@ -25,37 +27,31 @@ class LostError(Exception):
 
 def outcomes(cases: Sequence[Case], jobs: int, work: Work, limit: int) -> Iterator[tuple[Case, Record]]:
     """Every case with its record, as they come; see `Worker`, which is given what the case is of."""
-    waiting = list(reversed(cases))
-    crew: dict[connection.Connection, tuple[Worker, Case]] = {}
-    try:
-        while waiting or crew:
-            while waiting and len(crew) < jobs:
-                _next(crew, Worker(work, limit), waiting)
-            for line in connection.wait(list(crew)):
-                worker, case = crew[line]  # type: ignore[index]
-                yield case, _outcome(worker)
-                if worker.alive and waiting:
-                    _next(crew, worker, waiting)
-                else:
-                    worker.dismiss()
-                    del crew[worker.line]
-    finally:
-        for worker, _ in crew.values():
-            worker.dismiss()
+    workers = [Worker(work, limit) for _ in range(min(jobs, len(cases)))]
+    idle: SimpleQueue[int] = SimpleQueue()
 
+    def record(case: Case) -> Record:
+        number = idle.get()
+        try:
+            workers[number].give(case.of)
+            found: Record = workers[number].take()
+        except LostError as lost:
+            found = {"verdict": WRONG, "reason": str(lost), "seconds": lost.seconds}
+            workers[number] = Worker(work, limit)
+        idle.put(number)
+        return found
 
-def _next(crew: dict[connection.Connection, tuple[Worker, Case]], worker: Worker, waiting: list[Case]) -> None:
-    case = waiting.pop()
-    worker.give(case.of)
-    crew[worker.line] = worker, case
-
-
-def _outcome(worker: Worker) -> Record:
-    try:
-        found: Record = worker.take()
-    except LostError as lost:
-        return {"verdict": WRONG, "reason": str(lost), "seconds": lost.seconds}
-    return found
+    for number in range(len(workers)):
+        idle.put(number)
+    with ThreadPoolExecutor(max(len(workers), 1)) as threads:
+        waiting = {threads.submit(record, case): case for case in cases}
+        try:
+            for done in as_completed(waiting):
+                yield waiting[done], done.result()
+        finally:
+            threads.shutdown(wait=False, cancel_futures=True)
+            for worker in workers:
+                worker.dismiss()
 
 
 class Worker:
@@ -69,7 +65,7 @@ class Worker:
         # spawned, not forked: compiled code with threads does not survive a fork
         context = get_context("spawn")
         self.line, other = context.Pipe()
-        self.limit, self.alive = limit, True
+        self.limit = limit
         self.process = context.Process(target=_serve, args=(other, work, limit), daemon=True)
         self.process.start()
         other.close()
@@ -86,7 +82,6 @@ class Worker:
                 return self.line.recv()
             self.dismiss()
             raise LostError(f"did not answer within {PATIENCE * self.limit} s")
-        self.alive = False
         self.process.join()
         code = self.process.exitcode or 0
         if system.ended_by(code) == "SIGXCPU":
@@ -95,10 +90,10 @@ class Worker:
 
     def dismiss(self) -> None:
         """End the process, whatever it does."""
-        self.alive = False
-        self.line.close()
+        # first of all: a thread that waits for an answer is told by the end of its line
         self.process.terminate()
         self.process.join()
+        self.line.close()
 
 
 def _serve(line: connection.Connection, work: Work, limit: int) -> None:
