@@ -12,7 +12,7 @@ from fnmatch import fnmatch
 from importlib.util import find_spec
 from pathlib import Path
 
-from benchmarks import families, log, page, system
+from benchmarks import families, log, page, processes
 from benchmarks.family import WRONG, Case, Family, Record
 from flexclear.commands.__main__ import INTERRUPTED
 from flexclear.pipeline.core.scene.registry import suggestion
@@ -71,7 +71,7 @@ def _run(name: str, family: Family, options: argparse.Namespace) -> bool:
         library, extra = family.needs
         print(f"{name}: {library} is not installed; .venv/bin/python -m pip install -e '.[{extra}]' brings it")
         return False
-    if family.children and (why := system.lacking()):
+    if family.children and (why := processes.lacking()):
         print(f"{name}: {why}")
         return False
     every = family.cases(**settings)

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from benchmarks import system
+from benchmarks import processes
 
 T = TypeVar("T")
 K = TypeVar("K")
@@ -52,9 +52,9 @@ def once(task: Callable[[], object]) -> float:
 
 def of_children(task: Callable[[], object]) -> float:
     """Processor time of the processes that one call starts and waits for, with those that they start [s]."""
-    before = system.seconds_of_children()
+    before = processes.seconds_of_children()
     task()
-    return system.seconds_of_children() - before
+    return processes.seconds_of_children() - before
 
 
 def interleaved(tasks: Mapping[K, Callable[[], float]], rounds: int) -> dict[K, Times]:

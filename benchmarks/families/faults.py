@@ -24,7 +24,7 @@ from typing import Any
 
 import psutil
 
-from benchmarks import system
+from benchmarks import processes
 from benchmarks.family import FINISHED, WRONG, Case, Family, Measured, Record
 from benchmarks.page import Columns, table
 from flexclear.pipeline.core.artifacts import upkeep
@@ -331,9 +331,9 @@ def _helpers(
         store = Store(Path(here["FLEXCLEAR_RESULTS"]))
         process = _start(words, here, stderr=subprocess.PIPE)
         end = time.monotonic() + min(LATEST, seconds) * rng.random()
-        while process.poll() is None and (time.monotonic() < end or not system.children(process.pid)):
+        while process.poll() is None and (time.monotonic() < end or not processes.children(process.pid)):
             time.sleep(0.01)
-        children = system.children(process.pid)
+        children = processes.children(process.pid)
         waiting = _idle(process.pid, children) if idle else children
         if not waiting:  # nothing was brought about
             process.communicate()
@@ -351,11 +351,11 @@ def _helpers(
     return counts
 
 
-def _idle(parent: int, processes: Sequence[psutil.Process]) -> list[psutil.Process]:
+def _idle(parent: int, running: Sequence[psutil.Process]) -> list[psutil.Process]:
     """Those of a process's children that take no processor time for a moment."""
-    before = {process: system.seconds_of(process) for process in processes}
+    before = {child: processes.seconds_of(child) for child in running}
     time.sleep(LOOK)
-    return [p for p in system.children(parent) if p in before and system.seconds_of(p) - before[p] < IDLE]
+    return [p for p in processes.children(parent) if p in before and processes.seconds_of(p) - before[p] < IDLE]
 
 
 def _artifacts(store: Store) -> dict[tuple[str, str], str]:
@@ -369,7 +369,7 @@ def _full(folder: Path, environment: dict[str, str]) -> Counter[str]:
     counts = Counter[str]()
     for k, size in enumerate(FULL):
         here = {**environment, "FLEXCLEAR_RESULTS": f"{folder}/full{k}"}
-        code = _start(["run", SCENE], here, preexec_fn=system.limit_files(size)).wait()
+        code = _start(["run", SCENE], here, preexec_fn=processes.limit_files(size)).wait()
         store = Store(Path(here["FLEXCLEAR_RESULTS"]))
         damaged = upkeep.inventory(store, whole=True).damaged if store.root.is_dir() else ()
         counts["used" if damaged or code not in (0, 4) else "detected" if code else "harmless"] += 1

@@ -13,7 +13,8 @@ from flexclear.papers.wang_wang_2019.figures import Figure
 from flexclear.papers.wang_wang_2019.published import TABLE4_NORMAL_MODE, TABLE5_NORMAL_MODE
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.drawing import View, shell, triad, view
-from flexclear.pipeline.post.shapes.rod_shape import scale_to, surface
+from flexclear.pipeline.post.shapes.rod_shape import rod_scale_to as scale_to
+from flexclear.pipeline.post.shapes.rod_shape import rod_surface as surface
 
 #: drawn size of the largest displacement, as a fraction of the body's length
 FRACTION = 0.16

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.papers.wang_wang_2019.figures import Data, Figure, measured
+from flexclear.papers.wang_wang_2019 import deviations
+from flexclear.papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference, mode_set
+from flexclear.papers.wang_wang_2019.figures import Data, Figure
 from flexclear.papers.wang_wang_2019.figures.errors import NOISE
-from flexclear.papers.wang_wang_2019.figures.measured import SEPARATION, SLIGHT, difference, mode_set
 from flexclear.papers.wang_wang_2019.figures.table10 import ratios
 from flexclear.papers.wang_wang_2019.models import (
     CSJ,
@@ -78,9 +79,9 @@ def _verdict(*tests: bool) -> str:
 
 
 def _same_motion(data: Data) -> Outcome:
-    own, fractions = measured.sizes(data), []
+    own, fractions = deviations.sizes(data), []
     for model in FAR:
-        moved = measured.moved(data, model)
+        moved = deviations.moved(data, model)
         fractions.append(
             max(moved.angle / own.angle, moved.displacement / own.displacement, moved.velocity / own.velocity)
         )
@@ -90,8 +91,8 @@ def _same_motion(data: Data) -> Outcome:
 
 
 def _same_acceleration(data: Data) -> Outcome:
-    largest = measured.acceleration(data, IDEAL)
-    fractions = {model: difference(data, model, measured.vertical).max() / largest for model in FAR}
+    largest = deviations.acceleration(data, IDEAL)
+    fractions = {model: difference(data, model, deviations.vertical).max() / largest for model in FAR}
     text = ", ".join(
         f"{100 * fraction:.2g} % ({mode_set(model)})" for model, fraction in fractions.items() if fraction > ROUNDING
     )
@@ -104,9 +105,12 @@ def _same_path(*models: Model) -> Callable[[Data], Outcome]:
     """Whether the ball's centre stays next to the ideal model's; as a fraction of how far that moves."""
 
     def outcome(data: Data) -> Outcome:
-        ideal = measured.centre(data[f"{IDEAL.scene}:run"])
+        ideal = deviations.ball_centre(data[f"{IDEAL.scene}:run"])
         stroke = float(np.linalg.norm(ideal - ideal[0], axis=1).max())
-        off = {model: float(np.linalg.norm(difference(data, model, measured.centre), axis=1).max()) for model in models}
+        off = {
+            model: float(np.linalg.norm(difference(data, model, deviations.ball_centre), axis=1).max())
+            for model in models
+        }
         words = ", ".join(f"{mode_set(model) or model.label} {_length(far)}" for model, far in off.items())
         return _verdict(*(far < SMALL * stroke for far in off.values())), (
             f"off by {words} at most, of a path that goes {1e3 * stroke:.0f} mm far"
@@ -126,14 +130,14 @@ def _length(far: float) -> str:
 
 
 def _slight_vibration(data: Data) -> Outcome:
-    ideal = measured.reaction(data, IDEAL)
-    reactions = {m: measured.reaction(data, m) for m in FAR}
+    ideal = deviations.reaction(data, IDEAL)
+    reactions = {m: deviations.reaction(data, m) for m in FAR}
     text = ", ".join(f"{mode_set(m)} {force:.0f} N" for m, force in reactions.items())
     return _verdict(*(force / ideal - 1.0 < SLIGHT for force in reactions.values())), f"ideal {ideal:.0f} N; {text}"
 
 
 def _consistent(data: Data) -> Outcome:
-    free, fixed, full = (measured.effects(data, model) for model in (FAR_FREE, FAR_FIXED, FAR_CB))
+    free, fixed, full = (deviations.effects(data, model) for model in (FAR_FREE, FAR_FIXED, FAR_CB))
     fractions = {name: abs(free[name] - fixed[name]) / size for name, size in full.items() if size > 0.0}
     missed = max(free["velocity"], fixed["velocity"]) < SLIGHT * full["velocity"]
     text = ", ".join(f"{100 * fraction:.2g} % ({name})" for name, fraction in fractions.items())
@@ -144,7 +148,7 @@ def _consistent(data: Data) -> Outcome:
 
 
 def _free_suitable(data: Data) -> Outcome:
-    free, full = measured.moved(data, FAR_FREE).velocity, measured.moved(data, FAR_CB).velocity
+    free, full = deviations.moved(data, FAR_FREE).velocity, deviations.moved(data, FAR_CB).velocity
     return _verdict(abs(free / full - 1.0) < SLIGHT), (
         f"free-free modes find {1e3 * free:.2g} mm/s of the {1e3 * full:.2g} mm/s that a basis with all static "
         "compliance finds"
@@ -162,7 +166,7 @@ def _in_both_layouts(outcome: Callable[[Data, Model, Model], Outcome]) -> Callab
 
 
 def _no_influence(data: Data, csj: Model, ideal: Model) -> Outcome:
-    own, moved = measured.sizes(data, ideal), measured.moved(data, csj, ideal)
+    own, moved = deviations.sizes(data, ideal), deviations.moved(data, csj, ideal)
     fractions = moved.angle / own.angle, moved.displacement / own.displacement
     return _verdict(
         *(s < SMALL for s in fractions)
@@ -170,13 +174,13 @@ def _no_influence(data: Data, csj: Model, ideal: Model) -> Outcome:
 
 
 def _velocity_free(data: Data, csj: Model, ideal: Model) -> Outcome:
-    fraction = measured.moved(data, csj, ideal).velocity / measured.sizes(data, ideal).velocity
+    fraction = deviations.moved(data, csj, ideal).velocity / deviations.sizes(data, ideal).velocity
     return _verdict(fraction < SMALL), f"{100 * fraction:.1f} % of the largest velocity"
 
 
 def _conspicuous(data: Data, csj: Model, ideal: Model) -> Outcome:
-    force = measured.reaction(data, ideal), measured.reaction(data, csj)
-    acceleration = measured.acceleration(data, ideal), measured.acceleration(data, csj)
+    force = deviations.reaction(data, ideal), deviations.reaction(data, csj)
+    acceleration = deviations.acceleration(data, ideal), deviations.acceleration(data, csj)
     return _verdict(force[1] > 2.0 * force[0], acceleration[1] > 2.0 * acceleration[0]), (
         f"force {force[0]:.0f} to {force[1]:.0f} N, acceleration {acceleration[0]:.0f} to {acceleration[1]:.0f} m/s²"
     )
@@ -184,20 +188,20 @@ def _conspicuous(data: Data, csj: Model, ideal: Model) -> Outcome:
 
 def _lowered(data: Data) -> Outcome:
     models = (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)
-    force = [measured.reaction(data, m) for m in models]
-    acceleration = [measured.acceleration(data, m) for m in models]
+    force = [deviations.reaction(data, m) for m in models]
+    acceleration = [deviations.acceleration(data, m) for m in models]
     text = "; ".join(
         f"{mode_set(m)} {f:.0f} N, {a:.0f} m/s²" for m, f, a in zip(models, force, acceleration, strict=True)
     )
-    rigid = measured.reaction(data, CSJ), measured.acceleration(data, CSJ)
+    rigid = deviations.reaction(data, CSJ), deviations.acceleration(data, CSJ)
     tests = [f < rigid[0] and a < rigid[1] for f, a in zip(force, acceleration, strict=True)]
     return _verdict(*tests), f"CSJ {rigid[0]:.0f} N, {rigid[1]:.0f} m/s²; {text}"
 
 
 def _motion_kept(data: Data) -> Outcome:
     """Angle and displacement are those of the ideal model, and none depends on the mode set."""
-    own, fractions = measured.sizes(data), []
-    moved = {model: measured.moved(data, model) for model in FAR_CSJ}
+    own, fractions = deviations.sizes(data), []
+    moved = {model: deviations.moved(data, model) for model in FAR_CSJ}
     for m in moved.values():
         fractions.append([m.angle / own.angle, m.displacement / own.displacement, m.velocity / own.velocity])
     largest = np.max(fractions, axis=0)
@@ -213,7 +217,7 @@ def _paths_differ(data: Data) -> Outcome:
     """The ball's path in the socket, by what can be said of it beyond the horizon: statistics of the members."""
     free, fixed = (data[f"{model.scene}:ensemble"].sel(contact=JOINT) for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED))
     names = {"impact_count": ("impacts", 1.0), "contact_time_share": ("% of the time in contact", 100.0)}
-    tests = [measured.differ(free[name].values, fixed[name].values) for name in names]
+    tests = [deviations.differ(free[name].values, fixed[name].values) for name in names]
     texts = [
         f"{factor * free[n].mean():.0f} ± {factor * free[n].std(ddof=1):.0f} and "
         f"{factor * fixed[n].mean():.0f} ± {factor * fixed[n].std(ddof=1):.0f} {words}"
@@ -224,8 +228,8 @@ def _paths_differ(data: Data) -> Outcome:
 
 def _dashpot(data: Data) -> Outcome:
     """Vibration as the root mean square of the platform's acceleration minus the ideal one, at the outputs."""
-    ideal = measured.vertical(data[f"{IDEAL.scene}:run"])
-    rigid = float(np.sqrt(np.mean(difference(data, CSJ, measured.vertical) ** 2)))
+    ideal = deviations.vertical(data[f"{IDEAL.scene}:run"])
+    rigid = float(np.sqrt(np.mean(difference(data, CSJ, deviations.vertical) ** 2)))
     rows = {}
     for model in FAR_CSJ:
         members = data[f"{model.scene}:ensemble"].acceleration.sel(body=PLATFORM, axis="z").values
@@ -239,8 +243,8 @@ def _dashpot(data: Data) -> Outcome:
 
 
 def _sets_differ(data: Data) -> Outcome:
-    force = [measured.reaction(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
-    acceleration = [measured.acceleration(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
+    force = [deviations.reaction(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
+    acceleration = [deviations.acceleration(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
     differences = [abs(a / b - 1.0) for a, b in (force, acceleration)]
     return _verdict(
         *(a > SLIGHT for a in differences)
@@ -248,10 +252,13 @@ def _sets_differ(data: Data) -> Outcome:
 
 
 def _fixed_right(data: Data) -> Outcome:
-    best = measured.reaction(data, FAR_CSJ_CB), measured.acceleration(data, FAR_CSJ_CB)
+    best = deviations.reaction(data, FAR_CSJ_CB), deviations.acceleration(data, FAR_CSJ_CB)
     off = {}
     for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED):
-        off[model] = measured.reaction(data, model) / best[0] - 1.0, measured.acceleration(data, model) / best[1] - 1.0
+        off[model] = (
+            deviations.reaction(data, model) / best[0] - 1.0,
+            deviations.acceleration(data, model) / best[1] - 1.0,
+        )
     free, fixed = off[FAR_CSJ_FREE], off[FAR_CSJ_FIXED]
     return _verdict(abs(fixed[0]) < abs(free[0]), abs(fixed[1]) < abs(free[1])), (
         f"against all static compliance: free-free {100 * free[0]:+.0f} % (force), {100 * free[1]:+.0f} % "
@@ -260,7 +267,7 @@ def _fixed_right(data: Data) -> Outcome:
 
 
 def _clearance_dominates(data: Data) -> Outcome:
-    rod, clearance = measured.moved(data, FAR_CB), measured.moved(data, CSJ)
+    rod, clearance = deviations.moved(data, FAR_CB), deviations.moved(data, CSJ)
     parts = [getattr(rod, n) / getattr(clearance, n) for n in ("angle", "displacement", "velocity")]
     return _verdict(*(s < SLIGHT for s in parts)), (
         f"the rod's part of the clearance's: angle {100 * parts[0]:.2g} %, displacement {100 * parts[1]:.2g} %, "
@@ -269,9 +276,9 @@ def _clearance_dominates(data: Data) -> Outcome:
 
 
 def _enlarged(data: Data) -> Outcome:
-    rigid, tests, texts = measured.moved(data, CSJ), [], []
+    rigid, tests, texts = deviations.moved(data, CSJ), [], []
     for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB):
-        moved = measured.moved(data, model)
+        moved = deviations.moved(data, model)
         rise = [getattr(moved, n) / getattr(rigid, n) - 1.0 for n in ("angle", "displacement", "velocity")]
         tests.append(min(rise) > 0.0)
         texts.append(f"{mode_set(model)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise))

@@ -29,7 +29,7 @@ def surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.n
     Body axes; of a rod the displacement is that of the section's centre.
     """
     if is_rod(bundle):
-        rings, size = rod_shape.surface(bundle, q, scale)
+        rings, size = rod_shape.rod_surface(bundle, q, scale)
         return rings.reshape(-1, 3), np.repeat(size, rings.shape[1])
     displacement = scale * bundle.shape_translation.values @ q
     return bundle.node_position.values + displacement, np.linalg.norm(displacement, axis=1)
@@ -49,7 +49,7 @@ def faces(bundle: xr.Dataset) -> np.ndarray:
 def scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:
     """Factor that makes the largest displacement `share` of the body's length; 1 for no displacement."""
     if is_rod(bundle):
-        return rod_shape.scale_to(bundle, q, fraction)
+        return rod_shape.rod_scale_to(bundle, q, fraction)
     largest = float(surface(bundle, q)[1].max())
     return fraction * float(box(bundle)[1][0]) / largest if largest > 0.0 else 1.0
 

@@ -27,8 +27,8 @@ def centre_line(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[
     return points, displacement, turn
 
 
-def surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
-    """Points of the deformed surface [m], shape (ring, around, 3), and the displacement size [m], (ring,).
+def rod_surface(bundle: xr.Dataset, q: np.ndarray, scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the deformed rod_surface [m], shape (ring, around, 3), and the displacement size [m], (ring,).
 
     The sections stay plane and turn with the rod, so that torsion is seen too; both ends are capped.
     """
@@ -62,7 +62,7 @@ def circle(axis: np.ndarray, around: int = AROUND) -> np.ndarray:
     return np.outer(np.cos(phi), side) + np.outer(np.sin(phi), np.cross(axis, side))
 
 
-def scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:
+def rod_scale_to(bundle: xr.Dataset, q: np.ndarray, fraction: float) -> float:
     """Factor that makes the largest displacement `share` of the rod's length; 1 for no displacement.
 
     Where the centre line does not move (torsion), the largest section rotation is made 1 rad.
