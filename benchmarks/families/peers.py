@@ -136,17 +136,6 @@ def _of_loops(records: list[Record]) -> str:
     return f"{table(records, columns)}\n\nPinocchio {versions['pin']}, MuJoCo {versions['mujoco']}."
 
 
-FAMILY = Family(
-    what="one evaluation against Pinocchio and MuJoCo",
-    takes="3 min",
-    page="benchmarks.md",
-    cases=cases,
-    measure=each(lambda case: [(_of_chain if case.of[0] in CHAINS else _record)(*case.of)]),
-    show=show,
-    needs=("pinocchio", "peers"),
-)
-
-
 #: moments of inertia of each rod about its centre [kg m^2], its axis being z; mass and length are 1
 THIN = np.diag([1.0 / 12.0, 1.0 / 12.0, 1e-4])
 #: axes of a joining rod, which lies along x
@@ -279,3 +268,14 @@ PEERS: dict[str, Callable[[int], Peer]] = {
     "Pinocchio, constraintDynamics": pinocchio,
     "MuJoCo, mj_forward": mujoco,
 }
+
+
+FAMILY = Family(
+    what="one evaluation against Pinocchio and MuJoCo",
+    takes="3 min",
+    page="benchmarks.md",
+    cases=cases,
+    measure=each(lambda case: [(_of_chain if case.of[0] in CHAINS else _record)(*case.of)]),
+    show=show,
+    needs=("pinocchio", "peers"),
+)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.families import stability
 from benchmarks.family import FINISHED, REFUSED, WRONG, Family, Record
 from benchmarks.page import png
 from benchmarks.stability import runs, scenes
@@ -100,21 +99,6 @@ def _table(records: Sequence[Record]) -> str:
 
 def _largest(values: Sequence[float | None]) -> str:
     return f"{max(known):.1e}" if (known := [value for value in values if value is not None]) else "-"
-
-
-FAMILY = Family(
-    what="301 hard cases, and what becomes of each",
-    takes="30 min on two cores",
-    page="stability.md",
-    cases=scenes.cases,
-    measure=runs.measure,
-    show=show,
-    files=stability.files,
-    settings={"seed": 20190310, "random": 200},
-    times=False,
-    modules=runs.modules,
-    children=True,
-)
 
 
 BLUE, MARKS = "#0072B2", {REFUSED: ("D", "#E69F00"), WRONG: ("X", "#D55E00")}
@@ -282,3 +266,18 @@ def _legend(figure: Any) -> None:
         for mark, color, text in entries
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
+
+
+FAMILY = Family(
+    what="301 hard cases, and what becomes of each",
+    takes="30 min on two cores",
+    page="stability.md",
+    cases=scenes.cases,
+    measure=runs.measure,
+    show=show,
+    files=files,
+    settings={"seed": 20190310, "random": 200},
+    times=False,
+    modules=runs.modules,
+    children=True,
+)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from flexclear.papers.wang_wang_2019.figures import Data
 from flexclear.papers.wang_wang_2019.models import BALL_FRAME, IDEAL, JOINT, PLATFORM, Model
 from flexclear.pipeline.core.artifacts.quantities import SAME_TIME, common_times
 from flexclear.pipeline.core.numerics.rotations import angle_about_y, rotation_between
@@ -93,6 +92,8 @@ def _largest(values: np.ndarray) -> float:
     return float(np.max(np.abs(values)))
 
 
+#: artifacts by reference, such as ``sps4/csj:run``
+Data = dict[str, xr.Dataset]
 #: two answers differ by more than this fraction, and those of two ensembles also by this many standard deviations of
 #: the members
 SLIGHT, SEPARATION = 0.1, 2.0

@@ -89,15 +89,17 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, fraction
     factor = scale_to(bundle, q, FRACTION)
     points, size = surface(bundle, q, fraction * factor)
     moved = size if size.max() > 1e-9 * np.ptp(rest) else np.linalg.norm(points - rest, axis=1)
-    largest = float(scale_to_size(bundle, q, factor, rest))
+    full, sizes = surface(bundle, q, factor)
+    # of its centre line, or of its skin where that rests
+    skin_moves = sizes.max() <= 1e-9 * np.ptp(rest)
+    largest = float(np.linalg.norm(full - rest, axis=1).max()) if skin_moves else max(float(sizes.max()), 1e-300)
     index = faces(bundle)
     share_of = np.clip(moved / largest, 0.0, 1.0)
     if is_rod(bundle):
         rings = points.reshape(-1, AROUND + 1, 3)[:, ::EVERY]
         shell(panel, seen, rings, share_of.reshape(-1, AROUND + 1)[:, 0], zorder=2)
     elif index.shape[1] >= 3:
-        triangles = index if index.shape[1] == 3 else np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]])
-        skin(panel, seen, points, triangles, share_of, zorder=2)
+        skin(panel, seen, points, index, share_of, zorder=2)
     else:
         x, y = seen.project(points).T
         panel.scatter(x, y, c=moved / largest, cmap="viridis", vmin=0.0, vmax=1.0, s=9)
@@ -112,13 +114,3 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, fraction
     frequency = float(bundle["frequency"].values[mode])
     text = f"{frequency:.5g} Hz" if frequency > 0.0 else "static"
     panel.set_title(f"mode {mode + 1}: {text}, × {factor:.2g} √kg m", fontsize=8.8)
-
-
-def scale_to_size(bundle: xr.Dataset, q: np.ndarray, factor: float, rest: np.ndarray) -> float:
-    """The largest drawn displacement [m] of a shape: of its centre line, or of its skin where that rests."""
-    points, size = surface(bundle, q, factor)
-    return (
-        max(float(size.max()), 1e-300)
-        if size.max() > 1e-9 * np.ptp(rest)
-        else float(np.linalg.norm(points - rest, axis=1).max())
-    )

@@ -83,25 +83,16 @@ def png(pixels: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-def _still(shown: Shown, kind: str) -> dict[str, bytes]:
-    """When the bodies are farthest from where they started."""
+def _still(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes]:
+    """When the bodies are farthest from where they started, or the largest stress of the run is largest."""
     _must_draw()
     from flexclear.pipeline.post.render import film, ruler
 
-    drawn = shown.mechanism()
-    moved = np.abs(drawn.run.position.values - drawn.run.position.values[:1])
-    picture = film.still(drawn, int(np.argmax(moved.sum(axis=(1, 2)))))
-    return {"mechanism.png": png(ruler.annotated(picture, drawn))}
-
-
-def _stress_still(shown: Shown, kind: str) -> dict[str, bytes]:
-    """When the largest stress of the run is largest."""
-    _must_draw()
-    from flexclear.pipeline.post.render import film, ruler
-
-    drawn = shown.mechanism(stressed=True)
-    step = int(np.argmax(drawn.run["von_mises_stress"].values.max(axis=1)))
-    return {"stress.png": png(ruler.annotated(film.still(drawn, step, margin=ruler.BAR), drawn, ruler.BAR))}
+    drawn, margin = shown.mechanism(stressed=stressed), ruler.BAR if stressed else 0
+    moved = np.abs(drawn.run.position.values - drawn.run.position.values[:1]).sum(axis=(1, 2))
+    step = int(np.argmax(drawn.run["von_mises_stress"].values.max(axis=1) if stressed else moved))
+    picture = film.still(drawn, step, margin=margin)
+    return {f"{'stress' if stressed else 'mechanism'}.png": png(ruler.annotated(picture, drawn, margin))}
 
 
 def _film(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes]:
@@ -119,13 +110,10 @@ def _must_draw() -> None:
         raise SolverError(f"no pictures of solids: {gl.remedy()}")
 
 
-def _motion_page(shown: Shown, kind: str) -> dict[str, bytes]:
-    return {"motion.html": shown.page("motion", [viewer(player.motion(shown.mechanism()), "Motion")])}
-
-
-def _stress_page(shown: Shown, kind: str) -> dict[str, bytes]:
-    view = viewer(player.motion(shown.mechanism(stressed=True)), "Von Mises stress")
-    return {"stress.html": shown.page("stress", [view])}
+def _motion_page(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes]:
+    what, caption = ("stress", "Von Mises stress") if stressed else ("motion", "Motion")
+    view = viewer(player.motion(shown.mechanism(stressed=stressed)), caption)
+    return {f"{what}.html": shown.page(what, [view])}
 
 
 def _motion_gltf(shown: Shown, kind: str) -> dict[str, bytes]:
@@ -148,11 +136,16 @@ def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
     return shown.bundles
 
 
+def _side(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """From where a body is examined, and what is up."""
+    seen = player.side(bundle)
+    return seen.direction, seen.up
+
+
 def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:
     files: dict[str, bytes] = {}
     for body, bundle in _bodies(shown).items():
-        seen = player.side(bundle)
-        files |= mode_sheet.files(f"modes_{body}", body, bundle, seen.direction, seen.up)
+        files |= mode_sheet.files(f"modes_{body}", body, bundle, *_side(bundle))
     return files
 
 
@@ -161,8 +154,7 @@ def _mode_films(shown: Shown, kind: str) -> dict[str, bytes]:
 
     files = {}
     for body, bundle in _bodies(shown).items():
-        seen = player.side(bundle)
-        suffix, content = pace.write(mode_sheet.frames(body, bundle, seen.direction, seen.up), 12, kind)
+        suffix, content = pace.write(mode_sheet.frames(body, bundle, *_side(bundle)), 12, kind)
         files[f"modes_{body}.{suffix}"] = content
     return files
 
@@ -271,10 +263,8 @@ MAKERS: dict[str, dict[str, Maker]] = {
         "pvd": _motion_series,
     },
     "stress": {
-        "png": _stress_still,
-        "gif": partial(_film, stressed=True),
-        "mp4": partial(_film, stressed=True),
-        "html": _stress_page,
+        kind: partial(make, stressed=True)
+        for kind, make in {"png": _still, "gif": _film, "mp4": _film, "html": _motion_page}.items()
     },
     "modes": {
         "png": _mode_sheets,
