@@ -13,21 +13,15 @@ from matplotlib import pyplot as plt
 
 from benchmarks.family import Record as Row
 from benchmarks.page import png
+from benchmarks.reference_conditions import design
 from benchmarks.reference_conditions.claims import Rows, at, far_error
-from benchmarks.reference_conditions.design import (
-    CLEARANCE_COUNTS,
-    CONDITIONS,
-    COUNT,
-    FULL,
-    MOST_COMPLETE,
-    PLACES,
-    RIGID,
-)
 from flexclear.papers.wang_wang_2019.models import FAR_CB, FAR_FIXED, FAR_FREE
 
 #: those of the paper's models where they have such modes, the others from the same palette
-COLORS = dict(zip(CONDITIONS, (FAR_FREE.color, FAR_FIXED.color, "#56B4E9", "#CC79A7", FAR_CB.color), strict=True))
-MARKERS = dict(zip(CONDITIONS, "osDv^", strict=True))
+COLORS = dict(
+    zip(design.CONDITIONS, (FAR_FREE.color, FAR_FIXED.color, "#56B4E9", "#CC79A7", FAR_CB.color), strict=True)
+)
+MARKERS = dict(zip(design.CONDITIONS, "osDv^", strict=True))
 #: shares of error below this are drawn at it
 FLOOR = 1e-7
 
@@ -43,10 +37,10 @@ def files(records: Sequence[Row]) -> dict[str, bytes]:
 
 def _compliance(rows: list[Row]) -> Any:
     figure, axes = plt.subplots(2, 3, figsize=(12, 6.4), sharex=True, sharey=True, layout="constrained")
-    for column, place in enumerate(PLACES):
+    for column, place in enumerate(design.PLACES):
         for line, (direction, label) in enumerate((("x", "bending"), ("z", "axial"))):
             ax = axes[line, column]
-            for condition in CONDITIONS:
+            for condition in design.CONDITIONS:
                 points = [r for r in rows if (r["place_mm"], r["condition"]) == (place, condition)]
                 count, fraction = ([r[name] for r in points] for name in ("count", direction))
                 ax.step(count, fraction, where="post", color=COLORS[condition], label=condition, linewidth=1.6)
@@ -62,10 +56,10 @@ def _compliance(rows: list[Row]) -> Any:
 
 def _frequencies(rows: list[Row]) -> Any:
     figure, axes = plt.subplots(1, 3, figsize=(12, 4), sharey=True, layout="constrained")
-    for ax, place in zip(axes, PLACES, strict=True):
+    for ax, place in zip(axes, design.PLACES, strict=True):
         here = [r for r in rows if r["place_mm"] == place and r["time"] == 0.0]
-        full = np.array(next(r for r in here if r["condition"] == FULL)["frequency"])
-        for condition in CONDITIONS:
+        full = np.array(next(r for r in here if r["condition"] == design.FULL)["frequency"])
+        for condition in design.CONDITIONS:
             found = np.array(next(r for r in here if r["condition"] == condition)["frequency"])
             n = min(len(found), len(full))
             error = np.maximum(np.abs(found[:n] / full[:n] - 1.0), FLOOR)
@@ -80,17 +74,17 @@ def _frequencies(rows: list[Row]) -> Any:
 
 def _far(rows: list[Row]) -> Any:
     figure, axes = plt.subplots(1, 2, figsize=(12, 4.4), sharey=True, layout="constrained")
-    first = next(iter(PLACES))
-    for condition in CONDITIONS:
+    first = next(iter(design.PLACES))
+    for condition in design.CONDITIONS:
         of = [r for r in rows if r["condition"] == condition and r["finer"] == 1]
         line = sorted((r for r in of if r["place_mm"] == first), key=lambda r: r["count"])
         style = {"color": COLORS[condition], "marker": MARKERS[condition], "label": condition}
         axes[0].semilogy([r["count"] for r in line], [_off(r, rows) for r in line], **style)
-        least = [at(of, place, condition, COUNT) for place in PLACES]
-        axes[1].semilogy(list(PLACES), [_off(r, rows) for r in least], **style)
+        least = [at(of, place, condition, design.COUNT) for place in design.PLACES]
+        axes[1].semilogy(list(design.PLACES), [_off(r, rows) for r in least], **style)
     axes[0].set_xlabel("coordinates (joint at 0 mm)")
     axes[1].set_xlabel("place of the prismatic joint (mm), least whole count from 13")
-    axes[1].set_xticks(list(PLACES))
+    axes[1].set_xticks(list(design.PLACES))
     axes[0].set_ylabel("worst error of the largest effects,\nshare of the full rod's")
     axes[0].legend(fontsize=8)
     for ax in axes:
@@ -104,25 +98,25 @@ def _off(row: Row, rows: list[Row]) -> float:
 
 def _clearance(rows: list[Row]) -> Any:
     figure, axes = plt.subplots(1, 2, figsize=(12, 4.4), sharey=True, layout="constrained")
-    first = next(iter(PLACES))
-    for k, condition in enumerate(CONDITIONS):
+    first = next(iter(design.PLACES))
+    for k, condition in enumerate(design.CONDITIONS):
         of = [r for r in rows if r["condition"] == condition]
-        least = [at(of, place, condition, COUNT) for place in PLACES]
-        _bars(axes[0], [p + 2.5 * (k - 2) for p in PLACES], least, condition)
+        least = [at(of, place, condition, design.COUNT) for place in design.PLACES]
+        _bars(axes[0], [p + 2.5 * (k - 2) for p in design.PLACES], least, condition)
         line = sorted((r for r in of if r["place_mm"] == first), key=lambda r: r["count"])
         if len(line) > 1:
             _bars(axes[1], [r["count"] + 0.25 * (k - 2) for r in line], line, condition)
-    for place in PLACES:
-        rigid = next(r for r in rows if r["condition"] == RIGID and r["place_mm"] == place)["peak_force"]
+    for place in design.PLACES:
+        rigid = next(r for r in rows if r["condition"] == design.RIGID and r["place_mm"] == place)["peak_force"]
         axes[0].plot([place - 8, place + 8], [rigid, rigid], color="#888888", label="rigid" if place == first else None)
         best = Rows([], [r for r in rows if r["place_mm"] == place]).best()
         dashed: dict[str, Any] = {"color": "#000000", "linestyle": "--", "linewidth": 1.0}
         words = f"craig-bampton, {best['count']} coordinates" if place == first else None
         axes[0].plot([place - 8, place + 8], [best["peak_force"]] * 2, label=words, **dashed)
-    axes[0].set_xticks(list(PLACES))
+    axes[0].set_xticks(list(design.PLACES))
     axes[0].set_xlabel("place of the prismatic joint (mm), least whole count from 13")
     axes[1].set_xlabel("coordinates (joint at 0 mm)")
-    axes[1].set_xticks(sorted({*CLEARANCE_COUNTS, *MOST_COMPLETE}))
+    axes[1].set_xticks(sorted({*design.CLEARANCE_COUNTS, *design.MOST_COMPLETE}))
     axes[0].set_ylabel("peak contact force (N)")
     for ax in axes:
         if ax.get_legend_handles_labels()[0]:

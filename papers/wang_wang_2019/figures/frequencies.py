@@ -8,14 +8,8 @@ import numpy as np
 import xarray as xr
 from scipy.optimize import brentq
 
+from flexclear.papers.wang_wang_2019 import published
 from flexclear.papers.wang_wang_2019.figures import Figure
-from flexclear.papers.wang_wang_2019.published import (
-    RIGID_MODES,
-    TABLE4_ANSYS,
-    TABLE4_NORMAL_MODE,
-    TABLE5_ANSYS,
-    TABLE5_NORMAL_MODE,
-)
 from flexclear.pipeline.post.plotting.table import Table
 
 COLUMNS = (
@@ -108,11 +102,11 @@ def _about_section(agree: list[bool], square: xr.Dataset, circle: xr.Dataset) ->
 
 
 def _about_ansys() -> str:
-    ratio, bound = TABLE5_ANSYS[5] / TABLE5_ANSYS[2], euler_bernoulli_ratio()
+    ratio, bound = published.TABLE5_ANSYS[5] / published.TABLE5_ANSYS[2], euler_bernoulli_ratio()
     return (
         "The ANSYS columns belong to no converged uniform rod: its torsional frequency is the same for "
-        "clamped and for free ends, yet "
-        f"they give {TABLE4_ANSYS[4]:.1f} and {TABLE5_ANSYS[4]:.1f} Hz; and the third free bending frequency "
+        "clamped and for free ends, yet they give "
+        f"{published.TABLE4_ANSYS[4]:.1f} and {published.TABLE5_ANSYS[4]:.1f} Hz; and the third free bending frequency "
         "over the second is "
         f"{ratio:.4f}, above the {bound:.4f} of an Euler-Bernoulli beam, which rotary inertia and shear can only lower."
     )
@@ -143,5 +137,5 @@ def _figure(number: int, reference: str, ansys: Sequence[float], printed: Sequen
     )
 
 
-TABLE04 = _figure(4, "fixed", TABLE4_ANSYS, TABLE4_NORMAL_MODE, rigid=0)
-TABLE05 = _figure(5, "free", TABLE5_ANSYS, TABLE5_NORMAL_MODE, rigid=RIGID_MODES)
+TABLE04 = _figure(4, "fixed", published.TABLE4_ANSYS, published.TABLE4_NORMAL_MODE, rigid=0)
+TABLE05 = _figure(5, "free", published.TABLE5_ANSYS, published.TABLE5_NORMAL_MODE, rigid=published.RIGID_MODES)

@@ -12,19 +12,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post.render import forms, player, surfaces
-from flexclear.pipeline.post.render.mechanism import (
-    COLORS,
-    Flexible,
-    Layout,
-    Looks,
-    Mechanism,
-    Part,
-    mechanism,
-    pose,
-    rest,
-    skin,
-)
+from flexclear.pipeline.post.render import forms, mechanism, player, surfaces
 from flexclear.pipeline.post.render.ruler import exaggeration, words
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import flat, gravity
@@ -70,7 +58,7 @@ class Missing:
 class StartView:
     """The drawn mechanism, its marks, and sentences for below the picture."""
 
-    drawn: Mechanism
+    drawn: mechanism.Mechanism
     marks: tuple[Mark, ...]
     notes: tuple[str, ...]
     gaps: tuple[Missing, ...]
@@ -78,11 +66,11 @@ class StartView:
 
 
 def start_view(
-    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], gaps: Sequence[Missing], looks: Looks | None = None
+    run: xr.Dataset, bundles: Mapping[str, xr.Dataset], gaps: Sequence[Missing], looks: mechanism.Looks | None = None
 ) -> StartView:
     """The view of a start; gaps: of joints that do not fit."""
-    text, drawn = parameters(run), mechanism(run, bundles, looks)
-    at = Layout(run, text, bundles)
+    text, drawn = parameters(run), mechanism.mechanism(run, bundles, looks)
+    at = mechanism.Layout(run, text, bundles)
     # where each joint's second frame is in the world, and the axes of its first one
     joints = {
         name: (at.at_start(second)[0], at.at_start(first)[1])
@@ -98,17 +86,19 @@ def start_view(
         *(_still(body, opacity) for body in drawn.flexible),
     ]
     drawn = replace(drawn, parts=tuple(solid), flexible=())
-    extra = [Part(None, surface, color) for surface, color in _lines(text, joints, gaps, drawn.size)]
+    extra = [mechanism.Part(None, surface, color) for surface, color in _lines(text, joints, gaps, drawn.size)]
     marked = list(_marks(run, drawn, text, joints, gaps))
     cloud = np.concatenate([drawn.cloud, *(part.surface.points for part in extra), *([m.point] for m in marked)])
     drawn = replace(drawn, parts=(*drawn.parts, *extra), cloud=cloud)
     return StartView(drawn, tuple(marked), tuple(_notes(drawn, text, gaps)), tuple(gaps), gravity(text))
 
 
-def _still(body: Flexible, opacity: float) -> Part:
+def _still(body: mechanism.Flexible, opacity: float) -> mechanism.Part:
     """A meshed body as it is where nothing is deformed."""
-    shown = skin(body.bundle, rest(body.bundle), sharp=has_edges(body.bundle))
-    return Part(body.index, shown, body.color or COLORS[body.index % len(COLORS)], opacity)
+    shown = mechanism.skin(body.bundle, mechanism.rest(body.bundle), sharp=has_edges(body.bundle))
+    return mechanism.Part(
+        body.index, shown, body.color or mechanism.COLORS[body.index % len(mechanism.COLORS)], opacity
+    )
 
 
 def page_view(seen: StartView) -> dict[str, Any]:
@@ -176,7 +166,7 @@ def _head(base: np.ndarray, way: np.ndarray, size: float) -> Surface:
 
 def _marks(
     run: xr.Dataset,
-    drawn: Mechanism,
+    drawn: mechanism.Mechanism,
     text: Mapping[str, Any],
     joints: Mapping[str, tuple[np.ndarray, np.ndarray]],
     gaps: Sequence[Missing],
@@ -218,17 +208,17 @@ def _of_body(body: Mapping[str, Any]) -> str:
     return f"{flexible}{body['mass']:.4g} kg" if "mass" in body else f"{flexible}body".replace(", body", "")
 
 
-def _middle(run: xr.Dataset, drawn: Mechanism, index: int) -> np.ndarray:
+def _middle(run: xr.Dataset, drawn: mechanism.Mechanism, index: int) -> np.ndarray:
     """A point on what is drawn of a body, as near as possible to the middle of that."""
     for part in drawn.parts:
         if part.owner == index and part.frame is None and part.contact is None:
-            matrix = pose(run, index, 0)
+            matrix = mechanism.pose(run, index, 0)
             low, high = part.surface.points.min(axis=0), part.surface.points.max(axis=0)
             return np.asarray(matrix[:3, :3] @ (0.5 * (low + high)) + matrix[:3, 3])
     return np.asarray(run["position"].values[0, index])
 
 
-def _notes(drawn: Mechanism, parameters: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
+def _notes(drawn: mechanism.Mechanism, parameters: Mapping[str, Any], gaps: Sequence[Missing]) -> Iterator[str]:
     """What the names do not say."""
     yield f"start at t = {parameters.get('time', {}).get('start', 0.0):g} s"
     yield from exaggeration(drawn)
