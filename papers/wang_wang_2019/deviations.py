@@ -28,6 +28,10 @@ class Deviation:
     velocity: float  #: along z [m/s]
     until: float  #: last time that was compared [s]
 
+    def over(self, other: Deviation) -> tuple[float, float, float]:
+        """Angle, displacement and velocity as fractions of another one's."""
+        return self.angle / other.angle, self.displacement / other.displacement, self.velocity / other.velocity
+
 
 def max_deviation(run: xr.Dataset, reference: xr.Dataset, body: str, until: float = np.inf) -> Deviation:
     """Largest differences of `body` between two runs at their common times up to `until` [s].
@@ -133,11 +137,15 @@ def reaction(data: Data, model: Model) -> float:
     return float(post.peak_force.sel(contact=JOINT) if "contact" in post.sizes else post.peak_reaction.sel(joint=JOINT))
 
 
+def peaks(data: Data, model: Model) -> tuple[float, float]:
+    """Largest force at A1 [N] as of `reaction`, and largest vertical acceleration of the platform [m/s^2]."""
+    return reaction(data, model), acceleration(data, model)
+
+
 def acceleration(data: Data, model: Model) -> float:
-    """Largest vertical acceleration of the platform [m/s^2]."""
-    if f"{model.scene}:ensemble" in data:
-        return float(data[f"{model.scene}:ensemble"].peak_acceleration.sel(body=PLATFORM, axis="z").mean())
-    return float(data[f"{model.scene}:post"].peak_acceleration.sel(body=PLATFORM, axis="z"))
+    """Largest vertical acceleration of the platform [m/s^2]; of ensembles the mean of the members' largest."""
+    kind = "ensemble" if f"{model.scene}:ensemble" in data else "post"
+    return float(data[f"{model.scene}:{kind}"].peak_acceleration.sel(body=PLATFORM, axis="z").mean())
 
 
 def difference(data: Data, model: Model, of: Callable[[xr.Dataset], np.ndarray]) -> np.ndarray:

@@ -251,11 +251,12 @@ def _of_all(data: Data) -> Table:
         "standard deviation, over the members, of each member's largest error.",
         _against_paper(data),
         f"Largest contact forces: {_largest(data, 'peak_force', {'contact': paper.JOINT}, 'N')}. What softens an "
-        "impact is how far the mode set lets the rod be compressed between its joints; the three sets differ in just that.",
+        "impact is how far the mode set lets the rod be compressed between its joints; the three sets differ in just "
+        "that.",
         f"Largest vertical accelerations of the platform: "
         f"{_largest(data, 'peak_acceleration', {'body': paper.PLATFORM, 'axis': 'z'}, 'm/s²')}. They lie inside "
-        "impacts, where the motion is recorded at the largest force and penetration of each contact besides the regular "
-        "outputs.",
+        "impacts, where the motion is recorded at the largest force and penetration of each contact besides the "
+        "regular outputs.",
     )
     return _table("Table 9: largest errors, ideal model and FAR-CSJ model", columns, notes)
 

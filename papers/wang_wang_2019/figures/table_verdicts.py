@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -31,17 +30,8 @@ HOLDS, NOT, PARTLY = "holds", "does not hold", "in part"
 Outcome = tuple[str, str]  #: verdict, and the numbers that say so
 
 
-@dataclass(frozen=True, slots=True)
-class Statement:
-    """A statement of the paper, where it is, and the test of it."""
-
-    place: str
-    text: str
-    test: Callable[[Data], Outcome]
-
-
 def _verdicts(data: Data) -> Table:
-    rows = tuple((s.place, s.text, *s.test(data)) for s in STATEMENTS)
+    rows = tuple((place, text, *test(data)) for place, text, test in STATEMENTS)
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
         f"Of ensembles the mean over the members, which differ where they do by more than {100 * SLIGHT:g} % and "
@@ -61,15 +51,10 @@ def _verdict(*tests: bool) -> str:
 
 
 def _same_motion(data: Data) -> Outcome:
-    own, fractions = deviations.sizes(data), []
-    for model in paper.FAR:
-        moved = deviations.moved(data, model)
-        fractions.append(
-            max(moved.angle / own.angle, moved.displacement / own.displacement, moved.velocity / own.velocity)
-        )
-    return _verdict(
-        *(s < SMALL for s in fractions)
-    ), f"angle, displacement and velocity change by {100 * max(fractions):.1g} % of their largest values at most"
+    own = deviations.sizes(data)
+    fractions = [max(deviations.moved(data, model).over(own)) for model in paper.FAR]
+    text = f"angle, displacement and velocity change by {100 * max(fractions):.1g} % of their largest values at most"
+    return _verdict(*(s < SMALL for s in fractions)), text
 
 
 def _same_acceleration(data: Data) -> Outcome:
@@ -151,47 +136,36 @@ def _in_both_layouts(outcome: Callable[[Data, paper.Model, paper.Model], Outcome
 
 
 def _no_influence(data: Data, csj: paper.Model, ideal: paper.Model) -> Outcome:
-    own, moved = deviations.sizes(data, ideal), deviations.moved(data, csj, ideal)
-    fractions = moved.angle / own.angle, moved.displacement / own.displacement
-    return _verdict(
-        *(s < SMALL for s in fractions)
-    ), f"angle {100 * fractions[0]:.1f} %, displacement {100 * fractions[1]:.1f} %"
+    angle, displacement, _ = deviations.moved(data, csj, ideal).over(deviations.sizes(data, ideal))
+    text = f"angle {100 * angle:.1f} %, displacement {100 * displacement:.1f} %"
+    return _verdict(angle < SMALL, displacement < SMALL), text
 
 
 def _velocity_free(data: Data, csj: paper.Model, ideal: paper.Model) -> Outcome:
-    fraction = deviations.moved(data, csj, ideal).velocity / deviations.sizes(data, ideal).velocity
+    *_, fraction = deviations.moved(data, csj, ideal).over(deviations.sizes(data, ideal))
     return _verdict(fraction < SMALL), f"{100 * fraction:.1f} % of the largest velocity"
 
 
 def _conspicuous(data: Data, csj: paper.Model, ideal: paper.Model) -> Outcome:
-    force = deviations.reaction(data, ideal), deviations.reaction(data, csj)
-    acceleration = deviations.acceleration(data, ideal), deviations.acceleration(data, csj)
-    return _verdict(force[1] > 2.0 * force[0], acceleration[1] > 2.0 * acceleration[0]), (
-        f"force {force[0]:.0f} to {force[1]:.0f} N, acceleration {acceleration[0]:.0f} to {acceleration[1]:.0f} m/s²"
+    (force, acceleration), (base, base_acceleration) = (deviations.peaks(data, model) for model in (csj, ideal))
+    return _verdict(force > 2.0 * base, acceleration > 2.0 * base_acceleration), (
+        f"force {base:.0f} to {force:.0f} N, acceleration {base_acceleration:.0f} to {acceleration:.0f} m/s²"
     )
 
 
 def _lowered(data: Data) -> Outcome:
-    models = (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED, paper.FAR_CSJ_CB)
-    force = [deviations.reaction(data, m) for m in models]
-    acceleration = [deviations.acceleration(data, m) for m in models]
-    text = "; ".join(
-        f"{mode_set(m)} {f:.0f} N, {a:.0f} m/s²" for m, f, a in zip(models, force, acceleration, strict=True)
-    )
-    rigid = deviations.reaction(data, paper.CSJ), deviations.acceleration(data, paper.CSJ)
-    tests = [f < rigid[0] and a < rigid[1] for f, a in zip(force, acceleration, strict=True)]
+    peaks = {model: deviations.peaks(data, model) for model in paper.FAR_CSJ}
+    rigid = deviations.peaks(data, paper.CSJ)
+    text = "; ".join(f"{mode_set(m)} {force:.0f} N, {a:.0f} m/s²" for m, (force, a) in peaks.items())
+    tests = [force < rigid[0] and a < rigid[1] for force, a in peaks.values()]
     return _verdict(*tests), f"CSJ {rigid[0]:.0f} N, {rigid[1]:.0f} m/s²; {text}"
 
 
 def _motion_kept(data: Data) -> Outcome:
     """Angle and displacement are those of the ideal model, and none depends on the mode set."""
-    own, fractions = deviations.sizes(data), []
-    moved = {model: deviations.moved(data, model) for model in paper.FAR_CSJ}
-    for m in moved.values():
-        fractions.append([m.angle / own.angle, m.displacement / own.displacement, m.velocity / own.velocity])
-    largest = np.max(fractions, axis=0)
-    free, fixed = moved[paper.FAR_CSJ_FREE], moved[paper.FAR_CSJ_FIXED]
-    sets = [abs(getattr(free, n) / getattr(fixed, n) - 1.0) for n in ("angle", "displacement", "velocity")]
+    moved, own = {model: deviations.moved(data, model) for model in paper.FAR_CSJ}, deviations.sizes(data)
+    largest = np.max([one.over(own) for one in moved.values()], axis=0)
+    sets = [abs(ratio - 1.0) for ratio in moved[paper.FAR_CSJ_FREE].over(moved[paper.FAR_CSJ_FIXED])]
     return _verdict(*(s < SMALL for s in largest), *(s < SLIGHT for s in sets)), (
         f"angle {100 * largest[0]:.1f} %, displacement {100 * largest[1]:.1f} %, velocity {100 * largest[2]:.1f} % off "
         f"the ideal model; between free-free and fixed-fixed modes these differ by {100 * max(sets):.2g} % at most"
@@ -231,32 +205,23 @@ def _dashpot(data: Data) -> Outcome:
 
 
 def _sets_differ(data: Data) -> Outcome:
-    force = [deviations.reaction(data, m) for m in (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED)]
-    acceleration = [deviations.acceleration(data, m) for m in (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED)]
-    differences = [abs(a / b - 1.0) for a, b in (force, acceleration)]
-    return _verdict(
-        *(a > SLIGHT for a in differences)
-    ), f"by {100 * differences[0]:.0f} % in force, {100 * differences[1]:.0f} % in acceleration"
+    free, fixed = (deviations.peaks(data, model) for model in (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED))
+    force, acceleration = (abs(a / b - 1.0) for a, b in zip(free, fixed, strict=True))
+    text = f"by {100 * force:.0f} % in force, {100 * acceleration:.0f} % in acceleration"
+    return _verdict(force > SLIGHT, acceleration > SLIGHT), text
 
 
 def _fixed_right(data: Data) -> Outcome:
-    best = deviations.reaction(data, paper.FAR_CSJ_CB), deviations.acceleration(data, paper.FAR_CSJ_CB)
-    off = {}
-    for model in (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED):
-        off[model] = (
-            deviations.reaction(data, model) / best[0] - 1.0,
-            deviations.acceleration(data, model) / best[1] - 1.0,
-        )
-    free, fixed = off[paper.FAR_CSJ_FREE], off[paper.FAR_CSJ_FIXED]
-    return _verdict(abs(fixed[0]) < abs(free[0]), abs(fixed[1]) < abs(free[1])), (
+    *peaks, best = (deviations.peaks(data, model) for model in paper.FAR_CSJ)
+    free, fixed = ([own / of - 1.0 for own, of in zip(one, best, strict=True)] for one in peaks)
+    return _verdict(*(abs(b) < abs(a) for a, b in zip(free, fixed, strict=True))), (
         f"against all static compliance: free-free {100 * free[0]:+.0f} % (force), {100 * free[1]:+.0f} % "
         f"(acceleration); fixed-fixed {100 * fixed[0]:+.0f} %, {100 * fixed[1]:+.0f} %"
     )
 
 
 def _clearance_dominates(data: Data) -> Outcome:
-    rod, clearance = deviations.moved(data, paper.FAR_CB), deviations.moved(data, paper.CSJ)
-    parts = [getattr(rod, n) / getattr(clearance, n) for n in ("angle", "displacement", "velocity")]
+    parts = deviations.moved(data, paper.FAR_CB).over(deviations.moved(data, paper.CSJ))
     return _verdict(*(s < SLIGHT for s in parts)), (
         f"the rod's part of the clearance's: angle {100 * parts[0]:.2g} %, displacement {100 * parts[1]:.2g} %, "
         f"velocity {100 * parts[2]:.2g} %"
@@ -264,13 +229,10 @@ def _clearance_dominates(data: Data) -> Outcome:
 
 
 def _enlarged(data: Data) -> Outcome:
-    rigid, tests, texts = deviations.moved(data, paper.CSJ), [], []
-    for model in (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED, paper.FAR_CSJ_CB):
-        moved = deviations.moved(data, model)
-        rise = [getattr(moved, n) / getattr(rigid, n) - 1.0 for n in ("angle", "displacement", "velocity")]
-        tests.append(min(rise) > 0.0)
-        texts.append(f"{mode_set(model)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise))
-    return _verdict(*tests), f"angle, displacement, velocity: {'; '.join(texts)}"
+    rigid = deviations.moved(data, paper.CSJ)
+    rises = {m: [ratio - 1.0 for ratio in deviations.moved(data, m).over(rigid)] for m in paper.FAR_CSJ}
+    texts = [f"{mode_set(m)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise) for m, rise in rises.items()]
+    return _verdict(*(min(rise) > 0.0 for rise in rises.values())), f"angle, displacement, velocity: {'; '.join(texts)}"
 
 
 def _costs(*models: paper.Model) -> Callable[[Data], Outcome]:
@@ -332,74 +294,63 @@ def _one_stroke(data: Data) -> Outcome:
     )
 
 
-STATEMENTS = (
-    Statement(
+#: statements of the paper: where they are, and the test of each
+STATEMENTS: tuple[tuple[str, str, Callable[[Data], Outcome]], ...] = (
+    (
         "6.2.1, Fig. 11(a)-(c)",
         "With ideal joints the rod's flexibility has no effect on angle, displacement and velocity",
         _same_motion,
     ),
-    Statement(
+    (
         "6.2.1, Fig. 11(d)",
         "With ideal joints the rod's flexibility has no effect on the acceleration",
         _same_acceleration,
     ),
-    Statement("6.2.1, Fig. 11(e)", "The reaction at A1 differs slightly, by a vibration", _slight_vibration),
-    Statement(
-        "6.2.1, Fig. 11(f)",
-        "With ideal joints the path of the ball's centre is almost the same",
-        _same_path(*paper.FAR),
-    ),
-    Statement("6.2.1, Table 7", "Free-free and fixed-fixed modes give the same with ideal joints", _consistent),
-    Statement("6.2.1", "Free-free modes give the right solution where there is no clearance", _free_suitable),
-    Statement(
+    ("6.2.1, Fig. 11(e)", "The reaction at A1 differs slightly, by a vibration", _slight_vibration),
+    ("6.2.1, Fig. 11(f)", "With ideal joints the path of the ball's centre is almost the same", _same_path(*paper.FAR)),
+    ("6.2.1, Table 7", "Free-free and fixed-fixed modes give the same with ideal joints", _consistent),
+    ("6.2.1", "Free-free modes give the right solution where there is no clearance", _free_suitable),
+    (
         "6.2.2, Fig. 12(a), (b)",
         "Clearance has almost no influence on trajectory and displacement",
         _in_both_layouts(_no_influence),
     ),
-    Statement("6.2.2, Fig. 12(c)", "The velocity does not suffer from clearance", _in_both_layouts(_velocity_free)),
-    Statement(
+    ("6.2.2, Fig. 12(c)", "The velocity does not suffer from clearance", _in_both_layouts(_velocity_free)),
+    (
         "6.2.2, Fig. 12(d), (e)",
         "The effect of clearance on acceleration and force is conspicuous",
         _in_both_layouts(_conspicuous),
     ),
-    Statement(
-        "6.2.2, Fig. 12(f)", "Clearance makes the path of the ball's centre significantly different", _other_path
-    ),
-    Statement(
+    ("6.2.2, Fig. 12(f)", "Clearance makes the path of the ball's centre significantly different", _other_path),
+    (
         "6.2.3, Fig. 13(a)-(c), Figs. 14, 15",
         "With clearance and a flexible rod, angle, displacement and velocity stay those of the ideal model, whatever "
         "the mode set",
         _motion_kept,
     ),
-    Statement(
+    (
         "6.2.3, Fig. 13(d), (e)",
         "Free-free and fixed-fixed modes differ obviously in force and acceleration",
         _sets_differ,
     ),
-    Statement("6.2.3", "A flexible rod lowers contact force and acceleration", _lowered),
-    Statement("6.2.3, section 7", "The rod is a dashpot that damps the vibration out", _dashpot),
-    Statement(
-        "6.2.3, section 7", "The right reference conditions, fixed-fixed, must be imposed with clearance", _fixed_right
-    ),
-    Statement("Tables 7 and 8", "Clearance, not the rod's flexibility, costs the accuracy", _clearance_dominates),
-    Statement("Tables 8 and 9", "Clearance and a flexible rod together enlarge the errors further", _enlarged),
-    Statement(
-        "Fig. 13(f), Fig. 17",
-        "The ball's path in the socket differs significantly between the mode sets",
-        _paths_differ,
-    ),
-    Statement(
+    ("6.2.3", "A flexible rod lowers contact force and acceleration", _lowered),
+    ("6.2.3, section 7", "The rod is a dashpot that damps the vibration out", _dashpot),
+    ("6.2.3, section 7", "The right reference conditions, fixed-fixed, must be imposed with clearance", _fixed_right),
+    ("Tables 7 and 8", "Clearance, not the rod's flexibility, costs the accuracy", _clearance_dominates),
+    ("Tables 8 and 9", "Clearance and a flexible rod together enlarge the errors further", _enlarged),
+    ("Fig. 13(f), Fig. 17", "The ball's path in the socket differs significantly between the mode sets", _paths_differ),
+    (
         "6.2.3, Table 10",
         "A flexible rod with ideal joints costs hardly more than the ideal model",
         _costs(paper.FAR_FREE, paper.FAR_FIXED),
     ),
-    Statement("6.2.3, Table 10", "Clearance makes the ideal model twenty times as dear", _costs(paper.CSJ)),
-    Statement(
+    ("6.2.3, Table 10", "Clearance makes the ideal model twenty times as dear", _costs(paper.CSJ)),
+    (
         "6.2.3, Table 10",
         "Clearance and a flexible rod together make it forty times as dear",
         _costs(paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED),
     ),
-    Statement("Fig. 16", "The motion changes from periodic to quasi-periodic and chaotic", _becomes_chaotic),
+    ("Fig. 16", "The motion changes from periodic to quasi-periodic and chaotic", _becomes_chaotic),
 )
 
 TABLE = Figure(
