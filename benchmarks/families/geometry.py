@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from benchmarks import layouts
 from benchmarks.family import REFUSED, Case, Family, Record, each
-from benchmarks.geometry import identify, scenes
-from benchmarks.geometry.identify import DANGLE, DZ, Layout, Member, answer
+from benchmarks.layouts import DANGLE, DZ, Layout, Member, answer
 from benchmarks.page import Columns, table
 from flexclear.commands import scenes as stages
 from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
@@ -32,26 +32,26 @@ COARSE, SHOWN = 0.02, 5
 
 def members_rows() -> Iterator[Record]:
     """The family on its grid: one record with its extent, and one for the layout that is taken."""
-    found = identify.family()
-    record: Record = {"members": len(found), "on_the_plate": sum(identify.on_the_plate(m.layout) for m in found)}
+    found = layouts.family()
+    record: Record = {"members": len(found), "on_the_plate": sum(layouts.on_the_plate(m.layout) for m in found)}
     for name in ("ax", "ay", "bx", "by", "height", "leg"):
         values = [getattr(m.layout, name) for m in found]
         record |= {f"{name}_least": float(min(values)), f"{name}_most": float(max(values))}
     yield record
-    yield _member(identify.chosen(found))
+    yield _member(layouts.chosen(found))
 
 
 def velocity_rows() -> Iterator[Record]:
     """Runs with clearance of some of the family, the other choices as in the scenes; and of the first layout."""
-    for member in sorted(identify.family(COARSE), key=lambda m: m.answer.condition)[::SHOWN]:
+    for member in sorted(layouts.family(COARSE), key=lambda m: m.answer.condition)[::SHOWN]:
         yield _member(member) | rigid(member.layout, Open())
-    first = Member(identify.FIRST, answer(identify.FIRST))
+    first = Member(layouts.FIRST, answer(layouts.FIRST))
     yield _member(first) | rigid(first.layout, Open()) | {"first": True}
 
 
 def open_rows() -> Iterator[Record]:
     """The layout that is taken, over what else the paper leaves open."""
-    layout = identify.chosen(identify.family()).layout
+    layout = layouts.chosen(layouts.family()).layout
     for restitution, gravity, start in product(RESTITUTION, (False, True), STARTS):
         choice = Open(restitution, gravity, start)
         record = {"restitution": restitution, "gravity": gravity, "start": start}
@@ -60,7 +60,7 @@ def open_rows() -> Iterator[Record]:
 
 def flexible_rows() -> Iterator[Record]:
     """The layout that is taken, with a flexible rod and clearance."""
-    layout = identify.chosen(identify.family()).layout
+    layout = layouts.chosen(layouts.family()).layout
     for name in FLEXIBLE:
         yield {"set": name, "count": MEMBERS} | flexible(layout, name)
 
@@ -116,7 +116,7 @@ def _members(rows: list[Record]) -> str:
         f"Table 8 asks for dz/dL1 = {DZ:.4f} and dangle/dL1 = {DANGLE:.4f} rad/m. Hence ax = "
         f"{1e3 * taken['ax']:.1f} mm "
         f"and height / leg = {upright:.4f}, legs {np.degrees(np.arccos(upright)):.1f} degrees from the "
-        f"vertical.\n\n{extent['members']} layouts on a grid of {1e3 * identify.STEP:g} mm are left: {spans}. "
+        f"vertical.\n\n{extent['members']} layouts on a grid of {1e3 * layouts.STEP:g} mm are left: {spans}. "
         f"{extent['on_the_plate'] or 'None'} of them has all four joint centres over the plate, whatever way that is "
         f"turned.\n\nTaken, as the least condition number over the stroke:\n\n"
         + table(
@@ -223,8 +223,8 @@ def rigid(layout: Layout, choice: Open) -> Record:
     """Largest deviations from the ideal mechanism, largest force and acceleration of a run with clearance."""
     load = {"load": {"gravity": GRAVITY}} if choice.gravity else {}
     try:
-        ideal = dynamics.simulate(scenes.scene("sps4/ideal", layout, load), {}, silent)
-        requested = scenes.scene("sps4/csj", layout, choice.edits(), aside=STARTS[choice.start])
+        ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout, load), {}, silent)
+        requested = layouts.scene("sps4/csj", layout, choice.edits(), aside=STARTS[choice.start])
         run = dynamics.simulate(requested, {}, silent)
     except SolverError as error:
         return {"verdict": REFUSED, "reason": str(error)}
@@ -233,8 +233,8 @@ def rigid(layout: Layout, choice: Open) -> Record:
 
 def flexible(layout: Layout, name: str) -> Record:
     """Means over an ensemble of each member's largest deviations from the ideal mechanism, and their spread."""
-    requested = scenes.scene(f"sps4/{FLEXIBLE[name]}", layout, {"ensemble.members": MEMBERS})
-    ideal = dynamics.simulate(scenes.scene("sps4/ideal", layout), {}, silent)
+    requested = layouts.scene(f"sps4/{FLEXIBLE[name]}", layout, {"ensemble.members": MEMBERS})
+    ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout), {}, silent)
     members = dynamics.ensemble(requested, stages.bundles(requested, open_workplace(), jobs=None), silent)
     each = [_told(deviation) for deviation in ensemble_deviations(members, ideal, PLATFORM)]
     found = {name: [one[name] for one in each] for name in each[0]}

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from benchmarks.family import Family
 from benchmarks.family import Record as Row
 from benchmarks.page import Columns, table
-from benchmarks.reference_conditions import claims, figures, layouts, runs
+from benchmarks.reference_conditions import claims, figures, runs
 from benchmarks.reference_conditions.claims import at, far_error
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, COUNTS, FULL, MOST_COMPLETE, PLACES, RIGID
 from flexclear.pipeline.post.plotting.table import pipe_table
@@ -219,10 +219,6 @@ def _is_mesh_study(row: Row) -> bool:
     return (row["place_mm"], row["condition"], row["count"]) == (next(iter(PLACES)), "craig-bampton", COUNT)
 
 
-def _layouts(rows: dict[str, list[Row]]) -> str:
-    return layouts.text(rows["layouts"])
-
-
 def _label(row: Row) -> str:
     """Name of a mode set."""
     return row["condition"] if row["condition"] in (FULL, RIGID) else f"{row['condition']} {row['count']}"
@@ -250,7 +246,7 @@ TABLES = {
     "far": _far,
     "clearance": _clearance,
     "mesh": _mesh,
-    "layouts": _layouts,
+    "layouts": lambda rows: claims.of_layouts(rows["layouts"]),
 }
 
 FAMILY = Family(

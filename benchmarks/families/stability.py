@@ -9,11 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import atlas
+from benchmarks.atlas import ALONG, CLOSURE, DEVIATION, LEDGER, RANGES, Parameters
 from benchmarks.family import FINISHED, REFUSED, WRONG, Family, Record
 from benchmarks.page import png
-from benchmarks.stability import runs, scenes
-from benchmarks.stability.runs import CLOSURE, DEVIATION, LEDGER
-from benchmarks.stability.scenes import ALONG, RANGES, Parameters
 from flexclear.pipeline.core.scene.integrators import DEFAULT, INTEGRATORS
 from flexclear.pipeline.post.plotting.style import SOFT, plt, style
 from flexclear.pipeline.post.plotting.table import pipe_table
@@ -272,12 +271,12 @@ FAMILY = Family(
     what="301 hard cases, and what becomes of each",
     takes="30 min on two cores",
     page="stability.md",
-    cases=scenes.cases,
-    measure=runs.measure,
+    cases=atlas.cases,
+    measure=atlas.measure,
     show=show,
     files=files,
     settings={"seed": 20190310, "random": 200},
     times=False,
-    modules=runs.modules,
+    modules=atlas.modules,
     children=True,
 )

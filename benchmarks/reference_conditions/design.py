@@ -9,9 +9,7 @@ from typing import Any
 
 import xarray as xr
 
-from benchmarks.geometry import identify
-from benchmarks.geometry.identify import Layout
-from benchmarks.geometry.scenes import edits
+from benchmarks.layouts import FIRST, Layout, chosen, edits, family
 from flexclear.commands.scenes import find_scene
 from flexclear.pipeline.core.scene.load import load_scene, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
@@ -196,9 +194,9 @@ def clearance(members: int, places: tuple[int, ...] = tuple(PLACES)) -> list[Cas
 @cache
 def layouts() -> tuple[Layout, ...]:
     """The identified layout that is taken, members of its family by falling regularity, and last the first layout."""
-    family = sorted(identify.family(LAYOUT_GRID), key=lambda member: member.answer.condition)
-    found = [identify.chosen(identify.family()), *family[::EVERY]]
-    return (*(member.layout for member in found), identify.FIRST)
+    members = sorted(family(LAYOUT_GRID), key=lambda member: member.answer.condition)
+    found = [chosen(family()), *members[::EVERY]]
+    return (*(member.layout for member in found), FIRST)
 
 
 def of_layout(layout: Layout, members: int) -> list[Case]:

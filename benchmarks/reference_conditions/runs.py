@@ -9,10 +9,9 @@ import numpy as np
 import xarray as xr
 
 import flexclear as fc
-from benchmarks import family
+from benchmarks import family, layouts
 from benchmarks.family import Measured
 from benchmarks.family import Record as Row
-from benchmarks.geometry import identify
 from benchmarks.reference_conditions import design
 from benchmarks.reference_conditions.cases import BODY
 from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
@@ -143,7 +142,7 @@ def layout_rows(members: int) -> Iterator[Row]:
     for number, layout in enumerate(design.layouts()):
         runs = bring(design.of_layout(layout, members), place)
         ideal = next(run for case, run in runs.items() if case.condition == design.RIGID and not case.clearance)
-        which: Row = {"layout": number} | ({"first": True} if layout == identify.FIRST else {})
+        which: Row = {"layout": number} | ({"first": True} if layout == layouts.FIRST else {})
         which |= {name: float(getattr(layout, name)) for name in ("ax", "ay", "bx", "by", "height")}
         for case, run in runs.items():
             row = which | identity(case) | {"clearance": case.clearance}

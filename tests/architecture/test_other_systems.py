@@ -26,7 +26,7 @@ from tests.architecture import windows_rules as rules
 #: what of `os` and `signal` is not on Windows, or means something else there
 ELSEWHERE = (*rules.MODULES, *rules.FUNCTIONS, "SIGKILL", "link", "kill")
 #: the one module of each tree that may ask for them
-ONES = ("pipeline/core/system/platforms.py", "benchmarks/system.py")
+ONES = ("pipeline/core/system/platforms.py", "benchmarks/processes.py")
 
 
 def run(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
