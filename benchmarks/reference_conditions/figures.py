@@ -116,7 +116,7 @@ def _clearance(rows: list[Row]) -> Any:
     axes[0].set_xticks(list(design.PLACES))
     axes[0].set_xlabel("place of the prismatic joint (mm), least whole count from 13")
     axes[1].set_xlabel("coordinates (joint at 0 mm)")
-    axes[1].set_xticks(sorted({*design.CLEARANCE_COUNTS, *design.MOST_COMPLETE}))
+    axes[1].set_xticks(sorted({*design.RUN_COUNTS, *design.MOST_COMPLETE}))
     axes[0].set_ylabel("peak contact force (N)")
     for ax in axes:
         if ax.get_legend_handles_labels()[0]:

@@ -64,7 +64,9 @@ def static_rows() -> Iterator[Row]:
         row = {"highest": float(full["frequency"].max())} | _compliance(full["compliance_full"], place)
         yield {"place_mm": place, "condition": design.FULL, "count": 0} | row
         for condition in design.CONDITIONS:
-            for count in design.whole_counts(place, condition, max(design.COUNTS)):
+            for count in range(1, max(design.COUNTS) + 1):
+                if not design.is_whole(design.Case(place, condition, count)):
+                    continue
                 fraction = design.solved(design.Case(place, condition, count))["compliance_share"]
                 yield {"place_mm": place, "condition": condition, "count": count} | _compliance(fraction, place)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -36,17 +35,13 @@ NOISE = 1e-10
 VELOCITY = 1.5
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
-    """One column: its head, and one value or (mean, standard deviation) per row; None where there is none."""
-
-    head: str
-    cells: tuple[str, ...]
+#: one column: its head, and one value or mean and deviation per row
+Column = tuple[str, ...]
 
 
 def paper_column(head: str, values: MaximumError) -> Column:
     """The paper's column."""
-    return Column(head, tuple(ABSENT if name is None else number(getattr(values, name)) for *_, name in ROWS))
+    return head, *(ABSENT if name is None else number(getattr(values, name)) for *_, name in ROWS)
 
 
 def single(head: str, deviation: Deviation, tighter: Deviation) -> Column:
@@ -55,7 +50,7 @@ def single(head: str, deviation: Deviation, tighter: Deviation) -> Column:
     for _, name, factor, _ in ROWS:
         value, other = factor * getattr(deviation, name), factor * getattr(tighter, name)
         cells.append(f"{number(value)} ± {max(abs(value - other), NOISE):.0e}")
-    return Column(head, tuple(cells))
+    return head, *cells
 
 
 def several(head: str, deviations: Sequence[Deviation]) -> Column:
@@ -64,12 +59,12 @@ def several(head: str, deviations: Sequence[Deviation]) -> Column:
     for _, name, factor, _ in ROWS:
         values = factor * np.array([getattr(deviation, name) for deviation in deviations])
         cells.append(f"{number(values.mean())} ± {values.std(ddof=1):.1e}")
-    return Column(head, tuple(cells))
+    return head, *cells
 
 
 def _table(title: str, columns: Sequence[Column], notes: Sequence[str]) -> Table:
-    rows = tuple((head, *(column.cells[i] for column in columns)) for i, (head, *_) in enumerate(ROWS))
-    return Table(title, ("largest error", *(column.head for column in columns)), rows, (*notes, MEANING))
+    heads, *rows = zip(("largest error", *(head for head, *_ in ROWS)), *columns, strict=True)
+    return Table(title, heads, tuple(rows), (*notes, MEANING))
 
 
 def _both(
