@@ -183,14 +183,14 @@ def four_bars(loops: int, lean: float = 0.0) -> Scene:
     return _scene(f"{loops} four-bars", body, joint, 0.1, {})
 
 
-def hinged(links: int, end: float = 0.2) -> Scene:
+def hinged(links: int) -> Scene:
     """An open chain of rods of 1 m and 1 kg on hinges about y, along x at the start, under gravity along -z."""
     body: dict[str, Any] = {"ground": {"type": "ground", "frames": {"tip": {"axes": ACROSS}}}}
     joint: dict[str, Any] = {}
     for k in range(links):
         body[f"link{k}"] = _rod([k + 0.5, 0.0, 0.0], "x", ("foot", "tip"), ("foot", "tip"))
         joint[f"J{k}"] = {"type": "revolute", "between": [f"link{k - 1}.tip" if k else "ground.tip", f"link{k}.foot"]}
-    return _scene(f"{links} links", body, joint, end, {"integrator": "dop853", "rtol": 1e-10})
+    return _scene(f"{links} links", body, joint, 0.2, {"integrator": "dop853", "rtol": 1e-10})
 
 
 #: of hinges about the world's y

@@ -148,24 +148,24 @@ def _sets(place: int) -> list[tuple[int, str, int]]:
     return [(place, c, whole(place, c, n)) for c, n in sets]
 
 
-def far(places: tuple[int, ...] = tuple(PLACES)) -> list[Case]:
+def far() -> list[Case]:
     """Ideal joints: rigid, every condition, the full rod; at the first place in all counts and meshes."""
     found = []
-    for place in places:
+    for place in PLACES:
         found += [Case(place, RIGID), Case(place, FULL), *(Case(*key) for key in _sets(place))]
-    found += [Case(places[0], c, whole(places[0], c, n)) for c in CONDITIONS for n in RUN_COUNTS]
-    found += [Case(places[0], "craig-bampton", COUNT, finer=n) for n in FINER]
+    found += [Case(0, c, whole(0, c, n)) for c in CONDITIONS for n in RUN_COUNTS]
+    found += [Case(0, "craig-bampton", COUNT, finer=n) for n in FINER]
     return list(dict.fromkeys(found))
 
 
-def clearance(members: int, places: tuple[int, ...] = tuple(PLACES)) -> list[Case]:
+def clearance(members: int) -> list[Case]:
     """Clearance at A1: likewise, as ensembles."""
     found = []
-    for place in places:
+    for place in PLACES:
         found += [(place, RIGID, COUNT), *_sets(place)]
         found += [(place, "craig-bampton", whole(place, "craig-bampton", n)) for n in MOST_COMPLETE]
     for condition in ("free-free", "craig-bampton"):
-        found += [(places[0], condition, whole(places[0], condition, n)) for n in RUN_COUNTS]
+        found += [(0, condition, whole(0, condition, n)) for n in RUN_COUNTS]
     return [Case(*key, clearance=True, members=_share(members, *key[1:])) for key in dict.fromkeys(found)]
 
 

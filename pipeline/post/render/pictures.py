@@ -64,16 +64,6 @@ def make(what: str, kind: str, shown: Shown) -> dict[str, bytes]:
     return MAKERS[what][kind](shown, kind)
 
 
-def formats(what: str) -> tuple[str, ...]:
-    """As what something can be shown."""
-    return tuple(MAKERS[what])
-
-
-def needs_gl(what: str, kind: str) -> bool:
-    """Whether the machine must be able to draw solids for that."""
-    return what in ("motion", "stress", "vibrations") and kind in ("png", "gif", "mp4")
-
-
 def png(pixels: np.ndarray) -> bytes:
     """PNG file of pixels of shape (height, width, 3)."""
     from matplotlib.image import imsave

@@ -17,7 +17,7 @@ from flexclear.pipeline.post.overview.curves import scaled
 from flexclear.pipeline.post.render import joint_view, mechanism, pace, surfaces
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.view import View, axes_of, eye
-from flexclear.pipeline.post.shapes import body_stress
+from flexclear.pipeline.post.shapes import body_shape
 from flexclear.pipeline.post.shapes.body_shape import box, faces, fields_of, hertz, linear_fields, scale_to
 
 #: frames of a motion, and width over height of a picture that is neither wide nor narrow
@@ -52,7 +52,7 @@ def motion(drawn: mechanism.Mechanism, frames: int = FRAMES) -> dict[str, Any]:
 
 def _largest_stress(drawn: mechanism.Mechanism, steps: np.ndarray) -> dict[str, Any]:
     factor, unit = scaled(drawn.stress or 0.0, "Pa")
-    values = factor * body_stress.of_bodies(drawn.run)[steps].max(axis=1)
+    values = factor * body_shape.stress_of_bodies(drawn.run)[steps].max(axis=1)
     return {"label": "largest stress", "unit": unit, "values": [float(f"{v:.4g}") for v in values]}
 
 
@@ -160,9 +160,9 @@ def _bent(run: xr.Dataset, body: mechanism.Flexible, steps: np.ndarray) -> dict[
         "largest": largest,
     }
     if body.stressed:  # one byte a point and frame
-        top = body_stress.largest(run) or 1.0
+        top = body_shape.largest_stress(run) or 1.0
         name = str(run["body"].values[body.index])
-        levels = np.array([body_stress.on_surface(run, bundle, name, int(step)) for step in steps]) / top
+        levels = np.array([body_shape.stress_on_surface(run, bundle, name, int(step)) for step in steps]) / top
         data = np.round(255.0 * np.clip(levels, 0.0, 1.0)).astype(np.uint8)
         factor, unit = scaled(top, "Pa")
         content |= {"levels": base64.b64encode(data.tobytes()).decode(), "top": f"{factor * top:.3g} {unit}"}
