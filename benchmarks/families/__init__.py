@@ -5,7 +5,7 @@ NAMES = {
     "evaluation": "evaluation:FAMILY",
     "runs": "runs:FAMILY",
     "commands": "commands:FAMILY",
-    "cold": "cold:FAMILY",
+    "cold": "runs:COLD",
     "growth": "growth:FAMILY",
     "ensembles": "ensembles:FAMILY",
     "peers": "peers:FAMILY",

@@ -116,7 +116,7 @@ def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False
     content = {f"{stem}_start.html": _page(scene, seen)}
     if gl.works():
         from flexclear.pipeline.post.render.pictures import png
-        from flexclear.pipeline.post.render.start_picture import picture
+        from flexclear.pipeline.post.render.start_view import picture
 
         content[f"{stem}_start.png"] = png(picture(seen, scene.title or stem))
     elif not quiet:

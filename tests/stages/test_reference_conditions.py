@@ -7,7 +7,7 @@ import pytest
 from benchmarks.families import reference_conditions
 from benchmarks.family import Record as Row
 from benchmarks.layouts import Layout
-from benchmarks.reference_conditions import claims, design, figures
+from benchmarks.reference_conditions import claims, design
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, MOST_COMPLETE, PLACES, RIGID, Case
 
 EFFECT = {"angle": 3e-6, "displacement": 3e-7, "velocity": 7e-4}
@@ -90,7 +90,10 @@ def test_the_page_has_a_part_and_a_figure_per_group() -> None:
     assert isinstance(parts, dict)
     assert parts.keys() == {"short", "claims", "far", "clearance"}
     assert "**Holds** at all three places." in parts["claims"]
-    assert figures.files(records).keys() == {"reference-conditions/far.png", "reference-conditions/clearance.png"}
+    assert reference_conditions.files(records).keys() == {
+        "reference-conditions/far.png",
+        "reference-conditions/clearance.png",
+    }
 
 
 def test_cases_take_the_scene_of_their_place() -> None:
