@@ -321,8 +321,7 @@ def _draw_far(rows: list[Row]) -> Any:
         least = [at(of, place, condition, design.COUNT) for place in design.PLACES]
         axes[1].semilogy(list(design.PLACES), [_off(r, rows) for r in least], **style)
     axes[0].set_xlabel("coordinates (joint at 0 mm)")
-    axes[1].set_xlabel("place of the prismatic joint (mm), least whole count from 13")
-    axes[1].set_xticks(list(design.PLACES))
+    axes[1].set(xlabel="place of the prismatic joint (mm), least whole count from 13", xticks=list(design.PLACES))
     axes[0].set_ylabel("worst error of the largest effects,\nshare of the full rod's")
     axes[0].legend(fontsize=8)
     for ax in axes:
@@ -351,10 +350,8 @@ def _draw_clearance(rows: list[Row]) -> Any:
         dashed: dict[str, Any] = {"color": "#000000", "linestyle": "--", "linewidth": 1.0}
         words = f"craig-bampton, {best['count']} coordinates" if place == first else None
         axes[0].plot([place - 8, place + 8], [best["peak_force"]] * 2, label=words, **dashed)
-    axes[0].set_xticks(list(design.PLACES))
-    axes[0].set_xlabel("place of the prismatic joint (mm), least whole count from 13")
-    axes[1].set_xlabel("coordinates (joint at 0 mm)")
-    axes[1].set_xticks(sorted({*design.RUN_COUNTS, *design.MOST_COMPLETE}))
+    axes[0].set(xticks=list(design.PLACES), xlabel="place of the prismatic joint (mm), least whole count from 13")
+    axes[1].set(xlabel="coordinates (joint at 0 mm)", xticks=sorted({*design.RUN_COUNTS, *design.MOST_COMPLETE}))
     axes[0].set_ylabel("peak contact force (N)")
     for ax in axes:
         if ax.get_legend_handles_labels()[0]:

@@ -246,8 +246,7 @@ def _shaken(row: Record, name: str) -> float:
 
 
 def _name_axes(ax: Any, x: str, y: str) -> None:
-    ax.set_xlabel(LABELS[x])
-    ax.set_ylabel(LABELS[y])
+    ax.set(xlabel=LABELS[x], ylabel=LABELS[y])
     if x in LOGARITHMIC:
         ax.set_xscale("log")
     if y in LOGARITHMIC:

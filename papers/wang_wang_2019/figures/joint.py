@@ -61,8 +61,7 @@ def _joint(axes: Axes, eccentricity: float, *, touching: bool = False) -> None:
     _arrow(axes, ball, ball + DRAWN_BALL * np.array([-0.6, -0.8]), "R ball", (0.24, -0.06))
     if touching:
         _arrow(axes, q + 0.02 * t, q - 0.42 * n + 0.02 * t, "F on the ball", (0.1, 0.24), color="#B2182B")
-    axes.set_aspect("equal")
-    axes.set(xlim=(-1.3, 1.55), ylim=(-1.3, 1.25))
+    axes.set(aspect="equal", xlim=(-1.3, 1.55), ylim=(-1.3, 1.25))
     axes.set_axis_off()
 
 
@@ -101,8 +100,7 @@ def _friction(data: Data) -> Drawing:
         panel.scatter(1e3 * v, mu, s=7, color=CSJ.color, lw=0, zorder=3, label=f"run {CSJ.scene}, in contact")
         panel.set_xlabel("tangential velocity (mm/s)")
     axes[0, 0].set_xlim(-1.5e3 * limits[1], 1.5e3 * limits[1])
-    axes[0, 1].set_xlim(-3e3 * limits[0], 3e3 * limits[0])
-    axes[0, 1].set_title("(b) around zero")
+    axes[0, 1].set(xlim=(-3e3 * limits[0], 3e3 * limits[0]), title="(b) around zero")
     axes[0, 0].set_ylabel("friction coefficient")
     axes[0, 0].legend(loc="upper left", fontsize=8)
     style.heading(

@@ -106,16 +106,14 @@ def over_time(
         label=reference.model.label,
         zorder=2.4,
     )
-    axes.set_ylabel(quantity.unit)
-    axes.set_xlim(reference.time[0], reference.time[-1])
+    axes.set(ylabel=quantity.unit, xlim=(reference.time[0], reference.time[-1]))
 
 
 def zoomed(axes: Axes, quantity: Quantity, reference: paper.Motion, others: Sequence[paper.Motion]) -> None:
     """The slim panel with the same curves in the ideal model's range."""
     over_time(axes, quantity, reference, others)
     axes.set_ylim(*_range(quantity.values(reference)))
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel(f"zoom\n{quantity.unit}")
+    axes.set(xlabel="time (s)", ylabel=f"zoom\n{quantity.unit}")
 
 
 def difference(
@@ -133,9 +131,7 @@ def difference(
     for motion in others:
         time, values = differences[motion.model.scene]
         _curve(axes, motion, values, 0.9, time)
-    axes.set_xlim(reference.time[0], reference.time[-1])
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel(f"minus ideal\n{quantity.unit}")
+    axes.set(xlim=(reference.time[0], reference.time[-1]), xlabel="time (s)", ylabel=f"minus ideal\n{quantity.unit}")
     _scale(axes, [float(np.abs(values).max()) for _, values in differences.values()])
 
 
@@ -149,8 +145,7 @@ def _scale(axes: Axes, sizes: Sequence[float]) -> None:
     linear = 10.0 ** np.floor(np.log10(smallest))
     axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
     top = 10.0 ** np.ceil(np.log10(largest))
-    axes.set_ylim(-top, top)
-    axes.set_yticks([-top, 0.0, top])
+    axes.set(ylim=(-top, top), yticks=[-top, 0.0, top])
     axes.minorticks_off()
     text = f"linear within ±{linear:g}, logarithmic beyond"
     axes.text(0.995, 0.03, text, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
@@ -181,8 +176,7 @@ def ball_deviation(axes: Axes, reference: paper.Motion, others: Sequence[paper.M
         axes.plot(x, z, color=motion.model.color, lw=0.6, alpha=PALE)
         axes.plot(x[inside], z[inside], color=motion.model.color, lw=1.1, alpha=FIRM)
     axes.plot(0.0, 0.0, "+", color=reference.model.color, ms=8, mew=1.4, zorder=4)
-    axes.set_xlabel(f"x minus ideal ({unit})")
-    axes.set_ylabel(f"z minus ideal ({unit})")
+    axes.set(xlabel=f"x minus ideal ({unit})", ylabel=f"z minus ideal ({unit})")
     axes.locator_params(nbins=6)
     axes.set_aspect("equal", adjustable="datalim")
 
@@ -195,8 +189,7 @@ def ball_distance(axes: Axes, reference: paper.Motion, others: Sequence[paper.Mo
         _curve(axes, motion, factor * np.linalg.norm(deviation_of_ball, axis=1), 0.9, time)
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel(f"from ideal\n{unit}")
+    axes.set(xlabel="time (s)", ylabel=f"from ideal\n{unit}")
 
 
 def _ball_apart(motion: paper.Motion, reference: paper.Motion) -> tuple[np.ndarray, np.ndarray]:

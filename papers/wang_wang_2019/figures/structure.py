@@ -140,8 +140,7 @@ def _from_above(axes: Axes, at: dict[str, np.ndarray], corners: np.ndarray) -> N
     length = np.linalg.norm(at["platform.A1"] - at["ground.B1"])
     height = at["platform.A1"][2]
     text = f"height of A1..A4 at the start {1e3 * height:.1f} mm; legs between ball centres {1e3 * length:.1f} mm"
-    axes.set_xlabel(f"x0 (mm)\n{text}")
-    axes.set_ylabel("y0 (mm)")
+    axes.set(xlabel=f"x0 (mm)\n{text}", ylabel="y0 (mm)")
     reach = 1e3 * np.abs([at[f"ground.B{k}"][:2] for k in LEGS]).max(axis=0)
     axes.set(xlim=(-1.25 * reach[0] - 40.0, 1.25 * reach[0] + 40.0), ylim=(-1.2 * reach[1], 1.2 * reach[1]))
     axes.set_aspect("equal")

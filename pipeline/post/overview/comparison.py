@@ -291,8 +291,7 @@ def _overlay(axes: style.Axes, runs: Mapping[str, xr.Dataset], lines: Sequence[C
         axes.plot(1e3 * curve.time[~firm], factor * curve.values[~firm], alpha=PALE, **look)
         axes.plot(1e3 * curve.peaks[:, 0], factor * curve.peaks[:, 1], ".", ms=2.5, color=color)
     time = there[0].time
-    axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)")
-    axes.set_title(f"{there[0].title} ({unit})")
+    axes.set(xlim=(1e3 * time[0], 1e3 * time[-1]), xlabel="time (ms)", title=f"{there[0].title} ({unit})")
 
 
 def _apart(

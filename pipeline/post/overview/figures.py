@@ -101,8 +101,7 @@ def _sheet(
     for panel, (title, lines) in zip(axes.flat, panels, strict=False):
         for label, (values, look) in lines.items():
             panel.plot(1e3 * time, values, label=label, **look)
-        panel.set_title(title)
-        panel.set_xlim(1e3 * time[0], 1e3 * time[-1])
+        panel.set(title=title, xlim=(1e3 * time[0], 1e3 * time[-1]))
     for panel in axes.flat[len(panels) :]:
         panel.set_visible(False)
     for panel in axes[-1]:
@@ -203,8 +202,7 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
 def _over_time(axes: Axes, run: xr.Dataset, values: np.ndarray, title: str = "") -> None:
     time = 1e3 * run["time"].values
     axes.plot(time, values, color="#D55E00", lw=0.8)
-    axes.set(xlim=(time[0], time[-1]), xlabel="time (ms)")
-    axes.set_title(title)
+    axes.set(xlim=(time[0], time[-1]), xlabel="time (ms)", title=title)
 
 
 def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[np.ndarray, np.ndarray]:
@@ -221,8 +219,7 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
         axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.8)
         axes.plot(offset[-1:, i], offset[-1:, j], "o", color="#009E73", ms=4)  # of a ball that stays where it is
         axes.margins(y=0.15)
-        axes.set(xlabel="xyz"[i], ylabel="xyz"[j])
-        axes.set_title(centre(run, contact))
+        axes.set(xlabel="xyz"[i], ylabel="xyz"[j], title=centre(run, contact))
         return offset[:, i], offset[:, j]
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     axes.fill(radius * np.cos(turn), radius * np.sin(turn), color="#f3f3f3", ec="#a8a8a8", lw=1.0)
@@ -278,8 +275,7 @@ def _wear(run: xr.Dataset, post: xr.Dataset) -> dict[str, bytes]:
     time = 1e3 * run["time"].values
     for k, (row, name) in enumerate(zip(axes, names, strict=True)):
         row[0].plot(time, run["wear_load_path"].values[:, k], color=style.INK)
-        row[0].set(xlim=(time[0], time[-1]), xlabel="time (ms)")
-        row[0].set_title(f"{name}: normal force times way (N m)")
+        row[0].set(xlim=(time[0], time[-1]), xlabel="time (ms)", title=f"{name}: normal force times way (N m)")
         for panel, side, what in zip(row[1:], ("outer", "inner"), ("socket or journal", "ball or pin"), strict=True):
             sectors = int(post["wear_sectors"].values[k])
             depth = post[f"wear_depth_{side}"].values[k].max(axis=0)[:sectors]

@@ -108,8 +108,7 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, fraction
     both = np.concatenate([seen.project(surface(bundle, q, sign * factor)[0]) for sign in (1.0, -1.0)] + [line])
     low, high = both.min(axis=0), both.max(axis=0)
     edge = 0.03 * float((high - low).max())
-    panel.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge))
-    panel.set_aspect("equal")
+    panel.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
     panel.set_axis_off()
     frequency = float(bundle["frequency"].values[mode])
     text = f"{frequency:.5g} Hz" if frequency > 0.0 else "static"

@@ -86,8 +86,7 @@ def frames(
         time, force = 1e3 * run["time"].values, run["contact_normal_force"].values[:, contact]
         left.set_title(f"{name}: {centre(run, contact)}")
         right.plot(time, force, color="#D55E00", lw=0.9)
-        right.set(xlim=(time[0], time[-1]), xlabel="time (ms)")
-        right.set_title(f"{name}: normal force (N)")
+        right.set(xlim=(time[0], time[-1]), xlabel="time (ms)", title=f"{name}: normal force (N)")
         (trail,) = left.plot([], [], color="#D55E00", lw=1.8, animated=True)
         (dot,) = left.plot([], [], "o", color=style.INK, ms=8, animated=True)
         (mark,) = right.plot([], [], "o", color=style.INK, ms=6, animated=True)

@@ -108,9 +108,7 @@ def _section(axes: Axes, verdict: xr.Dataset) -> None:
     shown = verdict.principal.values
     other = shown[:, 1] if shown.shape[1] > 1 else np.zeros(len(shown))
     axes.scatter(shown[:, 0], other, **POINT)  # type: ignore[arg-type]
-    axes.set_title("section")
-    axes.set_xlabel("along the largest variance")
-    axes.set_ylabel("along the second largest")
+    axes.set(title="section", xlabel="along the largest variance", ylabel="along the second largest")
 
 
 def _returns(axes: Axes, verdict: xr.Dataset) -> None:
@@ -118,15 +116,11 @@ def _returns(axes: Axes, verdict: xr.Dataset) -> None:
     low, high = float(first.min()), float(first.max())
     axes.plot([low, high], [low, high], color=LIGHT, lw=1.0, zorder=1)
     axes.scatter(first[:-1], first[1:], **POINT)  # type: ignore[arg-type]
-    axes.set_title("return map")
-    axes.set_xlabel("this period")
-    axes.set_ylabel("next period")
+    axes.set(title="return map", xlabel="this period", ylabel="next period")
 
 
 def _power(axes: Axes, verdict: xr.Dataset) -> None:
-    axes.set_title("spectrum")
-    axes.set_xlabel("cycles per period")
-    axes.set_ylabel("fraction of the variance")
+    axes.set(title="spectrum", xlabel="cycles per period", ylabel="fraction of the variance")
     if not verdict.power.values.any():
         axes.text(0.5, 0.5, "the states stand still", transform=axes.transAxes, ha="center", color=style.SOFT)
         return
@@ -149,6 +143,4 @@ def _growth(axes: Axes, sections: xr.Dataset, verdict: xr.Dataset) -> None:
         alpha=0.18,
         lw=0,
     )
-    axes.set_title("how a neighbour parts")
-    axes.set_xlabel("period")
-    axes.set_ylabel("logarithm of its distance's growth")
+    axes.set(title="how a neighbour parts", xlabel="period", ylabel="logarithm of its distance's growth")
