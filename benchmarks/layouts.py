@@ -259,8 +259,7 @@ def _leg(layout: Layout, k: int, *, flexible: bool, along: float, aside: float) 
     pose = {"z": axis.tolist(), "x": level.tolist()}
 
     def at(distance: float) -> list[float]:
-        place: list[float] = (layout.B[k] + distance * axis).tolist()
-        return place
+        return (layout.B[k] + distance * axis).tolist()
 
     n = k + 1
     rod: dict[str, Any] = {"position": at(length - ROD_CENTRE), "axes": pose}

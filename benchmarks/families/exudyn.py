@@ -140,8 +140,7 @@ class Peer:
     def _asked(self, parameters: tuple[Any, ...]) -> Outcome:
         self.worker = self.worker or Worker(work, LIMIT)
         self.worker.give(parameters)
-        found: Outcome = self.worker.take()
-        return found
+        return self.worker.take()
 
     def close(self) -> None:
         """End its process."""

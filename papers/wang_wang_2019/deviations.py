@@ -157,20 +157,17 @@ def difference(data: Data, model: Model, of: Callable[[xr.Dataset], np.ndarray])
 
 def vertical(run: xr.Dataset) -> np.ndarray:
     """The platform's acceleration along z [m/s^2], shape (time,)."""
-    values: np.ndarray = run.acceleration.sel(body=PLATFORM, axis="z").values
-    return values
+    return run.acceleration.sel(body=PLATFORM, axis="z").values
 
 
 def ball_centre(run: xr.Dataset) -> np.ndarray:
     """The ball_centre of ball A1, world axes [m], shape (time, 3)."""
-    values: np.ndarray = run.frame_position.sel(frame=BALL_FRAME).values
-    return values
+    return run.frame_position.sel(frame=BALL_FRAME).values
 
 
 def force(run: xr.Dataset) -> np.ndarray:
     """What joint A1 transmits [N], shape (time, 3)."""
-    values: np.ndarray = run.joint_force.sel(joint=JOINT).values
-    return values
+    return run.joint_force.sel(joint=JOINT).values
 
 
 def differ(a: np.ndarray, b: np.ndarray) -> bool:

@@ -64,8 +64,7 @@ class Figure:
 
 def figure(name: str) -> Figure:
     """The figure or table of a name, its module imported now, and with it the plotting libraries."""
-    described: Figure = lookup(__name__, name, where="figures")
-    return described
+    return lookup(__name__, name, where="figures")
 
 
 def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

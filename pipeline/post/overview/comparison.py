@@ -117,8 +117,7 @@ def _common(runs: Mapping[str, xr.Dataset]) -> np.ndarray:
 
 def _at(own: np.ndarray, requested: np.ndarray) -> np.ndarray:
     """Indices into a run's times of the common ones."""
-    first: np.ndarray = quantities.common_times(own, requested)[0]
-    return first
+    return quantities.common_times(own, requested)[0]
 
 
 def _contacts(runs: Mapping[str, xr.Dataset]) -> list[str]:

@@ -99,8 +99,7 @@ class Caption:
         canvas = style.canvas((width, height))
         canvas.figure.text(14 / width, 0.45, text, fontsize=9.5, va="center", color="black", parse_math=False)
         canvas.draw()
-        shade: np.ndarray = 1.0 - style.pixels(canvas)[..., 0] / 255.0
-        return shade
+        return 1.0 - style.pixels(canvas)[..., 0] / 255.0
 
 
 #: pictures a second

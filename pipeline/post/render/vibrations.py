@@ -123,8 +123,7 @@ def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexibl
 def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Displacements of points of a rigid body in each vibration, (vibration, part, point, 3)."""
     move, turn = motions[owner]
-    moved: np.ndarray = move[:, :, None, :] + np.cross(turn[:, :, None, :], points - centre)
-    return moved
+    return move[:, :, None, :] + np.cross(turn[:, :, None, :], points - centre)
 
 
 def _bending(run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motions) -> Piece:

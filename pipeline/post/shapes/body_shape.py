@@ -83,8 +83,7 @@ def fields_of(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 def linear_fields(bundle: xr.Dataset) -> np.ndarray:
     """How each point of a body's skin moves per unit of each coordinate, about its centre of mass; body axes."""
     centre = bundle["modal_first_moment"].values / float(bundle["mass"])
-    fields: np.ndarray = fields_of(bundle)[1] - centre.T[:, None, :]
-    return fields
+    return fields_of(bundle)[1] - centre.T[:, None, :]
 
 
 def stress_recorded(run: xr.Dataset) -> list[str]:
