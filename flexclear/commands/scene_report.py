@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene.provenance import assumed
 from flexclear.pipeline.core.scene.variants import loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.pipeline.post.single_run.horizon import sentence
+from flexclear.pipeline.post.single_run.series import sentence
 from flexclear.stages import derived_series
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import FailedTasksError, Workplace, check

@@ -21,8 +21,7 @@ from flexclear.pipeline.post.render.forms import Seat, equivalent, wheels
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
 from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.render.vibrations import Vibrations
-from flexclear.pipeline.post.shapes.body_shape import surface
-from flexclear.pipeline.post.shapes.rod_shape import AROUND, PER_CELL
+from flexclear.pipeline.post.shapes.body_shape import AROUND, PER_CELL, surface
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes.rigid import drawn
 from flexclear.stages import rendering, simulation

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 KIND = "figure or table"
 NAMES = {
     "fig01": "structure:FIG01",
-    "fig03": "mode_shapes:FIG03",
-    "fig04": "mode_shapes:FIG04",
+    "fig03": "structure:FIG03",
+    "fig04": "structure:FIG04",
     "fig05": "joint:FIG05",
     "fig06": "joint:FIG06",
     "fig08": "panels:FIG08",

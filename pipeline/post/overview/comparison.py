@@ -22,8 +22,7 @@ from flexclear.pipeline.post.overview.curves import NOISE, Curve, curves, measur
 from flexclear.pipeline.post.overview.figures import CONTACTS, centre, orbit
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.table import Table
-from flexclear.pipeline.post.single_run.horizon import sentence
-from flexclear.pipeline.post.single_run.series import derive, parameters
+from flexclear.pipeline.post.single_run.series import derive, parameters, sentence
 
 #: what a run reports of its cost, by its attribute
 COSTS = {"evaluations": "evaluations", "steps": "steps", "rejected_steps": "rejected steps"}

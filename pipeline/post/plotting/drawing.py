@@ -12,7 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 
 from flexclear.pipeline.post.plotting.style import INK
-from flexclear.pipeline.post.shapes.rod_shape import circle
+from flexclear.pipeline.post.shapes.body_shape import circle
 
 #: direction of the light, seen by the observer: from above his left shoulder
 LIGHT = np.array([-0.35, 0.65, 0.68])

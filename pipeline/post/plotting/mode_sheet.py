@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.drawing import View, shell, skin, view
 from flexclear.pipeline.post.plotting.style import SOFT
-from flexclear.pipeline.post.shapes.body_shape import faces, is_rod, scale_to, surface
-from flexclear.pipeline.post.shapes.rod_shape import AROUND
+from flexclear.pipeline.post.shapes.body_shape import AROUND, faces, is_rod, scale_to, surface
 
 #: modes next to each other, and drawn size of the largest displacement as a fraction of the body's length
 COLUMNS, FRACTION = 3, 0.14
