@@ -2,7 +2,7 @@
 
 KIND = "benchmark"
 NAMES = {
-    "evaluation": "evaluation:FAMILY",
+    "evaluation": "runs:EVALUATION",
     "runs": "runs:FAMILY",
     "commands": "commands:FAMILY",
     "cold": "runs:COLD",

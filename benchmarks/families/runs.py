@@ -1,4 +1,6 @@
-"""Whole runs of the paper's scenes: warm ones at their own tolerance, and the first one with nothing compiled.
+"""Evaluations and whole runs of the paper's scenes: warm ones, and the first one with nothing compiled.
+
+Evaluations: against one LAPACK ``dgesv`` of the order of the maximal-coordinate system.
 
 Warm: the integration alone, and the simulate stage.  The first: as a command, from an empty folder of kernels to the
 dataset; meshes, modes and bundles are made before. The same command with the kernels on disk is measured next to it:
@@ -14,18 +16,26 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
+import numpy as np
+import xarray as xr
+from scipy.linalg.lapack import dgesv
+
 from benchmarks.family import Case, Family, Measured, Record, each
-from benchmarks.mechanisms import SCENES, Mechanism, mechanism
+from benchmarks.mechanisms import SCENES, Mechanism, evaluation_time, mechanism, states, trajectory
 from benchmarks.page import Columns, short, spread, table
 from benchmarks.timing import interleaved, of_children, once
 from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.platforms import cores
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics.model.merge import frames_of, merge
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline.post.plotting.table import pipe_table
 
 ROUNDS = 5
 
@@ -136,4 +146,90 @@ COLD = Family(
     measure=each(_from_nothing),
     show=lambda records: table(records, COLD_COLUMNS),
     children=True,
+)
+
+
+#: of a round, some milliseconds each: short against the drift of the machine, long against the clock
+EVALUATIONS, SOLUTIONS, TURNS = 2000, 30, 25
+#: rows of a joint in maximal coordinates; a fixed one joins two bodies to one link
+JOINT_ROWS = {"spherical": 3, "revolute": 5, "prismatic": 5, "fixed": 0, "clearance-spherical": 0}
+
+
+def _evaluations(case: Case) -> list[Record]:
+    """Both in turns in one process, the ratio the median of the ratios of neighbours."""
+    here = mechanism(case.name)
+    engines = {"": here.general_engine(), ", straight": here.engine()}
+    unknowns, derivation = maximal_unknowns(here.scene, here.bundles)
+    tasks: dict[str, Callable[[], float]] = {"dgesv": partial(dgesv_time, unknowns)}
+    straight = engines[", straight"]
+    for label, state in states(straight, trajectory(straight)).items():
+        for way, engine in engines.items():
+            tasks[f"{label}{way}"] = partial(evaluation_time, engine, state, EVALUATIONS)
+    times = interleaved(tasks, TURNS)
+    dense = times.pop("dgesv")
+    ours = {label: found.record("us") | {"ratio": dense.over(found)} for label, found in times.items()}
+    return [{"unknowns": unknowns, "derivation": derivation, "dgesv": dense.record("us"), "ours": ours}]
+
+
+def maximal_unknowns(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[int, str]:
+    """Order of the system in maximal coordinates, and where it comes from in words.
+
+    Its unknowns are the accelerations of every moving link (6 each, rigidly joined bodies being one, also where one of
+    them is flexible), those of the modes, and one multiplier for each row of every joint, drives included. Joints with
+    clearance are forces and have no rows.
+    """
+    frames = frames_of(scene, bundles)
+    groups, group_of = merge(scene, frames)
+    # rigid groups that a fixed joint ties to a flexible one move with its frame
+    tied = [
+        {group_of[frames[f].body] for f in joint.between} for joint in scene.joint.values() if joint.type == "fixed"
+    ]
+    carried = {i for pair in tied if len(pair) == 2 for i in pair if not groups[i].flexible}
+    links = len(groups) - 1 - len(carried)
+    modes = sum(bundles[group.host].sizes["mode"] for group in groups if group.flexible)
+    rows = sum(JOINT_ROWS[joint.type] for joint in scene.joint.values())
+    unknowns = 6 * links + modes + rows + len(scene.drive)
+    of_modes = f" + {modes} modes" if modes else ""
+    return unknowns, f"6 x {links} links{of_modes} + {rows} joint rows + {len(scene.drive)} drive rows = {unknowns}"
+
+
+def dgesv_time(order: int) -> float:
+    """Processor time of one solution of a dense system [s]; making its matrix is not counted.
+
+    The matrix is a random one: to within 2 % its entries do not matter for the time.
+    """
+    random = np.random.default_rng(order)
+    systems = [(random.normal(size=(order, order)).T, random.normal(size=order)) for _ in range(SOLUTIONS)]
+
+    def solve() -> None:
+        for A, b in systems:
+            dgesv(A, b, overwrite_a=1, overwrite_b=1)
+
+    return once(solve) / SOLUTIONS
+
+
+def shown_evaluations(records: list[Record]) -> str:
+    """The table, and where the numbers of unknowns come from."""
+    rows = []
+    for r in records:
+        cells = [r["case"], str(r["unknowns"]), spread(r["dgesv"], "us", 1)]
+        for label in ("free, straight", "in contact, straight", "free", "in contact"):
+            ours = r["ours"].get(label)
+            cells += [spread(ours, "us", 2), f"1/{ours['ratio']:.1f}"] if ours else ["", ""]
+        rows.append(cells)
+    head = ["scene", "n", "dgesv(n) [us]"]
+    for label in ("free", "in contact", "kernels, free", "kernels, in contact"):
+        head += [f"{label} [us]", "of dgesv"]
+    derivations = "\n".join(f"- {r['case']}: n = {r['derivation']}" for r in records)
+    return f"{pipe_table(head, rows)}\n\n{derivations}"
+
+
+EVALUATION = Family(
+    what="microseconds of one evaluation, against a dense solve",
+    takes="1 min",
+    page="benchmarks.md",
+    cases=lambda: [Case(name) for name in SCENES],
+    measure=each(_evaluations),
+    show=shown_evaluations,
+    quick="ideal",
 )

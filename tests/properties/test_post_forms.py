@@ -292,13 +292,13 @@ def test_a_vibrating_pendulum_turns_about_its_pin_and_is_not_drawn_too_far(swing
 
 @needs_gl
 def test_a_film_of_vibrations_goes_through_whole_periods(swinging: tuple[Mechanism, Vibrations]):
-    from flexclear.pipeline.post.render import vibration_film
+    from flexclear.pipeline.post.render import vibrations
 
-    pictures = np.array(list(vibration_film.frames(*swinging, 8)))
+    pictures = np.array(list(vibrations.frames(*swinging, 8)))
     assert pictures.shape == (12, 540, 960, 3)  # 1.5 s of 8 pictures
     np.testing.assert_array_equal(pictures[:6], pictures[6:])
     assert np.abs(pictures[3].astype(int) - pictures[0]).max() > 50  # of 255: the other side half a period later
-    assert vibration_film.sheet(*swinging).shape == (360, 480, 3)
+    assert vibrations.sheet(*swinging).shape == (360, 480, 3)
 
 
 @pytest.mark.parametrize("what, kind", [("joint", "gltf"), ("vibrations", "pvd")])

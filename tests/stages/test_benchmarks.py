@@ -11,7 +11,7 @@ import pytest
 from benchmarks import errors, log, page, processes, timing
 from benchmarks.errors import SAMPLING, Error, Samples
 from benchmarks.exudyn_model import METHODS, Outcome, holds_at_zero, joint_laws, polynomials, solve
-from benchmarks.families import evaluation, exudyn, growth
+from benchmarks.families import exudyn, growth, runs
 from benchmarks.family import Case
 from benchmarks.mechanisms import (
     Mechanism,
@@ -43,12 +43,12 @@ def scene(root: Path, name: str) -> Scene:
 @pytest.mark.parametrize("name", UNKNOWNS)
 def test_the_dense_system_has_the_unknowns_that_its_derivation_says(name: str):
     here = mechanism(name)
-    unknowns, words = evaluation.maximal_unknowns(here.scene, here.bundles)
+    unknowns, words = runs.maximal_unknowns(here.scene, here.bundles)
     assert unknowns == UNKNOWNS[name]
     if name == "csj":
         # ten links of six; four prismatic joints of five rows, four spherical B and C of three, A2..A4, Z; four drives
         assert words == "6 x 10 links + 49 joint rows + 4 drive rows = 113"
-    assert evaluation.dgesv_time(10) > 0.0
+    assert runs.dgesv_time(10) > 0.0
 
 
 def _at(law: Pieces, order: int, t: float) -> float:

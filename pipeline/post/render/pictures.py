@@ -227,18 +227,13 @@ def _vibration_page(shown: Shown, kind: str) -> dict[str, bytes]:
 
 def _vibration_sheet(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
-    from flexclear.pipeline.post.render import vibration_film as film
-
-    return {"vibrations.png": png(film.sheet(*_vibrating(shown)))}
+    return {"vibrations.png": png(vibrations.sheet(*_vibrating(shown)))}
 
 
-def _vibration_film(shown: Shown, kind: str) -> dict[str, bytes]:
+def _vibrations(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
-    from flexclear.pipeline.post.render import pace
-    from flexclear.pipeline.post.render import vibration_film as film
-
     rate = pace.rate(kind)
-    suffix, content = pace.write(film.frames(*_vibrating(shown), rate, shown.progress), rate, kind)
+    suffix, content = pace.write(vibrations.frames(*_vibrating(shown), rate, shown.progress), rate, kind)
     return {f"vibrations.{suffix}": content}
 
 
@@ -265,5 +260,5 @@ MAKERS: dict[str, dict[str, Maker]] = {
         "pvd": _mode_series,
     },
     "joint": {"png": _joint_figures, "gif": _joint_films, "mp4": _joint_films, "html": _joint_page},
-    "vibrations": {"png": _vibration_sheet, "gif": _vibration_film, "mp4": _vibration_film, "html": _vibration_page},
+    "vibrations": {"png": _vibration_sheet, "gif": _vibrations, "mp4": _vibrations, "html": _vibration_page},
 }
