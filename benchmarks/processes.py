@@ -113,13 +113,21 @@ def _serve(line: connection.Connection, work: Work, limit: int) -> None:
             line.send(work(parameters, lambda: processes.limit_seconds(limit)))
 
 
+def installed(library: str) -> bool:
+    """Whether a library can be imported here."""
+    try:
+        return find_spec(library) is not None
+    except ValueError:  # its import is blocked
+        return False
+
+
 def lacking() -> str:
     """Why child processes can be neither measured nor limited here; empty where they can."""
-    try:
-        known = find_spec("resource") is not None
-    except ValueError:  # its import is blocked
-        known = False
-    return "" if known else "needs processor times and limits of child processes, which this system does not have"
+    return (
+        ""
+        if installed("resource")
+        else "needs processor times and limits of child processes, which this system does not have"
+    )
 
 
 def _resource() -> Any:
