@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics.run.evaluation.observation import frames
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.post.single_run.horizon import horizon
+from flexclear.pipeline.post.single_run.series import horizon
 from tests.analytic.mechanism_runs import TREE, run
 
 

@@ -11,7 +11,7 @@ from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.artifacts.quantities import PERTURBATION
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.post.single_run.horizon import horizon
+from flexclear.pipeline.post.single_run.series import horizon
 from tests.properties.mechanisms import Table
 from tests.properties.movable import Setting, scene
 from tests.properties.movable_planar import LOOPS, loop, planar

@@ -19,7 +19,7 @@ from flexclear.pipeline.core.numerics.rotations import (
     turning,
 )
 from flexclear.pipeline.post import derive
-from flexclear.pipeline.post.single_run.horizon import horizon, spread
+from flexclear.pipeline.post.single_run.series import horizon, spread
 from tests.paper import synthetic
 
 angles = st.floats(-1.5, 1.5)
