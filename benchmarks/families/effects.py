@@ -62,7 +62,7 @@ def _influences() -> list[Record]:
     from flexclear.stages.workplace import open_workplace
 
     scene = edited(load_scene(scenes.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
-    found = effects.dataset(scene, open_workplace())
+    found = effects.bring(scene, open_workplace()).dataset()
     records = []
     for quantity in WATCHED:
         part = found.sel(quantity=quantity)

@@ -53,7 +53,7 @@ def bring(cases: list[Case], place: Workplace) -> dict[Case, xr.Dataset]:
     tasks = {case: design.task(case) for case in cases}
     outcome = place.bring(list(tasks.values()))
     check(outcome)
-    return {case: place.store.load(outcome.records[id(task)]) for case, task in tasks.items()}
+    return {case: place.store.load(outcome.records[task]) for case, task in tasks.items()}
 
 
 def identity(case: Case) -> Row:

@@ -13,15 +13,15 @@ from numpy.testing import assert_allclose
 
 from flexclear.commands.__main__ import main
 from flexclear.commands.frequencies import speeds
-from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics.linear.campbell import campbell
 from tests.analytic.test_unbalanced_rotors import ACROSS, ALONG, MASS, MIXED, SIDE, SLOPE, TURNS, Table, rotor
 
 
 def diagram(table: Table, at: list[float]) -> xr.Dataset:
-    return dynamics.campbell(Scene.model_validate(table), {}, silent, at)
+    return campbell(Scene.model_validate(table), {}, silent, at)
 
 
 def whirls(speed: float) -> np.ndarray:
@@ -113,7 +113,7 @@ def test_branches_pass_a_critical_speed_that_has_no_steady_motion() -> None:
 
 
 @pytest.fixture(scope="module")
-def campbell() -> ModuleType:
+def example() -> ModuleType:
     path = Path(__file__).parents[2] / "docs" / "examples" / "campbell.py"
     spec = importlib.util.spec_from_file_location("campbell", path)
     assert spec is not None
@@ -124,14 +124,14 @@ def campbell() -> ModuleType:
 
 
 @pytest.mark.parametrize("speed", [0.0, 100.0, 300.0])
-def test_the_gyroscopic_moment_parts_the_whirls_of_an_overhung_rotor(campbell: ModuleType, speed: float) -> None:
+def test_the_gyroscopic_moment_parts_the_whirls_of_an_overhung_rotor(example: ModuleType, speed: float) -> None:
     # the shaft's own mass, 1.6e-5 of the disc's, of which a quarter counts, is not in the closed form; the least whirl
     # is found as a difference of numbers ten times as large
-    assert_allclose(campbell.found_whirls(speed), campbell.whirls(speed), rtol=2e-4)
+    assert_allclose(example.found_whirls(speed), example.whirls(speed), rtol=2e-4)
 
 
-def test_a_shaft_without_a_spinning_disc_would_not_part_them(campbell: ModuleType) -> None:
-    backward, forward = np.split(np.abs(campbell.whirls(0.0)), 2)
+def test_a_shaft_without_a_spinning_disc_would_not_part_them(example: ModuleType) -> None:
+    backward, forward = np.split(np.abs(example.whirls(0.0)), 2)
     assert_allclose(np.sort(backward), np.sort(forward), rtol=1e-9)
-    low, high = np.split(np.abs(campbell.whirls(300.0)), 2)
+    low, high = np.split(np.abs(example.whirls(300.0)), 2)
     assert np.all(np.sort(low) < np.sort(high) * 0.9)

@@ -36,7 +36,7 @@ from tests.processes import printed
 DYNAMICS = "flexclear.pipeline.dynamics"
 CONTACT = (
     "flexclear.pipeline.dynamics.contact",
-    "flexclear.pipeline.dynamics.joints.clearance_spherical",
+    "flexclear.pipeline.dynamics.contact.surfaces.clearance_spherical",
     "flexclear.pipeline.dynamics.integrate.contact_events",
     "flexclear.pipeline.dynamics.integrate.contact_phases",
 )
@@ -50,8 +50,8 @@ APPLIED = (
 BODIES = "flexclear.pipeline.dynamics.bodies"
 FLEXIBLE = (f"{BODIES}.flexible", f"{BODIES}.interface", f"{BODIES}.ports", "flexclear.pipeline.structure")
 #: ways over singular poses and out of them, which no run takes that meets none
-RUNS = "flexclear.pipeline.dynamics.run"
-SINGULAR = tuple(f"{RUNS}.{name}" for name in ("collocation", "singular_pass", "singular_start"))
+POSES = "flexclear.pipeline.dynamics.run.singular_poses"
+SINGULAR = tuple(f"{POSES}.{name}" for name in ("collocation", "passing", "beginning"))
 SCHEME = Scheme("dop853")
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
 
@@ -112,7 +112,7 @@ def test_a_run_imports_the_code_of_no_effect_that_its_scene_lacks(root: Path) ->
     """But for what contacts and closures may be: ends of stops, and gears."""
     kinds = {"stops.model", "gears.model"}
     assert code_of_effects(imported_by_a_run(root, IDEAL)) == kinds
-    assert code_of_effects(imported_by_a_run(root, "checks/bushing")) == {*kinds, "bushings.run"}
+    assert code_of_effects(imported_by_a_run(root, "checks/bushing")) == {*kinds, "bushings.bushing", "bushings.run"}
 
 
 def test_every_function_that_a_declaration_names_is_there() -> None:
@@ -129,7 +129,7 @@ def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
     laws = {n for n in below(names, CONTACT) if re.search(r"\.(normal|friction)\.\w+$", n)}
     normal = {"flexclear.pipeline.dynamics.contact.normal.lankarani_nikravesh"}
     friction = "flexclear.pipeline.dynamics.contact.friction"
-    assert laws == normal | {f"{friction}.{n}" for n in ("modified_coulomb", "memoryless")}
+    assert laws == normal | {f"{friction}.{n}" for n in ("law", "modified_coulomb")}
     assert below(names, (*FLEXIBLE, *SINGULAR)) == set()
 
 
@@ -159,11 +159,12 @@ def reached(texts: dict[str, str]) -> set[str]:
 
 #: effect -> word that its generated source must have, modules it must reach
 EFFECTS = {
-    "contact": ("clearance_spherical", "flexclear.pipeline.dynamics.joints.clearance_spherical"),
+    "contact": ("clearance_spherical", "flexclear.pipeline.dynamics.contact.surfaces.clearance_spherical"),
     "normal law": ("import hysteretic", "flexclear.pipeline.dynamics.contact.form.hysteretic"),
     "friction": ("modified_coulomb", "flexclear.pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("flexible_bodies", "flexclear.pipeline.dynamics.bodies.flexible"),
     "closures": ("closures=", "flexclear.pipeline.dynamics.equations.closures"),
+    "singular poses": ("OVER_POSES", "flexclear.pipeline.dynamics.integrate.singular_step"),
     "couplings": ("make_coupled_closing", "flexclear.pipeline.dynamics.effects.gears.equations"),
     "stops": ("make_stops", "flexclear.pipeline.dynamics.effects.stops.contact"),
     "stiffening": ("flexible_bodies(bodies)", "flexclear.pipeline.dynamics.effects.stiffening.bodies"),
@@ -221,6 +222,8 @@ def test_the_entry_names_and_reaches_the_effects_present_and_no_other(case: str)
     found, present = CASES[case]
     texts = generated(found)
     modules, source = reached(texts), "".join(texts.values())
+    if "closures" in present:  # loops alone have singular poses
+        present = present | {"singular poses"}
     for effect, (word, module) in EFFECTS.items():
         assert (word in source) == (effect in present), effect
         assert (module in modules) == (effect in present), effect
@@ -233,10 +236,6 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     modules = reached(generated(found))
     requested = {module_of(JOINTS, n) for n in found.joints}
     requested.add("flexclear.pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
-    if "contact" in present:
-        requested.add("flexclear.pipeline.dynamics.joints.clearance_spherical")
-    if "joint friction" in present:
-        requested.add("flexclear.pipeline.dynamics.joints.bearings")
     assert below(modules, ("flexclear.pipeline.dynamics.joints",)) == requested
     if not {"contact", "stops", "joint friction"} & present:
         assert below(modules, CONTACT) == set()

@@ -37,14 +37,14 @@ def imported(*arguments: str, results: Path) -> set[str]:
     return {name for name in names - set(own) if not name.startswith(("_sysconfigdata", "__"))}
 
 
-def stand_in(tasks: Iterable[Task], place: Workplace) -> dict[int, Record]:
+def stand_in(tasks: Iterable[Task], place: Workplace) -> dict[Task, Record]:
     """Records of tasks and all their inputs, by identity: in the store is what their keys ask for, and not a result."""
-    found: dict[int, Record] = {}
+    found: dict[Task, Record] = {}
     for task in in_order(list(tasks)):
-        known = facts(task, {name: found[id(above)].digest for name, above in task.inputs.items()}, place.sources)
+        known = facts(task, {name: found[above].digest for name, above in task.inputs.items()}, place.sources)
         name = key(known)
         record = place.store.find(task.stage, name)
-        found[id(task)] = record or place.store.put(task.stage, name, {"nc": name.encode()}, known)
+        found[task] = record or place.store.put(task.stage, name, {"nc": name.encode()}, known)
     return found
 
 
@@ -56,7 +56,7 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scenes = report.Scenes()
     tasks = [*report.figure_tasks(place, scenes), *scenes.graph(report.HEADLINE).of("render").values()]
     records = stand_in(tasks, place)
-    graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in records]
+    graphs = [graph for graph in scenes.graphs.values() if graph.simulate in records]
     stand_in([report.page_task(place, records, graphs)], place)
     return root
 

@@ -32,8 +32,8 @@ for task in in_order(Graph(load_scene(scene, shortened), shown=False).up_to("pos
             if name.startswith(tuple(f"flexclear.pipeline.{t}" for t in ("structure", "dynamics", "post"))):
                 del sys.modules[name]
         before = {name for name in sys.modules}
-    inputs = {name: records[id(above)] for name, above in task.inputs.items()}
-    records[id(task)] = execute(task, inputs, store, sources, lambda fraction, text: None)
+    inputs = {name: records[above] for name, above in task.inputs.items()}
+    records[task] = execute(task, inputs, store, sources, lambda fraction, text: None)
     if task.label == label:
         print(*sorted(name for name in sys.modules.keys() - before if name.split(".")[0] in ("flexclear",)))
         break

@@ -12,8 +12,8 @@ import pytest
 import xarray as xr
 
 from flexclear.commands import scenes
-from flexclear.commands.as_json import as_json
 from flexclear.commands.check import examined
+from flexclear.commands.export import as_json
 from flexclear.commands.new import KINDS, TEMPLATES, write
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene import lines

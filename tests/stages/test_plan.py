@@ -63,7 +63,7 @@ def _ideal(scene: Scene) -> tuple[Run, dict[str, xr.Dataset]]:
     """The run of a scene's ideal twin, and what is known of its bodies."""
     place, task = open_workplace(), effect_plan.task(edited(scene, {"accuracy": {"quantities": {}}}))
     outcome = place.bring(list(task.inputs.values()), 1)
-    inputs = {name: place.store.load(outcome.records[id(below)]) for name, below in task.inputs.items()}
+    inputs = {name: place.store.load(outcome.records[below]) for name, below in task.inputs.items()}
     gone = [e for e in variants.effects(scene) if not e.name.startswith("load.")]
     bare = watched_quantities.plain(variants.without(scene, gone))
     rigid = {name: inputs[name] for name in Graph(bare, shown=False).bodies()}
@@ -134,7 +134,7 @@ def test_the_elements_that_are_called_for_make_the_error_that_is_wanted(tmp_path
     def reduced(factor: int) -> xr.Dataset:
         task = Graph(coarse, shown=False, recipe={"elements": factor}).bundle["rod"]
         place = open_workplace()
-        return place.store.load(place.bring([task], 1).records[id(task)])
+        return place.store.load(place.bring([task], 1).records[task])
 
     recipe = tmp_path / "coarse.toml"
     text = (tmp_path / "leg_rod.toml").read_text()

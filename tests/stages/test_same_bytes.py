@@ -11,7 +11,7 @@ import numpy, scipy.linalg
 from flexclear.commands.scenes import graphs, open_workplace
 (graph,) = graphs(["checks/clamped_rod"])
 done = open_workplace().bring(list(graph.bundle.values()), jobs=1)
-print(*(done.records[id(task)].digest for task in graph.bundle.values()))
+print(*(done.records[task].digest for task in graph.bundle.values()))
 """
 
 #: threads that BLAS has in a task: of a NumPy that this program loads, then where somebody has set another number

@@ -75,7 +75,7 @@ def test_what_failed_in_a_worker_is_the_task_that_was_asked_for(tmp_path: Path) 
     # without the run that it is of, it cannot be done
     tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in ("a", "b")]
     outcome = bring(tasks, Store(tmp_path), Sources(TREE), Monitor(), 2)
-    assert {id(failure.task) for failure in outcome.failures} == {id(task) for task in tasks}
+    assert {failure.task for failure in outcome.failures} == {task for task in tasks}
 
 
 UNGUARDED = """
