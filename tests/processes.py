@@ -1,7 +1,5 @@
 """Python in processes of its own, and copies of the sources that are to be edited."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

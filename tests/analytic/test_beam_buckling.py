@@ -1,7 +1,5 @@
 """Geometric stiffness: buckling loads, a stretched rod, what a rigid rotation costs; static compliance."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Exact frequencies beside those of a mesh; normal modes of the paper, to every printed digit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Bushings against closed forms: coupled plane motion, natural frequencies, and torque as the slope of the energy."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

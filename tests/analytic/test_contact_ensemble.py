@@ -1,7 +1,5 @@
 """Ensembles from scene to statistics: members that start a known distance apart, falling in closed form."""
 
-from __future__ import annotations
-
 import itertools
 import threading
 from functools import cache

@@ -1,7 +1,5 @@
 """The predictability horizon: growth of a small perturbation of the start."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

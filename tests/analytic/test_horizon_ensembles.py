@@ -1,7 +1,5 @@
 """Horizons of one perturbed run, and of tangent motions, against ensembles of random mechanisms; known exponents."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Explicit methods that crawl are noticed and replaced, a fixed step is told; implicit ones step over a stiff mode."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

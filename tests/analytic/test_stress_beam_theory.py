@@ -1,7 +1,5 @@
 """Section forces and peak stresses of single rods against beam theory, of the paper's by its joints and motion."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Unbalanced rotors at steady speed: their poses below and above the critical speed, and their stability."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """A run says, with amounts and remedies, when it left what its model carries; what means nothing is refused."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any

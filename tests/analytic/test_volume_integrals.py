@@ -4,8 +4,6 @@ A rod with everything - taper, shear, quadratic twist, pose, ball - moves by the
 here, from the solution's unknowns; a solid by quadrature over its curved cells.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Small mechanisms for tests, as scenes in tables of SI numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Recipes and meshes: what they hold and refuse, that other programs open them; bundles of the paper's rod."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """No contact is stepped over, however long the steps: a sprung ball swings a little beyond its socket's wall."""
 
-from __future__ import annotations
-
 from random import Random
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a flexible mechanism tends to as it stiffens and its basis completes; loads on it reach its modes."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 from typing import Any

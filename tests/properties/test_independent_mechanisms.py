@@ -1,7 +1,5 @@
 """Mechanisms that share no force are each as accurate as alone, however different their sizes are."""
 
-from __future__ import annotations
-
 from random import Random
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Shapes that move no frame are eliminated for themselves; accelerations are those of eigenmodes all coupled."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Pictures show true sizes, name what is drawn larger, draw rounding as a zero line, and planes from their normal."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

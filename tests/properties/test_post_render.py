@@ -1,7 +1,5 @@
 """What is drawn has the size of what was computed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is written here instead of imported from NumPy or SciPy does the same."""
 
-from __future__ import annotations
-
 import math
 from math import factorial
 

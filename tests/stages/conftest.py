@@ -4,8 +4,6 @@ The copy's `simulated` and `derived` make little datasets, and log each call to 
 there is a file of the name HELD_BY.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

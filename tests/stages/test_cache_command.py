@@ -1,7 +1,5 @@
 """``flexclear cache``: tells what is kept and whether it is whole, and removes nothing that is shown or needed."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

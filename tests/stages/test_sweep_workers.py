@@ -1,7 +1,5 @@
 """Who runs the points of a sweep does not matter, nor who dies meanwhile, nor whether all fit into memory."""
 
-from __future__ import annotations
-
 import logging
 import os
 import signal
