@@ -1,7 +1,5 @@
 """Stresses of solids: against scikit-fem with the same cells, closed forms, and the full model in motion."""
 
-from __future__ import annotations
-
 import base64
 import json
 from pathlib import Path

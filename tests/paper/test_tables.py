@@ -1,7 +1,5 @@
 """The tables say what the runs say, in the paper's units, beside the paper's own numbers."""
 
-from __future__ import annotations
-
 import csv
 import io
 

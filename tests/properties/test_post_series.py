@@ -1,7 +1,5 @@
 """What post derives from runs: angles, deviations, horizons, impacts, sections."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """``flexclear show``: the start pose with names, for every scene, without anything that computes or compiles."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
