@@ -17,6 +17,7 @@ from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised, straight_code
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
@@ -96,7 +97,7 @@ def trajectory(engine: Engine) -> Trajectory:
 
 def states(engine: Engine, run: Trajectory) -> dict[str, State]:
     """A state of the run without contact ("free") and, where all contacts press at a time, one of those."""
-    record = m.record(run.rows, run.contacts)
+    record = recording.record(run.rows, run.contacts)
     found = {"free": np.flatnonzero(~np.any(record.modes == 1.0, axis=1))}
     if run.contacts:
         forces = observed(engine, run).touch["normal_force"]
