@@ -51,7 +51,7 @@ def never(rows: np.ndarray) -> bool:
 class Trajectory:
     """What the stepper left.
 
-    rows: of the record (see `memory.record`); events: of the event table, by time.
+    rows: of the record (see `integrate.recording`); events: of the event table, by time.
     contacts: number of clearance joints.  selections: closure rows solved for, each from a time on.
     drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
