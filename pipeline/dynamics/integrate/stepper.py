@@ -115,8 +115,9 @@ def make_advance(
     begin, step_itself, error, extend_itself, keep = method.make_kernels(*given)
     proceed = step_itself if method.staged else make_at_once(step_itself)
     attempt_itself = make_attempt(evaluate, proceed) if method.staged else step_itself
-    attempt, extend, interpolate, foresee, arrive = attempt_itself, extend_itself, method.interpolate, None, None
-    loops = poses is not None
+    attempt, extend, interpolate, loops = attempt_itself, extend_itself, method.interpolate, poses is not None
+    foresee: Any = None
+    arrive: Any = None
     if loops:
         attempt, extend, interpolate = poses.make_along(method, attempt_itself, extend_itself)
         foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, attempt, method)
