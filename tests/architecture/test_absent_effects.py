@@ -164,7 +164,7 @@ EFFECTS = {
     "friction": ("modified_coulomb", "flexclear.pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("flexible_bodies", "flexclear.pipeline.dynamics.bodies.flexible"),
     "closures": ("closures=", "flexclear.pipeline.dynamics.equations.closures"),
-    "singular poses": ("OVER_POSES", "flexclear.pipeline.dynamics.integrate.singular_step"),
+    "singular poses": ("poses=singular_step", "flexclear.pipeline.dynamics.integrate.singular_step"),
     "couplings": ("make_coupled_closing", "flexclear.pipeline.dynamics.effects.gears.equations"),
     "stops": ("make_stops", "flexclear.pipeline.dynamics.effects.stops.contact"),
     "stiffening": ("flexible_bodies(bodies)", "flexclear.pipeline.dynamics.effects.stiffening.bodies"),

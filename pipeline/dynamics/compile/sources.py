@@ -271,7 +271,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
     if events:
         file.given["events"] = events
     if parts.closures:
-        file.given["poses"] = file.take(f"{INTEGRATORS}.singular_step", "OVER_POSES")
+        file.given["poses"] = file.take(INTEGRATORS, "singular_step")
     file.take(DYNAMICS, "memory as m")
     maker = file.take(f"{INTEGRATORS}.stepper", "make_advance")
     return _text(file, f"steps of {scheme}", "steps", maker, ADVANCE)
