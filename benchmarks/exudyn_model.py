@@ -24,7 +24,7 @@ from benchmarks.mechanisms import Mechanism
 from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
 from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.contact.surfaces import BallInSocket
+from flexclear.pipeline.dynamics.contact.surfaces import clearance_spherical
 from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 from flexclear.pipeline.dynamics.model import merge as grouping
 from flexclear.pipeline.dynamics.model.contacts import LEAST_RATE
@@ -334,7 +334,7 @@ def _contact(model: Model, joint: ClearanceSpherical, socket: Any, ball: Any) ->
             spheresRadii=[joint.ball_radius, joint.ball_radius + joint.clearance],
             isHollowSphere1=True,
             impactModel=1,
-            contactStiffness=BallInSocket.stiffness(joint, exponent),
+            contactStiffness=clearance_spherical.stiffness(joint, exponent),
             contactStiffnessExponent=exponent,
             restitutionCoefficient=1.0 - 0.5 * (1.0 - restitution**2),
             minimumImpactVelocity=joint.floor or LEAST_RATE,

@@ -115,9 +115,8 @@ def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models
     In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     from flexclear.commands import cost as cost_command
-    from flexclear.stages.workplace import open_workplace
 
-    return cost_command.dataset(_loaded(scene), open_workplace(), budget, models)
+    return cost_command.dataset(_loaded(scene), budget, models)
 
 
 def stability(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
@@ -127,10 +126,9 @@ def stability(scene: Scene | str | Path, budget: str | float | None = None) -> x
     singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost.  In a notebook
     the dataset shows the answer first.  Raises FlexclearError.
     """
-    from flexclear.commands import answers as answers_command
-    from flexclear.stages.workplace import open_workplace
+    from flexclear.commands import answers
 
-    return answers_command.dataset("stability", _loaded(scene), open_workplace(), budget)
+    return answers.dataset("stability", _loaded(scene), budget)
 
 
 def sweep(
@@ -275,8 +273,7 @@ def compare(
     from flexclear.stages.workplace import open_workplace
 
     without = "both" if ideal is True else ideal or None
-    comparison = compare_command.bring([_loaded(scene) for scene in scenes], open_workplace(), without)
-    return comparison.dataset()
+    return compare_command.bring([_loaded(scene) for scene in scenes], open_workplace(), without).dataset()
 
 
 def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
@@ -287,13 +284,13 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
     important ones first, with as many members as decide the change (`pipeline.post.answers.matters`); a notebook shows
     the answer first.  Raises FlexclearError.
     """
-    from flexclear.commands import answers as answers_command
+    from flexclear.commands import answers
     from flexclear.commands import effects as effects_command
     from flexclear.stages.workplace import open_workplace
 
     if budget is not None:
-        return answers_command.dataset("matters", _loaded(scene), open_workplace(), budget)
-    return effects_command.dataset(_loaded(scene), open_workplace())
+        return answers.dataset("matters", _loaded(scene), budget)
+    return effects_command.bring(_loaded(scene), open_workplace()).dataset()
 
 
 def plan(
@@ -309,9 +306,8 @@ def plan(
     In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     from flexclear.commands import plan as plan_command
-    from flexclear.stages.workplace import open_workplace
 
-    return plan_command.dataset(_loaded(scene), open_workplace(), accuracy, budget)
+    return plan_command.dataset(_loaded(scene), accuracy, budget)
 
 
 def render(scene: Scene | str | Path) -> Path:
@@ -344,13 +340,12 @@ def report(scene: Scene | str | Path, budget: str | float | None = None, *, answ
     budget: of what accuracy costs, whether the run is stable and which effects matter, as of `stability`; answers:
     whether these are there.  Raises FlexclearError.
     """
-    from flexclear.commands import answers as answers_command
-    from flexclear.commands import scene_report, scenes
-    from flexclear.stages.workplace import open_workplace
+    from flexclear.commands import report as report_command
+    from flexclear.commands import scenes
+    from flexclear.stages.workplace import open_workplace, seconds
 
-    seconds = answers_command.seconds(budget)
-    graph, where = scenes.graph(_loaded(scene)), open_workplace()
-    return scene_report.make(graph, where, seconds=seconds, answers=answers)
+    given = None if budget is None else seconds(budget, "budget")
+    return report_command.of_scene(scenes.graph(_loaded(scene)), open_workplace(), budget=given, answers=answers)
 
 
 def open(scene: Scene | str | Path) -> xr.DataTree:

@@ -19,12 +19,11 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, the `own`
     setting of the scene (own_integrator, own_rtol or own_step), what was left `undone` in words, whether the study is
-    `complete`, and `peers`, as of `flexclear.commands.cost_peers`.  The reference is the tightest run among the
+    `complete`, and `peers`, as of `flexclear.commands.cost.read_peers`.  The reference is the tightest run among the
     points, and a run by another method confirms it.
     """
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
-    from flexclear.pipeline.post.cost import answer
     from flexclear.pipeline.post.cost.causes import causes_of
     from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
     from flexclear.pipeline.post.plotting.table import files

@@ -37,8 +37,8 @@ def comparison(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], prog
     where there is one.
     """
     from flexclear.pipeline.core.scene.quantity import Quantity
-    from flexclear.pipeline.post.overview import comparison as compared_runs
     from flexclear.pipeline.post.overview import comparison
+    from flexclear.pipeline.post.overview import comparison as compared_runs
     from flexclear.pipeline.post.plotting.table import files
 
     runs = {label: inputs[f"run{k}"] for k, label in enumerate(params["labels"])}

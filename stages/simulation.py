@@ -168,11 +168,12 @@ def linear(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress
     """The equilibrium in a `pose` (schema EQUILIBRIUM), or with its vibrations (schema LINEAR); over the speeds of a
     drive these alone (schema CAMPBELL).  Inputs are ``bundle/<body>``."""
     from flexclear.pipeline import dynamics
+    from flexclear.pipeline.dynamics.linear.campbell import campbell
 
     pose, scene, reduced = params["pose"], rebuild(params, inputs), bundles(inputs)
     where = pose["time"], pose["drives"]
     if "speeds" in params:
-        return {"nc": dynamics.campbell(scene, reduced, progress, params["speeds"], params["drive"], *where)}
+        return {"nc": campbell(scene, reduced, progress, params["speeds"], params["drive"], *where)}
     solve = dynamics.frequencies if pose["vibrations"] else dynamics.equilibrium
     return {"nc": solve(scene, reduced, progress, *where, pose["moving"])}
 

@@ -61,7 +61,7 @@ def _measured(case: Case) -> list[Record]:
 
 def _influences() -> list[Record]:
     scene = edited(load_scene(scenes.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
-    found = effects.dataset(scene, open_workplace())
+    found = effects.bring(scene, open_workplace()).dataset()
     records = []
     for quantity in WATCHED:
         part = found.sel(quantity=quantity)

@@ -68,7 +68,7 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
         task = effect_plan.task(scene)
         outcome = place.bring(list(task.inputs.values()), 1)
         check(outcome)
-        inputs = {name: place.store.load(outcome.records[id(below)]) for name, below in task.inputs.items()}
+        inputs = {name: place.store.load(outcome.records[below]) for name, below in task.inputs.items()}
         params = {**task.params, **task.context}
         decided, planning = _planned(params, inputs)
         if planning > SECOND:  # that may have fetched code

@@ -40,7 +40,7 @@ def bring(cases: list[design.Case], place: Workplace) -> dict[design.Case, xr.Da
     tasks = {case: design.task(case) for case in cases}
     outcome = place.bring(list(tasks.values()))
     check(outcome)
-    return {case: place.store.load(outcome.records[id(task)]) for case, task in tasks.items()}
+    return {case: place.store.load(outcome.records[task]) for case, task in tasks.items()}
 
 
 def identity(case: design.Case) -> Row:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.commands import as_json, export, scenes
+from flexclear.commands import export, scenes
+from flexclear.commands.export import as_json
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
@@ -66,7 +67,7 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--out", "pictures are of Campbell diagrams", "add --speeds, e.g. 0:500rpm:50")
     targets = _targets(options, ())
     modes = scenes.linear(graph.scene, time, moving=options.moving, workplace=open_workplace(options))
-    print(as_json.as_json(modes) if options.json else text(modes).rstrip("\n"))
+    print(as_json(modes) if options.json else text(modes).rstrip("\n"))
     for target in targets:
         with disk_limits(target.parent):
             export.write(modes, target, ("vibration",))
@@ -88,7 +89,7 @@ def diagram(scene: Scene, time: float | None, options: argparse.Namespace) -> No
     made = scenes.linear(scene, time, speeds=given, drive=options.drive, workplace=open_workplace(options))
     from flexclear.pipeline.post.plotting import campbell
 
-    print(as_json.as_json(made) if options.json else campbell.text(made))
+    print(as_json(made) if options.json else campbell.text(made))
     pictures = campbell.files("campbell", made) if any(target.suffix in PICTURES for target in targets) else {}
     for target in targets:
         with disk_limits(target.parent):

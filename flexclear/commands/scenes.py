@@ -27,7 +27,7 @@ from flexclear.pipeline.core.workflow.progress import WARNING
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, add_options, open_workplace, relative
+from flexclear.stages.workplace import Made, Workplace, add_options, open_workplace, relative
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,6 +50,14 @@ def print_files(folder: Path, files: Mapping[str, str]) -> None:
     there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
     if there:
         print(f"{relative(folder)}: {', '.join(there)}")
+
+
+def pictures(made: Made | None, captions: Mapping[str, Sequence[str]]) -> str:
+    """Those pictures and films of an artifact that are there, as HTML; by name their captions, and what they show."""
+    from flexclear.pipeline.post.pages import media
+
+    files = made.record.files if made is not None else {}
+    return "".join(media(name, made.read(name), *text) for name, text in captions.items() if made and name in files)
 
 
 def joined(names: Sequence[str]) -> str:
@@ -214,7 +222,7 @@ def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, pl
     """
     missed = [*plans]
     for graph in graphs:
-        record = outcome.records.get(id(graph.simulate))
+        record = outcome.records.get(graph.simulate)
         if record is None:
             continue
         for sentence in filter(None, record.said.get("warnings", "").split("\n")):

@@ -7,12 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.commands import as_json
+from flexclear.commands.export import as_json
 from flexclear.commands.scenes import as_in_its_file, check_target, graphs, scene_arguments
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check, open_workplace
+from flexclear.stages.workplace import Workplace, open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,20 +40,12 @@ def command(options: argparse.Namespace) -> None:
     workplace = open_workplace(options)
     scenes = [with_sections(graph.scene, asked) for graph in graphs(options.scenes, options.set)]
     tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
-    outcome = workplace.bring([graph.verdict for graph in tasks.values()])
-    check(outcome)
-    records = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
-    judged = {name: outcome.records[id(graph.verdict)] for name, graph in tasks.items()}
-    verdicts = {name: workplace.store.load(record) for name, record in judged.items()}
-    print(as_json.as_json(verdicts) if options.json else "\n\n".join(text(*judged) for judged in verdicts.items()))
+    judged = dict(zip(tasks, workplace.made(*(graph.verdict for graph in tasks.values())), strict=True))
+    verdicts = {name: made.dataset() for name, made in judged.items()}
+    print(as_json(verdicts) if options.json else "\n\n".join(text(*one) for one in verdicts.items()))
     if options.page is not None:
-        pictures = {
-            name: workplace.store.path(record.stage, record.key, "sections.png").read_bytes()
-            for name, record in judged.items()
-        }
-        write_page(
-            verdicts, {name: workplace.store.load(record) for name, record in records.items()}, pictures, options.page
-        )
+        sections = dict(zip(tasks, workplace.datasets(*(graph.sections for graph in tasks.values())), strict=True))
+        write_page(verdicts, sections, {n: made.read("sections.png") for n, made in judged.items()}, options.page)
 
 
 def with_sections(scene: Scene, asked: Mapping[str, object]) -> Scene:

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import as_json, export, scenes
+from flexclear.commands import export, scenes
+from flexclear.commands.export import as_json
 from flexclear.pipeline.core.artifacts.store import disk_limits, write_dataset
 from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
 from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
@@ -65,7 +66,7 @@ def command(options: argparse.Namespace) -> None:
             made[name] = bring(plan, workers, workplace, folder := workplace.store.root / "sweeps" / name)
             _show(plan, made[name], folder, options.out, quiet=options.json)
     if options.json:
-        print(as_json.as_json(made))
+        print(as_json(made))
 
 
 def width(asked: int | None) -> int:

@@ -81,9 +81,8 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
 def bring(workplace: Workplace) -> Outcome:
     """Bring everything that the report shows, and the page, up to date; what fails is left out of the page."""
     scenes = Scenes()
-    tasks = report_tasks(workplace, scenes)  # records go by the identity of tasks, which must not end before
-    shown = workplace.bring(tasks)
-    graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in shown.records]
+    shown = workplace.bring(report_tasks(workplace, scenes))
+    graphs = [graph for graph in scenes.graphs.values() if graph.simulate in shown.records]
     made = workplace.bring([page_task(workplace, shown.records, graphs)])
     check(made)
     return Outcome({**shown.records, **made.records}, shown.failures)
@@ -114,16 +113,12 @@ def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
         modules=tuple(dict.fromkeys(module_of(figures.__name__, name) for name in names)),
         folder="",
     )
-    outcome = workplace.bring([task])
-    check(outcome)
-    record = outcome.records[id(task)]
-    index: dict[str, dict[str, Any]] = json.loads(
-        workplace.store.path(task.stage, record.key, "index.json").read_bytes()
-    )
+    (made,) = workplace.made(task)
+    index: dict[str, dict[str, Any]] = json.loads(made.read("index.json"))
     return index
 
 
-def page_task(workplace: Workplace, records: Mapping[int, Record], graphs: list[Graph]) -> Task:
+def page_task(workplace: Workplace, records: Mapping[Task, Record], graphs: list[Graph]) -> Task:
     """The page; it is written again when anything that it shows has changed."""
     return Task(
         stage="report",

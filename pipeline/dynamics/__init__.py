@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
 __all__ = [
-    "campbell",
     "cost",
     "ensemble",
     "equilibrium",
@@ -191,22 +190,3 @@ def frequencies(
         return dataset.linear(*steady(scene, bundles, progress, time, drives), moving)
     bench, rest = at_rest(scene, bundles, progress, time, drives)
     return dataset.linear(bench, rest, vibrations(bench, rest.at), moving)
-
-
-def campbell(
-    scene: Scene,
-    bundles: Mapping[str, Labelled],
-    progress: Progress,
-    speeds: Sequence[float],
-    drive: str | None = None,
-    time: float | None = None,
-    drives: Mapping[str, float] | None = None,
-) -> xr.Dataset:
-    """Vibrations about steady motion over the speed of a drive (schema CAMPBELL).
-
-    speeds: [rad/s, or m/s].  drive: its name; the only one that moves when None.  time, drives: as of `equilibrium`.
-    Raises InputError for a drive that is not there, SolverError where no speed has a steady motion.
-    """
-    from flexclear.pipeline.dynamics.linear.campbell import campbell as over
-
-    return over(scene, bundles, progress, speeds, drive, time, drives)

@@ -282,7 +282,7 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
     modules = _modules(requested)
     families = {}
     for text, graph in graphs.items():
-        records = {name: outcome.records[id(task)] for name, task in graph.simulate.inputs.items()}
+        records = {name: outcome.records[task] for name, task in graph.simulate.inputs.items()}
         sections = any(one.reduction == "sections" for one in requested.recorded)
         simulate = simulation.params(graph.scene, sections=sections)
         task = Task(

@@ -10,7 +10,7 @@ import scipy.linalg
 
 from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.kinds import kind
-from tests.analytic.beam_models import BENDING, HELD, RECIPE, build, frequencies, order
+from tests.analytic.beam_models import BENDING, RECIPE, build, frequencies, held_rows, order
 from tests.analytic.beam_solutions import PAPER_ROD
 
 EI = PAPER_ROD.youngs_modulus * PAPER_ROD.second_moment
@@ -18,13 +18,10 @@ EI = PAPER_ROD.youngs_modulus * PAPER_ROD.second_moment
 EULER = {"CF": 2.0, "PP": 1.0, "CP": 0.699155660, "CC": 0.5}
 
 
-def plane(matrix: Any, ends: str, found: beam.Beam) -> np.ndarray:
+def plane(matrix: Any, ends: str, system: beam.Beam) -> np.ndarray:
     """One plane of bending, with its ends held."""
-    kept = np.isin(found.component, BENDING)
-    for start, letter in zip((0, found.nodal_size - 6), ends, strict=True):
-        for k in HELD[letter]:
-            kept[start + BENDING[k]] = False
-    return np.asarray(matrix.toarray()[np.ix_(kept, kept)])
+    rows = held_rows(system, BENDING, ends)
+    return np.asarray(matrix.toarray()[np.ix_(rows, rows)])
 
 
 def critical_load(elements: int, ends: str, **changes: Any) -> float:

@@ -5,7 +5,6 @@ The cloud moves by the element's functions written out again here, from the solu
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from flexclear.pipeline.structure.modes import bundle
 from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import RECIPE
 from tests.analytic.beam_solutions import PAPER_ROD
+from tests.analytic.clouds import Cloud, same_energy, same_integrals
 
 ELEMENTS = 4
 START, END = (0.02, 0.013), (0.012, 0.01)
@@ -37,15 +37,6 @@ RECIPES: dict[str, dict[str, Any]] = {
     }
     for theory in ("rayleigh", "timoshenko")
 }
-
-
-@dataclass(frozen=True)
-class Cloud:
-    """Mass points [kg] (p,), their places [m] (p, 3) and shapes (p, 3, n), mesh axes."""
-
-    mass: np.ndarray
-    place: np.ndarray
-    shape: np.ndarray
 
 
 def cloud(theory: str, modes: xr.Dataset) -> Cloud:
@@ -73,7 +64,8 @@ def cloud(theory: str, modes: xr.Dataset) -> Cloud:
             masses.append(MASS / 6.0)
             places.append(np.array([PAPER_ROD.length, 0.0, 0.0]) + arm)
             shapes.append(move + np.cross(turn, arm, axisa=0, axisc=0))
-    return Cloud(np.array(masses), POSITION + np.array(places) @ R.T, np.einsum("kl,pln->pkn", R, np.array(shapes)))
+    place = POSITION[:, None] + R @ np.array(places).T
+    return Cloud(np.array(masses), place, np.einsum("kl,pln->kpn", R, np.array(shapes)))
 
 
 def section_motion(
@@ -111,23 +103,12 @@ def body(request: pytest.FixtureRequest) -> tuple[xr.Dataset, Cloud]:
     return bundle.build(rod, modes), cloud(request.param, modes)
 
 
-def close(found: np.ndarray, expected: np.ndarray) -> None:
-    """Sums of some hundred terms: rounding of the largest."""
-    np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
+def test_integrals_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
+    same_integrals(*body, PAPER_ROD.length)
 
 
-def test_rigid_integrals_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
-    data, points = body
-    assert float(data["mass"]) == pytest.approx(points.mass.sum(), rel=1e-13)
-    close(data["first_moment"].values, points.mass @ points.place)
-    close(data["second_moment"].values, np.einsum("p,pk,pl->kl", points.mass, points.place, points.place))
-
-
-def test_modal_integrals_are_those_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
-    data, (m, X, S) = body[0], (body[1].mass, body[1].place, body[1].shape)
-    close(data["modal_first_moment"].values, np.einsum("p,pkj->kj", m, S))
-    close(data["position_mode_moment"].values, np.einsum("p,pk,plj->klj", m, X, S))
-    close(data["mode_mode_moment"].values, np.einsum("p,pki,plj->klij", m, S, S, optimize=True))
+def test_kinetic_energy_of_any_motion_is_that_of_the_volume(body: tuple[xr.Dataset, Cloud]) -> None:
+    same_energy(*body)
 
 
 def test_modal_mass_is_one(body: tuple[xr.Dataset, Cloud]) -> None:

@@ -10,8 +10,7 @@ from scipy.linalg import expm
 
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
-from tests.analytic.linear_runs import frequencies
-from tests.analytic.mechanism_runs import run
+from tests.analytic.mechanism_runs import frequencies, run
 from tests.properties.mechanisms import scene, simulate
 
 K = np.array([[2000.0, 300.0, 10.0], [300.0, 1500.0, -20.0], [10.0, -20.0, 4.0]])

@@ -12,8 +12,7 @@ from scipy.special import ellipj, ellipk
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
-from tests.analytic.linear_runs import frequencies
-from tests.analytic.mechanism_runs import run
+from tests.analytic.mechanism_runs import frequencies, run
 from tests.properties import movable
 from tests.properties.mechanisms import Table, simulate
 from tests.properties.movable import Mechanism, Random, Setting

@@ -11,7 +11,7 @@ from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
-from tests.analytic.linear_runs import frequencies
+from tests.analytic.mechanism_runs import frequencies
 from tests.properties.mechanisms import GRAVITY, Table, joint, scene
 
 #: a disc at the end of a shaft of 0.25 m: mass [kg], inertia across and along [kg m^2]

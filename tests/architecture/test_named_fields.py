@@ -40,7 +40,8 @@ def test_names_are_those_of_memory_and_none_means_two_things() -> None:
     kinds = (m.SIZES, m.STRETCHES, m.REPORTS, m.LISTS, floats, TABLES)
     names = [name for kind in (*kinds, m.INDICES) for name in kind]
     assert len(names) == len(set(names))
-    of_effects = {name for effect in EFFECTS for name in (*effect.sizes, *effect.stretches)} | set(m.OF_EFFECTS)
+    stretches = {one.partition(":")[0] for effect in EFFECTS for one in effect.stretches}
+    of_effects = {name for effect in EFFECTS for name in effect.sizes} | stretches | set(m.OF_EFFECTS)
     for kind in kinds:
         named = set(kind) - of_effects  # those of effects are read by their names alone
         assert {name: getattr(m, name.upper()) for name in named} == {name: kind[name] for name in named}

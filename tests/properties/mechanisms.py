@@ -32,6 +32,12 @@ def body(position: Any, mass: float = 1.0, frames: Table | None = None, **more: 
     }
 
 
+def rigid(mass: float, inertia: float | list[float], frames: Table, **more: Any) -> Table:
+    """A rigid body; inertia: one number [kg m^2] where it is alike about all axes."""
+    moments = [inertia] * 3 if isinstance(inertia, float) else inertia
+    return {"type": "rigid", "mass": mass, "inertia": moments, "frames": frames, **more}
+
+
 def ground(**frames: Any) -> Table:
     return {"type": "ground", "frames": {name: {"position": list(p)} for name, p in frames.items()}}
 

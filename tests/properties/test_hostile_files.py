@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.commands import cost_peers, scenes
+from flexclear.commands import cost, scenes
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import checked, read_checked, sha256
 from flexclear.pipeline.core.artifacts.store import Store, read_record
@@ -208,7 +208,7 @@ def test_a_packed_matrix_is_not_read_beyond_what_its_header_says(tmp_path: Path)
 def test_runs_of_other_programs_are_numbers(text: str, tmp_path: Path) -> None:
     (tmp_path / "p.json").write_text(text)
     with refused("--peer"):
-        cost_peers.read(tmp_path / "p.json")
+        cost.read_peers(tmp_path / "p.json")
 
 
 # Folders of results that somebody else sent ----------------------------------------------------------------------

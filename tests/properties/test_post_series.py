@@ -253,15 +253,6 @@ def test_time_in_contact_is_that_of_the_located_events():
         assert float(derive(rows).contact_time_share[0]) == pytest.approx(expected * synthetic.END / ends, rel=1e-9)
 
 
-def test_extremes_are_those_of_all_rows():
-    run = synthetic.run("sps4/csj", clearance=True)
-    post = derive(run)
-    assert float(post.peak_acceleration.sel(body="platform", axis="z")) == float(
-        np.abs(run.acceleration.sel(body="platform", axis="z")).max()
-    )
-    assert float(post.peak_reaction.sel(joint="A1")) == float(post.reaction.sel(joint="A1").max())
-
-
 @pytest.mark.parametrize("nudge", [-1.0, 1.0])
 def test_rounding_does_not_choose_between_two_equal_peaks(nudge: float):
     """A stroke that ends as it began has its largest acceleration twice."""

@@ -23,7 +23,7 @@ from benchmarks.mechanisms import (
     without_clearance,
     without_friction,
 )
-from flexclear.commands import cost_peers
+from flexclear.commands import cost
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.schema import Scene
@@ -236,4 +236,4 @@ def test_the_logged_runs_of_the_peer_are_points_of_cost_studies(tmp_path: Path):
         assert 1e-4 < track["error"]["platform.velocity"][0] < 1e-1
     file = tmp_path / "peers.json"
     file.write_text(json.dumps(found))
-    assert cost_peers.read(file) == found
+    assert cost.read_peers(file) == found

@@ -76,6 +76,16 @@ def interrupted(
             return found, kills
 
 
+def require_same_bits(
+    work: Callable[[], xr.Dataset], folder: Path, monkeypatch: pytest.MonkeyPatch, looks_each: int = 4, kills: int = 1
+) -> None:
+    """Work that is killed after some looks, so many times or more, gives what it gives otherwise."""
+    whole = work()
+    result, killed = interrupted(work, folder, monkeypatch, looks_each)
+    assert killed >= kills
+    assert result.identical(whole)
+
+
 def check(root: Path, name: str, **changes: Any) -> Scene:
     return edited(load_scene(root / "scenes" / "checks" / f"{name}.toml"), changes)
 
@@ -96,10 +106,7 @@ def test_a_killed_run_goes_on_to_the_same_bits_under_every_integrator(
     solver: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = smooth(solver)
-    whole = dynamics.simulate(scene, {}, silent)
-    found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch)
-    assert kills >= 1
-    assert found.identical(whole)
+    require_same_bits(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch)
 
 
 #: scene -> a kill after so many looks, and changes of the scene
@@ -123,10 +130,7 @@ def test_a_killed_run_goes_on_to_the_same_bits_whatever_it_has(
 ) -> None:
     looks, changes = RUNS[name]
     scene = check(root, name.partition(",")[0], **changes)
-    whole = dynamics.simulate(scene, {}, silent)
-    found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, looks)
-    assert kills >= 1
-    assert found.identical(whole)
+    require_same_bits(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, looks)
 
 
 @pytest.mark.usefixtures("often")
@@ -154,10 +158,7 @@ def test_a_killed_run_goes_on_with_the_straight_code_that_it_had(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = check(root, "bricard", **CHANGING)
-    whole = dynamics.simulate(scene, {}, silent)
-    found, kills = interrupted(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, 3)
-    assert kills >= 2
-    assert found.identical(whole)
+    require_same_bits(lambda: dynamics.simulate(scene, {}, silent), tmp_path, monkeypatch, 3, kills=2)
 
 
 @pytest.mark.usefixtures("often")
@@ -200,10 +201,7 @@ def test_a_killed_ensemble_goes_on_to_the_same_bits(
 def test_killed_sections_go_on_to_the_same_bits(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sections = {"transient": 2, "periods": 20, "exponent_periods": 20}
     scene = check(root, "driven_pendulum", sections=sections, **{"solver.rtol": 1e-10})
-    whole = dynamics.sections(scene, {}, silent)
-    found, kills = interrupted(lambda: dynamics.sections(scene, {}, silent), tmp_path, monkeypatch, 300)
-    assert kills >= 1
-    assert found.identical(whole)
+    require_same_bits(lambda: dynamics.sections(scene, {}, silent), tmp_path, monkeypatch, 300)
 
 
 @pytest.mark.usefixtures("often")

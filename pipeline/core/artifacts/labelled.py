@@ -16,8 +16,8 @@ import numpy as np
 if TYPE_CHECKING:
     import xarray as xr
 
-    #: what stages read, of which names, dimensions and values are asked alone
-    Labelled: TypeAlias = "xr.Dataset | LabelledArrays"
+#: what stages read, of which names, dimensions and values are asked alone
+Labelled: TypeAlias = "xr.Dataset | LabelledArrays"
 
 
 @dataclass(frozen=True)

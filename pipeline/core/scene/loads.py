@@ -1,6 +1,6 @@
 """Loads: gravity, forces and torques on frames, springs and dampers, and what acts along joint coordinates.
 
-A load of type 'point-force' acts as the class of the same name in `pipeline.dynamics.loads.point_force` says.
+A load of type 'point-force' acts as `pipeline.dynamics.loads.point_force` says.
 """
 
 import math

@@ -199,8 +199,7 @@ Body = Annotated[
 class IdealJoint(Part):
     """Two frames; the axes of motion are those of the first, its axis is z.
 
-    A free joint holds nothing: it says that a body shall fly. The motion of a type 'planar' is in
-    `pipeline.dynamics.joints.planar`.
+    A free joint holds nothing: it says that a body shall fly. The motion of each type is in `pipeline.dynamics.joints`.
     type: which motion it leaves free.  between: first frame, whose axes are those of motion, and second frame, each as
     body.FRAME.  friction: follows the force that the joint carries; absent means none.
     """

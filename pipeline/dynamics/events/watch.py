@@ -20,7 +20,8 @@ from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe_blocks
-from flexclear.pipeline.dynamics.run.horizon.periods import Moment, handed
+from flexclear.pipeline.dynamics.run.horizon.periods import handed
+from flexclear.pipeline.dynamics.run.pieces import Moment
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
 #: parts into which an interval is divided to look closer, and how often: what is left is a straight line

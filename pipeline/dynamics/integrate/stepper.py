@@ -116,9 +116,7 @@ def make_advance(
     resolve_events = make_resolve_events(evaluate, attempt, extend, project, dense)
     record_outputs = make_record_outputs(extend, interpolate)
     detect_stiffness = make_detect_stiffness(method)
-    first_step, error_norm, after_rejection, next_step = stepping.make_step_control(
-        evaluate, (watch_start, any_closed), begin, error, method
-    )
+    first_step, error_norm, after_rejection, next_step = stepping.make_step_control(evaluate, any_closed, error, method)
     note, stand, steer, ready, done = poses.note, poses.stand, poses.steer, poses.ready, poses.done
     foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, attempt, method)
 
@@ -220,23 +218,22 @@ def make_advance(
         keep_scales(d)
 
     @kernel
-    def set_off(d):
-        """What `first_step` does for the contacts, before a step along a polynomial; True, for it can be made."""
+    def start(d):
+        """Begin at the start of a segment or after an event; False when the equations have no solution there."""
         evaluate(d, d.time, d.at_y, d.at_slopes)
         d.evaluations += 1
-        watch_start(d)
-        d.evaluation, d.fresh = m.OK, 0
-        return True
-
-    @kernel
-    def start(d):
-        """Begin at the start of a segment or after an event; False when that cannot be."""
-        if ready(d):
-            return set_off(d)
-        if not first_step(d):
+        if ready(d):  # where the polynomial begins nothing need be solvable
+            d.evaluation = m.OK
+        elif d.evaluation != m.OK or not finite(d, d.at_slopes):
+            d.status = m.NOT_A_NUMBER if d.evaluation == m.OK else m.NO_START
             return False
-        note(d)
-        stand(d, d.time)
+        watch_start(d)
+        d.fresh = 0
+        if not ready(d):
+            d.step = first_step(d)
+            begin(d)
+            note(d)
+            stand(d, d.time)
         return True
 
     @kernel

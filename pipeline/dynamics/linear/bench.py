@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TypeVar
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
@@ -26,8 +27,7 @@ from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
 from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, mass_factor
 from flexclear.pipeline.dynamics.run.run import begun, driven
 
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
+Pose = TypeVar("Pose")
 
 #: drives reach the requested pose in strides of this fraction of the mechanism's size, or this angle
 STRIDE = 0.05
@@ -140,22 +140,36 @@ def set_drives(bench: Bench, drives: np.ndarray) -> None:
 
 def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Positions after the drives have gone to `target` in strides, the loops closed after each."""
-    origin, fraction, stride = bench.drives[:, 0], 0.0, 1.0
     if not bench.model.closures:
-        fraction = 1.0
-    else:
-        way = float(np.max(np.abs(target - origin) / bench.units, initial=0.0))
-        stride = min(1.0, STRIDE / way) if way > 0.0 else 1.0
+        return q
+    origin = bench.drives[:, 0]
+    way = float(np.max(np.abs(target - origin) / bench.units, initial=0.0))
+
+    def at(fraction: float, start: np.ndarray) -> np.ndarray:
+        set_drives(bench, np.stack([origin + fraction * (target - origin), 0.0 * target], axis=1))
+        return closed(bench, start)
+
+    return in_strides(at, q, min(1.0, STRIDE / way) if way > 0.0 else 1.0, SHORTEST_STRIDE)
+
+
+def in_strides(at: Callable[[float, Pose], Pose], pose: Pose, longest: float, shortest: float) -> Pose:
+    """The pose at the end of a way, from that at its start, by `at` of fractions of the way and the pose before.
+
+    A stride is halved where `at` raises SolverError; that is raised where one of the shortest is still too long.
+    """
+    fraction = 0.0
     while fraction < 1.0:
-        attempt = min(1.0, fraction + stride)
-        try:
-            set_drives(bench, np.stack([origin + attempt * (target - origin), 0.0 * target], axis=1))
-            q, fraction = closed(bench, q), attempt
-        except SolverError:
-            stride *= 0.5
-            if stride < SHORTEST_STRIDE:
-                raise
-    return q
+        stride = min(longest, 1.0 - fraction)
+        while True:
+            try:
+                pose = at(min(1.0, fraction + stride), pose)
+                break
+            except SolverError:
+                stride *= 0.5
+                if stride < shortest:
+                    raise
+        fraction = min(1.0, fraction + stride)
+    return pose
 
 
 def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarray:

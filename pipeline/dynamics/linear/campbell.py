@@ -11,12 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 from scipy.optimize import linear_sum_assignment
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.schema import CAMPBELL, conform
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
@@ -28,9 +28,6 @@ from flexclear.pipeline.dynamics.linear.equilibrium import Equilibrium
 from flexclear.pipeline.dynamics.linear.steady import steady_near
 from flexclear.pipeline.dynamics.linear.vibrations import Vibrations
 from flexclear.pipeline.dynamics.record.dataset import attributes, subject
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: fraction of a vibration's displacements, or of its energy, that decides what it is
 DECISIVE = 0.8

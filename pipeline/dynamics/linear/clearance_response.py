@@ -19,18 +19,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.effects import CONTACTS, NORMAL_LAWS
+from flexclear.pipeline.dynamics.effects import NORMAL_LAWS, SURFACES
 from flexclear.pipeline.dynamics.model.closing import misfit
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -38,9 +38,6 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: the motion is examined so often
 BOUND_TIMES = 32
@@ -103,7 +100,7 @@ def _play(joint: Clearance, force: float) -> float:
     """How far the points may separate [m]: the clearance, and how deep a force presses the surfaces."""
     law = lookup(NORMAL_LAWS, joint.normal.law, where="[normal]")
     exponent = law.exponent if joint.normal.exponent is None else joint.normal.exponent
-    stiffness = lookup(CONTACTS, joint.type, where="[joint]").stiffness(joint, exponent)
+    stiffness = lookup(SURFACES, joint.type, where="[joint]").stiffness(joint, exponent)
     return float(joint.clearance + (KNOCK * force / stiffness) ** (1.0 / exponent))
 
 

@@ -12,15 +12,15 @@ Rotating Systems, sec. 2.4 (self-centring).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
-from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, closed, hold, set_drives
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, closed, hold, in_strides, set_drives
 from flexclear.pipeline.dynamics.linear.equilibrium import (
     BALANCED,
     LONGEST_MOVE,
@@ -32,9 +32,6 @@ from flexclear.pipeline.dynamics.linear.equilibrium import (
 from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, stiffness, tangent
 from flexclear.pipeline.dynamics.linear.vibrations import ZERO_EIGENVALUE, Vibrations, vibrations
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import built_rows
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: corrections of one pose; each is at most this fraction of the one before, else a stride has to be shorter
 CORRECTIONS, CONTRACTION = 20, 0.5
@@ -100,31 +97,20 @@ def _continued(bench: Bench, q: np.ndarray) -> Equilibrium:
     except SolverError:
         bench.internal[:] = internal
 
-    def at(fraction: float, start: np.ndarray) -> Equilibrium:
+    def at(fraction: float, before: Equilibrium) -> Equilibrium:
         set_drives(bench, bench.drives * [1.0, fraction])
-        before = bench.internal.copy()
+        internal = bench.internal.copy()
         try:
-            return newton(bench, start)
+            return newton(bench, before.at.q)
         except SolverError:
-            bench.internal[:] = before
+            bench.internal[:] = internal
             raise
 
     try:
         set_drives(bench, bench.drives * [1.0, 0.0])
-        rest, fraction = descend(bench, q), 0.0
-        while fraction < 1.0:
-            stride = 1.0 - fraction
-            while True:
-                try:
-                    rest, fraction = at(min(1.0, fraction + stride), rest.at.q), min(1.0, fraction + stride)
-                    break
-                except SolverError:
-                    stride *= 0.5
-                    if stride < SHORTEST:
-                        raise
+        return in_strides(at, descend(bench, q), 1.0, SHORTEST)
     finally:
         set_drives(bench, bench.drives)
-    return rest
 
 
 def newton(bench: Bench, q: np.ndarray) -> Equilibrium:

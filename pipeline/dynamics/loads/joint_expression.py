@@ -6,7 +6,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 from flexclear.pipeline.core.scene.formulas import Formula
-from flexclear.pipeline.core.scene.loads import JointExpression as Declared
+from flexclear.pipeline.core.scene.loads import JointExpression
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, measure
@@ -26,10 +26,6 @@ def applying(formula: Callable) -> SimpleNamespace:
     return SimpleNamespace(apply=apply)
 
 
-class JointExpression:
-    """See the module's text."""
-
-    @staticmethod
-    def row(load: Declared, path: str, formula: Formula, coordinate: Coordinate) -> Row:
-        """What the expression reads, and its numbers."""
-        return by_formula(formula, path, joint=load.joint)
+def row(load: JointExpression, path: str, formula: Formula, coordinate: Coordinate) -> Row:
+    """What the expression reads, and its numbers."""
+    return by_formula(formula, path, joint=load.joint)

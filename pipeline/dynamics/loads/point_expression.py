@@ -6,7 +6,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 from flexclear.pipeline.core.scene.formulas import Formula
-from flexclear.pipeline.core.scene.loads import PointExpression as Declared
+from flexclear.pipeline.core.scene.loads import PointExpression
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act
 from flexclear.pipeline.dynamics.loads.row import Row, by_formula
@@ -27,10 +27,6 @@ def applying(formula: Callable) -> SimpleNamespace:
     return SimpleNamespace(apply=apply)
 
 
-class PointExpression:
-    """See the module's text."""
-
-    @staticmethod
-    def row(load: Declared, path: str, formula: Formula) -> Row:
-        """What the expressions read, and their numbers."""
-        return by_formula(formula, path, frames=(load.frame,), follows=load.axes == "frame")
+def row(load: PointExpression, path: str, formula: Formula) -> Row:
+    """What the expressions read, and their numbers."""
+    return by_formula(formula, path, frames=(load.frame,), follows=load.axes == "frame")

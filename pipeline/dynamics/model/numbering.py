@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.interface_basis import InterfaceBasis, interface_basis
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism, Site
 
@@ -115,7 +115,7 @@ def _number_positions(numbering: Numbering, links: list[Link]) -> None:
     numbering.positions = [range(0)] * len(links)
     for i, link in enumerate(links[1:], start=1):
         if not link.drives:
-            numbering.positions[i] = range(numbering.nq, numbering.nq + len(joint_class(link.kind).POSITIONS))
+            numbering.positions[i] = range(numbering.nq, numbering.nq + len(joint_type(link.kind).POSITIONS))
             numbering.nq = numbering.positions[i].stop
         if link.bundle is not None:
             numbering.modal_positions[i] = range(numbering.nq, numbering.nq + link.bundle.sizes["mode"])
@@ -124,7 +124,7 @@ def _number_positions(numbering: Numbering, links: list[Link]) -> None:
     for i, link in enumerate(links):
         if link.drives:
             first = numbering.nq + _drive(numbering.mechanism, link)
-            numbering.positions[i] = range(first, first + len(joint_class(link.kind).POSITIONS))
+            numbering.positions[i] = range(first, first + len(joint_type(link.kind).POSITIONS))
 
 
 def _number_coordinates(numbering: Numbering, links: list[Link]) -> None:
@@ -141,11 +141,11 @@ def _number_coordinates(numbering: Numbering, links: list[Link]) -> None:
             numbering.modal_coordinates[i] = range(numbering.nv, numbering.nv + len(numbering.modal_positions[i]))
             numbering.nv = numbering.modal_coordinates[i].stop
         if i and not links[i].drives:
-            numbering.coordinates[i] = range(numbering.nv, numbering.nv + len(joint_class(links[i].kind).SPEEDS))
+            numbering.coordinates[i] = range(numbering.nv, numbering.nv + len(joint_type(links[i].kind).SPEEDS))
             numbering.nv = numbering.coordinates[i].stop
 
     visit(0)
     for i, link in enumerate(links):
         if link.drives:
             first = numbering.nv + _drive(numbering.mechanism, link)
-            numbering.coordinates[i] = range(first, first + len(joint_class(link.kind).SPEEDS))
+            numbering.coordinates[i] = range(first, first + len(joint_type(link.kind).SPEEDS))

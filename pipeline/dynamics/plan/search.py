@@ -11,11 +11,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
 from flexclear.pipeline.core.scene.integrators import DEFAULT
@@ -33,9 +33,6 @@ from flexclear.pipeline.dynamics.plan.requested_accuracy import requested_in
 from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, Pilots
 from flexclear.pipeline.dynamics.plan.tolerance import as_it_is, no_dearer, smooth
 from flexclear.pipeline.dynamics.run.run import Run, integrate
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: what bounds of clearances, which hold whatever happens, may use up of the budget
 BY_BOUND = 0.9

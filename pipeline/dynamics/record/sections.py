@@ -19,6 +19,7 @@ from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.journal import Journal, State
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Variables
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.ensemble import kept_bodies
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
 
 #: of impacts, known when they end
 LATER = ("peak_force", "duration")
-Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
 def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:

@@ -21,6 +21,7 @@ import numpy as np
 
 from flexclear.pipeline.core.numerics.rotations import components, first_largest, matrices, principal, skew, von_mises
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.dynamics.equations.observation import Series, Variables
 from flexclear.pipeline.dynamics.record.body_loads import Motion, motion_and_loads
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.solid_stress import factors, gauge_nodes, largest
@@ -28,8 +29,6 @@ from flexclear.pipeline.dynamics.record.wrenches import Wrench
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
-
-Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class Gauged:
     position: np.ndarray
 
 
-def record(motions: Motions, names: tuple[str, ...]) -> tuple[Variables, dict[str, object]]:
+def record(motions: Motions, names: tuple[str, ...]) -> Series:
     """Stresses of the bodies `names`, rods and solids: variables and coordinates of the run dataset.
 
     InputError for a bundle that was made without what this needs.
@@ -61,7 +60,7 @@ def record(motions: Motions, names: tuple[str, ...]) -> tuple[Variables, dict[st
     return variables | more, coordinates | named
 
 
-def _of_gauges(gauged: Mapping[str, Gauged]) -> tuple[Variables, dict[str, object]]:
+def _of_gauges(gauged: Mapping[str, Gauged]) -> Series:
     stress = np.concatenate([body.stress for body in gauged.values()], axis=1)
     dims = ("time", "gauge")
     variables: Variables = {"von_mises_stress": (dims, von_mises(stress))}
@@ -77,9 +76,7 @@ def _of_gauges(gauged: Mapping[str, Gauged]) -> tuple[Variables, dict[str, objec
     }
 
 
-def _of_solids(
-    motions: Motions, solids: Mapping[str, Labelled], gauged: dict[str, Gauged]
-) -> tuple[Variables, dict[str, object]]:
+def _of_solids(motions: Motions, solids: Mapping[str, Labelled], gauged: dict[str, Gauged]) -> Series:
     """The factors of the stress fields; what follows from them into `gauged`."""
     every, fields, owners = [], list[str](), list[str]()
     for body, bundle in solids.items():
@@ -97,9 +94,7 @@ def _of_solids(
     }
 
 
-def _of_rods(
-    motions: Motions, rods: Mapping[str, Labelled], gauged: dict[str, Gauged]
-) -> tuple[Variables, dict[str, object]]:
+def _of_rods(motions: Motions, rods: Mapping[str, Labelled], gauged: dict[str, Gauged]) -> Series:
     """Section forces and peak stresses; the latter are left out when a rod has a section without known outline.
 
     The largest of all sections into `gauged`, at the centre of its section.

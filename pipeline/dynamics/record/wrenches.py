@@ -13,10 +13,10 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.record.acting import on_frames
 from flexclear.pipeline.dynamics.record.motion import Motions
 
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
+Acting = tuple[str, np.ndarray, np.ndarray]  #: the same with the frame on which it acts
 
 
 def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> dict[str, Wrench]:
@@ -48,11 +48,23 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
     return moments, forces
 
 
-def path_wrenches(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def path_wrenches(model: Model, seen: Observed) -> list[Acting]:
     """For every frame that a drive leads along a path: its name, moment about the kernels' origin, force."""
     tree, drives = _tree(model, seen), model.scene.drive
     paths = {f"drive.{name}": drive.frame for name, drive in drives.items() if isinstance(drive, PathDrive)}
     return [(frame, *tree[edge]) for edge, frame in paths.items() if edge in tree]
+
+
+def on_frames(model: Model, seen: Observed, body: str) -> list[Acting]:
+    """What acts on a body besides joints and paths: loads and effects."""
+    on_each: list[Acting] = []
+    if model.loads:
+        from flexclear.pipeline.dynamics.record.loads import on_loaded_frames
+
+        on_each += on_loaded_frames(model, seen)
+    for on_its_frames in model.parts.functions("acts"):
+        on_each += on_its_frames(model, seen)
+    return [acting for acting in on_each if model.mechanism.frames[acting[0]].body == body]
 
 
 def _tree(model: Model, seen: Observed) -> dict[str, Wrench]:

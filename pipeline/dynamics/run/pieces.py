@@ -79,25 +79,41 @@ def in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Handover:
-    """What the next method must know, copied, at the end of the last accepted step.
+class Moment:
+    """All that a motion continues from.
 
-    y: state.  modes, latched, watched: of the contacts, as in the work space.  counters: integers from m.STATUS on.
-    lasting: control floats LASTING.  rows, events: what was recorded.  selections, collocations, passes: as of a
-    trajectory.
+    y: state.  modes, latched, watched: of the contacts, as in the work space.  events: of the event table, among them
+    those of the contacts that are closed, to which `watched` refers.
     """
 
     y: np.ndarray
     modes: np.ndarray
     latched: np.ndarray
     watched: np.ndarray
+    events: np.ndarray
+
+    @staticmethod
+    def of(engine: Engine, watched: np.ndarray, events: np.ndarray) -> Moment:
+        """Where the stepper is, copied."""
+        return Moment(engine.view(m.Y).copy(), engine.modes.copy(), engine.latched.copy(), watched.copy(), events)
+
+    def enter(self, engine: Engine) -> None:
+        """Put it into the work space."""
+        engine.view(m.Y)[:], engine.view(m.WATCH.place)[:] = self.y, self.watched
+        engine.modes[:], engine.latched[:] = self.modes, self.latched
+
+
+@dataclass(frozen=True)
+class Handover:
+    """What the next method must know, copied, at the end of the last accepted step.
+
+    counters: integers from m.STATUS on.  lasting: control floats LASTING.  tape: what was recorded.
+    """
+
+    here: Moment
     counters: np.ndarray
     lasting: np.ndarray
-    rows: np.ndarray
-    events: np.ndarray
-    selections: Selections
-    collocations: tuple[Collocation, ...] = ()
-    passes: tuple[Pass, ...] = ()
+    tape: Tape
 
     @property
     def time(self) -> float:
@@ -235,7 +251,17 @@ def _arrays(left: Handover | None) -> Iterator[np.ndarray]:
     """What decides how another method continues; nothing of how singular poses were passed before does."""
     if left is None:
         return
-    yield from (left.y, left.modes, left.latched, left.watched, left.counters, left.lasting, left.rows, left.events)
-    for time, rows in left.selections:
+    here = left.here
+    yield from (
+        here.y,
+        here.modes,
+        here.latched,
+        here.watched,
+        left.counters,
+        left.lasting,
+        left.tape.rows,
+        here.events,
+    )
+    for time, rows in left.tape.selections:
         yield np.array([time])
         yield rows

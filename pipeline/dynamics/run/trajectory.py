@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapping
-from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Piece, Selections, Tape, in_order, piece
+from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Moment, Piece, Selections, Tape, in_order, piece
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, crawls, look
 from flexclear.pipeline.dynamics.run.refusals import refusal
 from flexclear.pipeline.dynamics.run.refusals.reach import require_shallow
@@ -217,17 +217,17 @@ def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
 
 def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> Tape:
     """A tape with what another method has recorded; the engine as that method left it."""
-    tape, n = _prepare(engine, left.y, left.time, outputs), engine.n
+    here, before = left.here, left.tape
+    tape, n = _prepare(engine, here.y, left.time, outputs), engine.n
     cap = n[m.CAP]
     n[m.STATUS : m.INTEGERS] = left.counters
     n[m.CAP] = cap
-    engine.modes[:] = left.modes
-    engine.view(m.Y)[:], engine.latched[:], engine.view(m.WATCH.place)[:] = left.y, left.latched, left.watched
+    here.enter(engine)
     engine.control[LASTING] = left.lasting
-    tape.rows, tape.events = np.concatenate([left.rows, tape.rows]), np.concatenate([left.events, tape.events])
-    same = np.array_equal(left.selections[-1][1], engine.selected)
-    tape.selections = [*left.selections, *([] if same else tape.selections)]
-    tape.collocations, tape.passes = [*left.collocations], [*left.passes]
+    tape.rows, tape.events = np.concatenate([before.rows, tape.rows]), np.concatenate([here.events, tape.events])
+    same = np.array_equal(before.selections[-1][1], engine.selected)
+    tape.selections = [*before.selections, *([] if same else tape.selections)]
+    tape.collocations, tape.passes = [*before.collocations], [*before.passes]
     return tape
 
 
@@ -267,11 +267,10 @@ def _leave_singular_start(engine: Engine, tape: Tape) -> None:
     first = m.record(tape.rows[:1], len(engine.model.contacts)).state[0]
     engine.select_pieces_after(engine.start)
     way = start_motion(engine, first.copy())
-    first[:] = engine.view(m.Y)[:] = way.state
-    engine.view(m.COLLOCATION)[:] = way.motion.series.ravel()
+    way.lay(engine)
+    first[:] = engine.view(m.Y)
     engine.view(m.PIVOT)[:] = 1.0, 0.0
-    engine.control[m.COLLOCATED] = way.motion.span
-    tape.collocations.append(way.motion)
+    tape.collocations.append(way)
     tape.selections[:] = [(engine.start, engine.selected.copy())]
 
 
@@ -376,7 +375,7 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     if engine.mobility.redundant and closure_rows.improve(engine, t, closure_rows.CLEARLY):
         tape.selections.append((t, engine.selected.copy()))
         return True
-    from flexclear.pipeline.dynamics.run.singular_poses.passing import EQUAL_TIMES, lay_over
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import EQUAL_TIMES, lay_over  # which few runs need
 
     made, passes = lay_over(engine)
     if made is not None:
@@ -400,19 +399,9 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
 def _hand_over(engine: Engine, tape: Tape) -> Handover:
     """What a paused integration leaves to another method."""
     n = engine.n
-    return Handover(
-        engine.view(m.Y).copy(),
-        engine.modes.copy(),
-        engine.latched.copy(),
-        engine.view(m.WATCH.place).copy(),
-        n[m.STATUS : m.INTEGERS].copy(),
-        engine.control[LASTING],
-        tape.rows[: n[m.N_RECORDED]].copy(),
-        tape.events[: n[m.N_EVENTS]].copy(),
-        tuple(tape.selections),
-        tuple(tape.collocations),
-        tuple(tape.passes),
-    )
+    here = Moment.of(engine, engine.view(m.WATCH.place), tape.events[: n[m.N_EVENTS]].copy())
+    recorded = replace(tape, rows=tape.rows[: n[m.N_RECORDED]].copy())
+    return Handover(here, n[m.STATUS : m.INTEGERS].copy(), engine.control[LASTING], recorded)
 
 
 def _so_far(engine: Engine, tape: Tape) -> np.ndarray:

@@ -62,6 +62,13 @@ def floating(model: Model, note: str, loaded: sp.csr_array | None = None, *, res
     )
 
 
+def joined(given: Given, count: int, needs: str) -> tuple[Interface, ...]:
+    """The interfaces, of which a condition needs so many; InputError where there are fewer.  needs: in words."""
+    if len(given.interfaces) < count:
+        raise InputError("modes.interfaces", needs, "name the recipe's frames")
+    return given.interfaces
+
+
 def functional(frames: tuple[Interface, ...], name: str) -> sp.csr_array:
     """The motion ``frame.direction`` in axes of the frame, shape (1, ndof); InputError for unknown names."""
     frame_name, _, direction = name.partition(".")

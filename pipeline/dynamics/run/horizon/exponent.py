@@ -15,9 +15,10 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.run.displacement import askew
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
-from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, moved_start
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, Direction
 
 #: batches of the exponent's error, and Student's t of their number at 95 %
@@ -49,12 +50,10 @@ def start_direction(engine: Engine, y: np.ndarray) -> Direction:
     """
     model, nothing = engine.model, np.zeros(len(engine.model.arrays.f))
     if model.contacts:
-        along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
-        offsets = np.concatenate([PERTURBATION * contact.joint.clearance * along for contact in model.contacts])
-        return Direction(nothing, perturbed(engine, y, offset_jacobian(engine, y), offsets) - y)
+        return Direction(nothing, moved_start(engine, y) - y)
     end = model.speeds.stop
     change = np.zeros(len(y))
-    change[:end] = STATE_CHANGE * _far(engine)[:end] * np.sin(1.0 + np.arange(end) * 2.399963)
+    change[:end] = STATE_CHANGE * _far(engine)[:end] * askew(end)
     return Direction(
         nothing, PERTURBATION / STATE_CHANGE * 0.5 * (project(engine, y + change) - project(engine, y - change))
     )

@@ -26,10 +26,10 @@ from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import TICK
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.run.displacement import displaced, per_speed
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.observation import frames
-from flexclear.pipeline.dynamics.run.evaluation.start import project, rates_at_speeds
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
 
 #: the two are compared at about this many times, which bounds the cost; where outputs are rarer, between them as well
@@ -109,10 +109,7 @@ class Pair:
 
         try:
             select_rows(engine, start, engine.start)
-            direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
-            offsets = [PERTURBATION * contact.joint.clearance * direction for contact in engine.model.contacts]
-            moved = perturbed(engine, start, offset_jacobian(engine, start), np.concatenate(offsets))
-            other.rows = steps(engine, moved, enough, self.outputs)[1].rows
+            other.rows = steps(engine, moved_start(engine, start), enough, self.outputs)[1].rows
         except SolverError:
             failed = True
         self._wait(lambda: self._ended, alive)
@@ -278,29 +275,29 @@ def _between(engine: Engine, requested: np.ndarray) -> np.ndarray:
 def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Change of the ball-to-socket vectors (world) per change of the positions, closures closed; (3 contacts, nv).
 
-    Of a stop, whose way has no direction in space, its three rows are alike.  From the velocities that unit speeds add
-    to those of the drives, so that no step width enters.
+    Of a stop, whose way has no direction in space, its three rows are alike.
     """
     engine.select_pieces_after(engine.start)
     contacts, stops = engine.model.arrays.table(m.CONTACTS), engine.model.arrays.size(m.N_SURFACES)
 
-    def offset_rates(speeds: np.ndarray) -> np.ndarray:
-        rates_at_speeds(engine, y, speeds)
+    def offset_rates(rates: np.ndarray) -> np.ndarray:
         velocity = engine.table(m.SITE_FRAMES)["velocity"]
         offset = velocity[contacts["inner"]] - velocity[contacts["outer"]]
         offset[stops:] = engine.table(m.TOUCH)["rate"][stops:, None]
         return np.asarray(offset).ravel()
 
-    driven = offset_rates(np.zeros(engine.model.nv))
-    rates = [offset_rates(unit) - driven for unit in np.eye(engine.model.nv)]
-    return np.reshape(rates, (engine.model.nv, -1)).T if rates else np.zeros((len(driven), 0))
+    return per_speed(engine, y, offset_rates)
 
 
 def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     """The start with the balls moved by `offsets` (3 per contact) [m] as nearly as the joints allow."""
     engine.select_pieces_after(engine.start)
     speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
-    moved, nq = y.copy(), engine.model.nq
-    # rates per unit time, for one unit: a displacement of 1e-8 m is linear
-    moved[:nq] += rates_at_speeds(engine, y, speeds)[:nq] - rates_at_speeds(engine, y, np.zeros(len(speeds)))[:nq]
-    return project(engine, moved)
+    return displaced(engine, y, speeds)
+
+
+def moved_start(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """The start of a perturbed run: every contact moved by PERTURBATION of its clearance, along no axis."""
+    along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
+    offsets = [PERTURBATION * contact.joint.clearance * along for contact in engine.model.contacts]
+    return perturbed(engine, y, offset_jacobian(engine, y), np.concatenate(offsets))

@@ -23,9 +23,10 @@ from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.driving import prescribed
+from flexclear.pipeline.dynamics.run.displacement import askew
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
-from flexclear.pipeline.dynamics.run.pieces import Handover
+from flexclear.pipeline.dynamics.run.pieces import Handover, Moment, Tape
 from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, integrate
 
 #: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together
@@ -36,21 +37,6 @@ NEIGHBOUR = 1e3
 NOT_LINEAR = 1e4
 #: laws repeat when they end a period as they began it, but for this fraction
 EQUAL_LAWS = 1e-6
-
-
-@dataclass(frozen=True)
-class Moment:
-    """All that continues from one stretch of time to the next.
-
-    y: state.  modes, latched, watched: of the contacts, as in the work space.  begun: events of the contacts that are
-    closed, as rows of the event table.
-    """
-
-    y: np.ndarray
-    modes: np.ndarray
-    latched: np.ndarray
-    watched: np.ndarray
-    begun: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -196,9 +182,9 @@ def _follow(part: Engine, here: Moment) -> Moment | None:
 
 
 def handed(part: Engine, here: Moment) -> Handover:
-    """A moment as what another method would have left of this stretch: one row, and the contacts' open events."""
+    """A moment as what another method would have left of this stretch: one row."""
     counters = np.zeros(m.INTEGERS - m.STATUS, dtype=np.int64)
-    for index, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.begun))):
+    for index, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.events))):
         counters[index - m.STATUS] = value
     lasting = np.zeros(len(LASTING))
     lasting[0] = part.start
@@ -206,8 +192,8 @@ def handed(part: Engine, here: Moment) -> Handover:
     first = m.record(rows, len(part.model.contacts))
     first.time[:], first.state[:] = part.start, here.y
     first.modes[:], first.latched[:] = here.modes[: len(part.model.contacts)], here.latched[: len(part.model.contacts)]
-    selections = ((part.start, part.selected.copy()),)
-    return Handover(here.y, here.modes, here.latched, here.watched, counters, lasting, rows, here.begun, selections)
+    recorded = Tape(np.zeros(0), rows, here.events, [(part.start, part.selected.copy())])
+    return Handover(here, counters, lasting, recorded)
 
 
 def _moment(part: Engine, trajectory: Trajectory) -> Moment:
@@ -220,20 +206,20 @@ def _moment(part: Engine, trajectory: Trajectory) -> Moment:
             begun = trajectory.events[np.flatnonzero(mine)[-1]]
             table["event_row"][c] = len(events)
             events.append(np.array([float(begun[name]) for name in begun.dtype.names]))
-    begun_events = np.array(events).reshape(len(events), m.EVENT.size)
-    return Moment(trajectory.state[-1].copy(), part.modes.copy(), part.latched.copy(), watched, begun_events)
+    begun = np.array(events).reshape(len(events), m.EVENT.size)
+    return replace(Moment.of(part, watched, begun), y=trajectory.state[-1].copy())
 
 
 def _earlier(moment: Moment, period: float) -> Moment:
     """The moment when time has started over: its contacts began a period earlier."""
-    begun = moment.begun.copy()
-    m.named(m.EVENT, begun)["time"] -= period
-    return replace(moment, begun=begun)
+    events = moment.events.copy()
+    m.named(m.EVENT, events)["time"] -= period
+    return replace(moment, events=events)
 
 
 def _set_neighbour(part: Engine, scales: np.ndarray, here: Moment, separation: float) -> Moment:
     """A neighbour in a direction that no symmetry of a mechanism has."""
-    direction = np.where(np.isfinite(scales), np.sin(1.0 + np.arange(len(scales)) * 2.399963), 0.0)
+    direction = np.where(np.isfinite(scales), askew(len(scales)), 0.0)
     unit = direction / np.linalg.norm(direction)
     moved = here.y + separation * unit * np.where(np.isfinite(scales), scales, 0.0)
     return replace(here, y=_closed(part, moved))

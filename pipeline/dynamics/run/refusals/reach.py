@@ -3,6 +3,9 @@ moves too fast there for a branch to be followed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
 
 from flexclear.pipeline.core.system.errors import SolverError
@@ -20,6 +23,16 @@ REST_FRACTION, DYING = 0.1, 0.1
 FASTER = 40.0
 
 
+@contextmanager
+def preserved(engine: Engine) -> Iterator[None]:
+    """The work space is afterwards as it was."""
+    saved = engine.w.copy(), engine.n.copy()
+    try:
+        yield
+    finally:
+        engine.w[:], engine.n[:] = saved
+
+
 def beyond_reach(engine: Engine) -> str:
     """When, which drive, and at which joint, in words; nothing where reach is not what ends at the stepper's state.
 
@@ -27,12 +40,11 @@ def beyond_reach(engine: Engine) -> str:
     drives; at the end of a loop's reach it asks them not to move.  Of loops with flexible
     bodies, whose modes give way, this says nothing.  The memory stays as it is.
     """
-    model, saved = engine.model, (engine.w.copy(), engine.n.copy())
+    model = engine.model
     if not model.drives or not model.closures or not model.mechanism.all_rigid:
         return ""
-    text = _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
-    engine.w[:], engine.n[:] = saved
-    return text
+    with preserved(engine):
+        return _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
 
 
 def require_shallow(engine: Engine) -> None:
@@ -44,25 +56,20 @@ def require_shallow(engine: Engine) -> None:
     from flexclear.pipeline.dynamics.contact.validity import SHALLOW, pressed_through
     from flexclear.pipeline.dynamics.run.refusals.overtravel import forced_depth
 
-    model, saved = engine.model, (engine.w.copy(), engine.n.copy())
-    t = float(engine.control[m.TIME])
-    engine.attempt(engine.view(m.Y).copy(), t)
-    gaps = engine.table(m.TOUCH)["gap"].copy()
-    powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[model.nv :])
-    pulled = bool(model.drives) and bool(np.any(powers > 0.0))
-    drive = model.drives[int(np.argmax(powers))] if pulled else ""
-    away = (
-        f"drive {drive} leads out of reach: shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"
-    )
-    engine.w[:], engine.n[:] = saved
-    for k, (contact, depth) in enumerate(zip(model.contacts, -gaps, strict=True)):
+    model, t = engine.model, float(engine.control[m.TIME])
+    with preserved(engine):
+        engine.attempt(engine.view(m.Y).copy(), t)
+        depths, drive = -engine.table(m.TOUCH)["gap"], _pulling(engine)
+    pulled = drive is not None
+    away = f"drive {drive} leads out of reach: {_shorten(drive or '')}"
+    for k, (contact, depth) in enumerate(zip(model.contacts, depths, strict=True)):
         if text := pressed_through(contact.words, contact.joint, float(depth)):
             remedy = "choose a stiffer contact, a slower impact or smaller loads"
             raise SolverError(f"at t = {t:.6g} s: {text}: {f'{away}; else {remedy}' if pulled else remedy}")
         if not (pulled and model.mechanism.all_rigid and depth > SHALLOW * contact.joint.radius > 0.0):
             continue
-        time, least = forced_depth(engine, k)
-        engine.w[:], engine.n[:] = saved
+        with preserved(engine):
+            time, least = forced_depth(engine, k)
         if least:
             raise SolverError(
                 f"at t = {t:.6g} s: {contact.words}: the surfaces are {depth:.3g} m deep in each other, and "
@@ -76,16 +83,15 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
 
     rows: recorded so far, whose speeds those at the stepper's state are compared with.
     """
-    model, saved = engine.model, (engine.w.copy(), engine.n.copy())
-    t, y = float(engine.control[m.TIME]), engine.view(m.Y).copy()
-    engine.attempt(y, t)
-    J = closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN))
-    where = closure_rows.diagnosis(engine) if J.size else ""
+    model, t, y = engine.model, float(engine.control[m.TIME]), engine.view(m.Y).copy()
+    with preserved(engine):
+        engine.attempt(y, t)
+        J = closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN))
+        where = closure_rows.diagnosis(engine) if J.size else ""
     U, values, _ = np.linalg.svd(J) if J.size else (np.eye(1), np.ones(1), None)
-    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > REST_FRACTION)
-    engine.w[:], engine.n[:] = saved
     if not J.size or values[-1] > SINGULAR * values[0]:
         return ""
+    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > REST_FRACTION)
     states = m.record(rows, len(model.contacts)).state
     before, now = (np.abs(s[..., model.speeds] / model.speed_scales)[..., moving] for s in (states, y))
     if np.max(now, initial=0.0) > DYING * np.max(before, initial=0.0):
@@ -126,7 +132,7 @@ def _too_fast(engine: Engine, t: float, where: str) -> str:
 def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     model, still = engine.model, y.copy()
     engine.attempt(y, t)
-    powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[model.nv :])
+    drive = _pulling(engine) or model.drives[0]
     still[model.speeds] = 0.0
     engine.attempt(still, t)
     U, values, _ = np.linalg.svd(closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN)))
@@ -137,9 +143,18 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
         return ""
     if not abs(U[:, len(values) - 1] @ pulled) > FASTER * values[-1] * np.linalg.norm(pulled) > 0.0:
         return ""
-    drive = model.drives[int(np.argmax(powers))]
     joint = closure_rows.worst_joint(engine, U[:, len(values) - 1])
     return (
         f"at t = {t:.6g} s: drive {drive} leads out of reach: the loop closed at joint {joint} is stretched or folded "
-        f"as far as it goes; shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"
+        f"as far as it goes; {_shorten(drive)}"
     )
+
+
+def _pulling(engine: Engine) -> str | None:
+    """The drive with the largest power in the state evaluated last; None where none has any."""
+    powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[engine.model.nv :])
+    return engine.model.drives[int(np.argmax(powers))] if np.any(powers > 0.0) else None
+
+
+def _shorten(drive: str) -> str:
+    return f"shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"

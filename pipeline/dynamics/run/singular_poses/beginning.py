@@ -7,8 +7,6 @@ to no branch show in that there is none, however short the way.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from flexclear.pipeline.core.scene.start import Branch
@@ -34,20 +32,7 @@ ANY = 0.5
 EQUAL_CHANGES = 0.05
 
 
-@dataclass(frozen=True)
-class StartMotion:
-    """A motion out of the pose; selected: closure rows that are solved for on it."""
-
-    motion: Collocation
-    selected: np.ndarray
-
-    @property
-    def state(self) -> np.ndarray:
-        """The state in the pose, with the speeds of the branch."""
-        return self.motion.states(np.array([self.motion.start]))[0]
-
-
-def start_motion(engine: Engine, y: np.ndarray) -> StartMotion:
+def start_motion(engine: Engine, y: np.ndarray) -> Collocation:
     """From the state at the start, which has all loops closed; leaves its closure rows selected.
 
     SolverError when its velocities are not those of one smooth motion, or nothing says which of several it takes.
@@ -60,25 +45,24 @@ def start_motion(engine: Engine, y: np.ndarray) -> StartMotion:
     way = _along(engine, motions[0], turn) if motions else None
     if way is None:
         raise SolverError(engine.mobility.start_refusal)
-    engine.keep(way.selected)
+    engine.keep(engine.selected)  # the scales of rows are those of another state
     return way
 
 
-def _along(engine: Engine, way: Direction, turn: float) -> StartMotion | None:
+def _along(engine: Engine, way: Direction, turn: float) -> Collocation | None:
     """The motion in a direction; None when there is none, or none whose start differs by `turn` at most."""
-    if not way.moves:
+    if way.size == 0.0:
         return None
     engine.control[m.END] = engine.breaks[1]
     for k in range(WAY_HALVINGS):
-        span = min(way.reaching(FIRST_WAY * 0.5**k), engine.breaks[1] - engine.start)
+        span = way.reaching(FIRST_WAY * 0.5**k)
         closure_rows.select_rows(engine, way.state(engine.start + span), engine.start + span)
-        saved, sampler = engine.selected.copy(), Sampler(engine)
+        sampler = Sampler(engine)
         lead = Lead(way.state, turn if way.at_speed else 0.0)
         made = collocate(sampler, engine.start, way.start, span, None, lead)
         sampler.restore()
-        engine.n[m.EVALUATIONS] += sampler.evaluations
         if made is not None:
-            return StartMotion(made, saved)
+            return made
     return None
 
 

@@ -17,7 +17,7 @@ from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import start_motions
-from flexclear.pipeline.dynamics.run.singular_poses.collocation import Sampler
+from flexclear.pipeline.dynamics.run.refusals.reach import preserved
 
 #: way off, in units of the coordinates, and singular values below this fraction of the largest, which are zero
 WAY, ZERO_SINGULAR = 1e-2, 1e-6
@@ -33,27 +33,40 @@ TIME_HALVINGS = 60
 
 @dataclass(frozen=True)
 class Direction:
-    """A way out of the pose. begin: time of the start [s].  start: the state there.
+    """A way out of the pose. begin, end: times of the start and of the next break of the laws [s].
 
-    way: change of the state after a unit of progress.
-    speeds: change of the state at a unit of the progress's rate.
-    progress: of the motion by time [s]; reaching: how long until it has gone so far, in units of the coordinates.
-    at_speed: whether it begins with a speed, not from rest.
+    start: the state at the start.  way: change of the state after a unit of progress; size: of the coordinate that
+    changes most, in its unit.  speeds: change of the state at a unit of the progress's rate; none where the motion
+    begins at speed, not from rest.  progress: of the motion by time [s].
     """
 
     begin: float
+    end: float
     start: np.ndarray
     way: np.ndarray
-    speeds: np.ndarray
+    size: float
+    speeds: np.ndarray | None
     progress: Callable[[float], float]
-    reaching: Callable[[float], float]
-    at_speed: bool
-    moves: bool = True
+
+    @property
+    def at_speed(self) -> bool:
+        """Whether it begins with a speed."""
+        return self.speeds is None
+
+    def reaching(self, size: float) -> float:
+        """How long until the fastest coordinate has gone so many of its units, or to the next break [s]."""
+        from scipy.optimize import brentq  # slow to import, and few runs begin in a singular pose
+
+        def beyond(span: float) -> float:
+            return self.progress(self.begin + span) * self.size - size
+
+        longest = self.end - self.begin
+        return longest if beyond(longest) <= 0.0 else float(brentq(beyond, 0.0, longest, xtol=1e-15 * longest))
 
     def state(self, t: float) -> np.ndarray:
         """State at a time, roughly."""
         progress = self.progress(t)
-        if self.at_speed or t == self.begin:
+        if self.speeds is None or t == self.begin:
             return np.asarray(self.start + progress * self.way)
         back = RATE_INTERVAL * (t - self.begin)
         rate = (progress - self.progress(t - back)) / back
@@ -70,23 +83,15 @@ def by_speeds(engine: Engine, y: np.ndarray) -> Direction:
 
 
 def _steady(engine: Engine, y: np.ndarray, rate: np.ndarray) -> Direction:
-    nq = engine.model.nq
+    nq, begin, end = engine.model.nq, engine.start, float(engine.breaks[1])
     fastest = float(np.max(np.abs(rate[:nq]) / engine.model.state_scales[:nq], initial=0.0))
-    still = np.zeros(len(y))
-
-    def reaching(size: float) -> float:
-        return size / fastest if fastest > 0.0 else np.inf
-
-    return Direction(engine.start, y, rate, still, lambda t: t - engine.start, reaching, True, fastest > 0.0)
+    return Direction(begin, end, y, rate, fastest, None, lambda t: t - begin)
 
 
 def directions(engine: Engine, y: np.ndarray) -> list[Direction]:
     """All directions that the drives and the given velocities leave, from the state at the start; few or none."""
-    sampler = Sampler(engine)
-    seen = _Pose(engine, y)
-    tangents = seen.directions()
-    sampler.restore()
-    return tangents
+    with preserved(engine):
+        return _Pose(engine, y).directions()
 
 
 class _Pose:
@@ -169,22 +174,12 @@ class _Pose:
 
     def _driven(self, step: np.ndarray, went: float) -> Direction:
         """From rest, as far as the drives have opened the loops."""
-        size = float(np.max(np.abs(step)))
+        return self._from_rest(step, lambda t: float(np.linalg.norm(self.residual(np.zeros(self.nv), t))) / went)
 
-        def progress(t: float) -> float:
-            return float(np.linalg.norm(self.residual(np.zeros(self.nv), t))) / went
-
-        def reaching(requested: float) -> float:
-            span = float(self.engine.breaks[1]) - self.engine.start
-            for _ in range(TIME_HALVINGS):
-                if progress(self.engine.start + span) * size <= requested:
-                    break
-                span *= 0.8
-            return span
-
-        return Direction(
-            self.engine.start, self.rest, self._slope(step), self._with(step) - self.rest, progress, reaching, False
-        )
+    def _from_rest(self, step: np.ndarray, progress: Callable[[float], float]) -> Direction:
+        size, speeds = float(np.max(np.abs(step))), self._with(step) - self.rest
+        begin, end = self.engine.start, float(self.engine.breaks[1])
+        return Direction(begin, end, self.rest, self._slope(step), size, speeds, progress)
 
     def _fall(self, step: np.ndarray) -> list[Direction]:
         """From rest under the forces, if they push this way along the branch."""
@@ -195,13 +190,7 @@ class _Pose:
         push = self.engine.slope[self.engine.model.speeds] / self.units @ step / (step @ step)
         if not push * (self.engine.end - t) ** 2 > WAY:
             return []
-        size = float(np.max(np.abs(step)))
-        return [
-            Direction(
-                t, self.rest, self._slope(step), self._with(step) - self.rest, lambda at: 0.5 * push * (at - t) ** 2,
-                lambda requested: float(np.sqrt(2.0 * requested / (push * size))), False,
-            )
-        ]  # fmt: skip
+        return [self._from_rest(step, lambda at: 0.5 * push * (at - t) ** 2)]
 
     def _tangents(self, base: np.ndarray, free: np.ndarray, t: float | None) -> list[np.ndarray]:
         """Displacements by about WAY with which the closures hold to second order; from rest both ways of a line."""

@@ -81,6 +81,12 @@ class Collocation:
         """States at times [s], shape (len(times), n)."""
         return np.asarray(chebyshev.chebval(2.0 * (np.asarray(times) - self.start) / self.span - 1.0, self.series).T)
 
+    def lay(self, engine: Engine) -> None:
+        """Leave it ready for the stepper, whose state is then that of its start."""
+        engine.view(m.Y)[:] = self.states(np.array([self.start]))[0]
+        engine.view(m.COLLOCATION)[:] = self.series.ravel()
+        engine.control[m.COLLOCATED] = self.span
+
 
 @dataclass(frozen=True)
 class Lead:
@@ -116,8 +122,9 @@ class Sampler:
         self._kept = engine.w.copy(), engine.n.copy()
 
     def restore(self) -> None:
-        """Put the engine's memory back."""
+        """Put the engine's memory back, but for the number of evaluations."""
         self.engine.w[:], self.engine.n[:] = self._kept
+        self.engine.n[m.EVALUATIONS] += self.evaluations
 
     def closed(self, t: float, y: np.ndarray) -> tuple[np.ndarray, bool]:
         """The state nearest to y with its loops closed, and whether there is one."""

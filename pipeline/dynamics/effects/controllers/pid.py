@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexclear.pipeline.core.scene.loads import Pid as Declared
+from flexclear.pipeline.core.scene.loads import Pid
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.gauge import counted, internal_rate
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
@@ -65,13 +65,7 @@ def numbers(load: Any, coordinate: Coordinate, measured: Coordinate) -> tuple[fl
     return (*gains, low, high, 0.0 if tracking is None else 1.0 / tracking)
 
 
-class Pid:
-    """See the module's text."""
-
-    apply = staticmethod(apply)
-
-    @staticmethod
-    def row(load: Declared, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
-        """Six numbers (`numbers`), the reference, and the integral part as state."""
-        reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
-        return Row(joint=load.joint, laws=(reference,), numbers=numbers(load, coordinate, measured), states=1)
+def row(load: Pid, path: str, coordinate: Coordinate, measured: Coordinate) -> Row:
+    """Six numbers (`numbers`), the reference, and the integral part as state."""
+    reference = (load.reference, measured.dimension, f"{path[:-1]}.reference]")
+    return Row(joint=load.joint, laws=(reference,), numbers=numbers(load, coordinate, measured), states=1)

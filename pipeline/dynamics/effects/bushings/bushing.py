@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.loads import Bushing as Declared
+from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.dynamics.gauge import internal_rate
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, number
@@ -133,14 +133,8 @@ def apply(d, k):
     act(d, k, add(torque, cross(p, force)), force, length, rate, stored, 0.0, lost)
 
 
-class Bushing:
-    """See the module's text."""
-
-    apply = staticmethod(apply)
-
-    @staticmethod
-    def row(load: Declared, path: str) -> Row:
-        """Stiffness, then damping, row by row [SI]; three states where it resists rotation."""
-        numbers = [entry for matrix in (load.stiffness, load.damping) for row in matrix for entry in row]
-        resists = any(entry for matrix in (load.stiffness, load.damping) for row in matrix[3:] for entry in row)
-        return Row(frames=load.between, numbers=tuple(numbers), states=3 if resists else 0)
+def row(load: Bushing, path: str) -> Row:
+    """Stiffness, then damping, row by row [SI]; three states where it resists rotation."""
+    numbers = [entry for matrix in (load.stiffness, load.damping) for row in matrix for entry in row]
+    resists = any(entry for matrix in (load.stiffness, load.damping) for row in matrix[3:] for entry in row)
+    return Row(frames=load.between, numbers=tuple(numbers), states=3 if resists else 0)

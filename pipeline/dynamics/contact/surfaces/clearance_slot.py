@@ -2,12 +2,17 @@
 
 The pin's centre is led by the straight part of the slot's centre line; between its ends the gap is measured across it,
 beyond them from the end. Axial motion and tilt are held as a planar joint holds them (`joints.HELD`).
+
+The walls are planes; the round ends are given their stiffness. Exponent 1.5: K of a sphere on a plane, as is usual for
+revolute joints (see `clearance_revolute`). Exponent 1: a cylinder on a plane.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from flexclear.pipeline.core.scene.clearance import ClearanceSlot
+from flexclear.pipeline.dynamics.contact.hertz import cylinder_stiffness, given_or, half_width, plane_stiffness
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import axis, dot, radial, scale, sub
 
@@ -26,7 +31,11 @@ def separation(axes, numbers, p, v):
     return numbers.clearance - distance, rate, normal, turning, across
 
 
-class ClearanceSlot:
-    """See the module's text."""
+def stiffness(joint: ClearanceSlot, exponent: float) -> float:
+    """K [N/m^exponent], given or as above; ValueError where nothing is published."""
+    return given_or(joint, exponent, {1.0: cylinder_stiffness, 1.5: plane_stiffness})
 
-    separation = staticmethod(separation)
+
+def contact_size(joint: ClearanceSlot, depth: float, force: float) -> float:
+    """Half-width of the contact [m] under a force [N]."""
+    return half_width(joint, joint.radius, depth, force)

@@ -1,0 +1,33 @@
+"""Small displacements of a state at an engine's start, as drives and loops allow them.
+
+They follow from the rates at speeds, less those at the speeds of the drives alone: no step width enters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import project, rates_at_speeds
+
+
+def per_speed(engine: Engine, y: np.ndarray, read: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Change of what is read of the rates, or of the work space, per unit of each free speed; shape (..., nv)."""
+    nv = engine.model.nv
+    driven = read(rates_at_speeds(engine, y, np.zeros(nv)))
+    changes = [read(rates_at_speeds(engine, y, unit)) - driven for unit in np.eye(nv)]
+    return np.moveaxis(np.reshape(changes, (nv, *np.shape(driven))), 0, -1)
+
+
+def displaced(engine: Engine, y: np.ndarray, displacement: np.ndarray) -> np.ndarray:
+    """The state after a small displacement by the free coordinates, shape (nv,), its loops closed."""
+    there, nq = y.copy(), engine.model.nq
+    there[:nq] += rates_at_speeds(engine, y, displacement)[:nq] - rates_at_speeds(engine, y, 0.0 * displacement)[:nq]
+    return project(engine, there)
+
+
+def askew(count: int) -> np.ndarray:
+    """Numbers from -1 to 1 that make a direction which no symmetry of a mechanism has, shape (count,)."""
+    return np.asarray(np.sin(1.0 + np.arange(count) * 2.399963))
