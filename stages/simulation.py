@@ -157,13 +157,15 @@ def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], p
 
     inputs: ``bundle/<body>``, and ``run`` of a scene with contacts, which has the horizon.
     """
-    from flexclear.pipeline import dynamics
+    from flexclear.pipeline.dynamics import require_without_events
+    from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities as derivatives
 
     scene = rebuild(params, inputs)
+    require_without_events(scene, "derivatives")
     horizon = float(inputs["run"]["horizon"]) if "run" in inputs else math.inf
     with _in_time(scene):
         names = params["of"], params["to"]
-        return {"nc": dynamics.sensitivities(scene, bundles(inputs), progress, *names, horizon)}
+        return {"nc": derivatives(scene, bundles(inputs), progress, *names, horizon)}
 
 
 def linear(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

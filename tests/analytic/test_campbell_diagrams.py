@@ -16,12 +16,12 @@ from flexclear.commands.frequencies import speeds
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.dynamics.linear.campbell import campbell
+from flexclear.pipeline.dynamics.linear.campbell import campbell as over_speeds
 from tests.analytic.test_unbalanced_rotors import ACROSS, ALONG, MASS, MIXED, SIDE, SLOPE, TURNS, Table, rotor
 
 
 def diagram(table: Table, at: list[float]) -> xr.Dataset:
-    return campbell(Scene.model_validate(table), {}, silent, at)
+    return over_speeds(Scene.model_validate(table), {}, silent, at)
 
 
 def whirls(speed: float) -> np.ndarray:

@@ -8,6 +8,7 @@ from typing import Any
 
 from numba import njit
 
+import flexclear.pipeline.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
 from flexclear.pipeline.dynamics.fields import data
 
 

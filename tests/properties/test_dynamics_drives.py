@@ -75,7 +75,8 @@ def pieces(law: Any) -> Pieces:
 
 def value(law: Any, t: float, order: int = 0, side: str = "right") -> float:
     """A derivative of the law at t, from the piece that holds right (or left) of it."""
-    return pieces(law).value(t, order, side)
+    before = [p for p in pieces(law).pieces if p.start < t]
+    return before[-1].value(t, order) if side == "left" and before else pieces(law).value(t, order)
 
 
 def compiled(law: Any, t: float, piece: int) -> np.ndarray:

@@ -168,6 +168,6 @@ def test_warning_where_a_law_does_not_deliver_what_it_is_asked_for(name: str) ->
     ],
 )
 def test_what_a_law_cannot_do_is_refused_in_words(law: NormalLaw, said: str) -> None:
-    module = lankarani_nikravesh if law.law == "lankarani-nikravesh" else kelvin_voigt
+    part = lankarani_nikravesh.LAW if law.law == "lankarani-nikravesh" else kelvin_voigt
     with pytest.raises(ValueError, match=said):
-        module.LAW.resolve(law, 1e9, 1.0)
+        part.resolve(law, 1e9, 1.0)

@@ -45,7 +45,7 @@ def test_a_task_has_one_thread_whoever_has_set_more() -> None:
 DOCSTRINGS = """
 from importlib import import_module
 from flexclear.pipeline.core.scene.citations import docstring
-places = [("integrate.dop853", ""), ("contact.normal.hertz", ""), ("contact.normal.hertz", "Hertz")]
+places = [("integrate.dop853", ""), ("contact.normal.hertz", ""), ("contact.law", "Hysteresis")]
 for module, name in places:
     thing = import_module(f"flexclear.pipeline.dynamics.{module}")
     print(" ".join((docstring(getattr(thing, name) if name else thing) or "").split()))

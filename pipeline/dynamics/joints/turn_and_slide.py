@@ -1,7 +1,4 @@
-"""Joints that turn about z of the first frame, slide along its axes, or do both: each by its coordinates alone.
-
-Source of the sliding joint: Wang & Wang (2019), eqs. (30), (31).
-"""
+"""Joints that turn about z of the first frame, slide along its axes, or do both: each by its coordinates alone."""
 
 from __future__ import annotations
 

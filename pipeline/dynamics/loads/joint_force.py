@@ -5,8 +5,7 @@ from __future__ import annotations
 from flexclear.pipeline.core.scene.loads import JointForce
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import law
-from flexclear.pipeline.dynamics.loads.joint_expression import applying
+from flexclear.pipeline.dynamics.loads.fields import along_coordinate, law
 from flexclear.pipeline.dynamics.loads.row import Row
 
 
@@ -16,7 +15,7 @@ def given(d, k):
     return law(d, k, 0)
 
 
-apply = applying(given).apply
+apply = along_coordinate(given)
 
 
 def row(load: JointForce, path: str, coordinate: Coordinate) -> Row:

@@ -3,19 +3,10 @@
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import PointForce
-from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import law
-from flexclear.pipeline.dynamics.loads.point_expression import applying
+from flexclear.pipeline.dynamics.loads.fields import at_origin, laws
 from flexclear.pipeline.dynamics.loads.row import Row
 
-
-@kernel
-def given(d, k):
-    """The force of load k, before it turns with its frame."""
-    return (law(d, k, 0), law(d, k, 1), law(d, k, 2))
-
-
-apply = applying(given).apply
+apply = at_origin(laws)
 
 
 def row(load: PointForce, path: str) -> Row:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from flexclear.pipeline.core.scene.loads import PointTorque
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import ZERO, act
-from flexclear.pipeline.dynamics.loads.point_force import given
+from flexclear.pipeline.dynamics.loads.fields import ZERO, act, laws
 from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.vectors import dot, turn
 
@@ -14,7 +13,7 @@ from flexclear.pipeline.dynamics.vectors import dot, turn
 def apply(d, k):
     """Apply load k."""
     frame = d.site_frames[d.loads[k].b]
-    torque = given(d, k)
+    torque = laws(d, k)
     if d.loads[k].follows:
         torque = turn(frame.axes, torque)
     act(d, k, torque, ZERO, 0.0, 0.0, 0.0, dot(torque, frame.omega), 0.0)

@@ -10,6 +10,7 @@ from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.registry import lookup, suggestion
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.effects import JOINTS
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
@@ -29,6 +30,14 @@ class Prescribed:
 def joint_type(kind: str) -> Any:
     """What declares a joint type; asked for some hundred times per link while a mechanism is built."""
     return lookup(JOINTS, kind, where="joint")
+
+
+def measured(value: Any, dimension: str, path: str) -> float:
+    """A number of a scene in SI; InputError, placed at `path`, for one of another dimension."""
+    try:
+        return quantity(value, dimension)
+    except ValueError as error:
+        raise InputError(path, str(error)) from None
 
 
 def label(joint: str, kind: str, k: int) -> str:

@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift, start_
 from flexclear.pipeline.dynamics.model.gauges import angles
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.start_table import given_coordinates, given_modal_velocities
+from flexclear.pipeline.dynamics.model.start_table import given_coordinates, given_modes
 
 #: state -> frames of all links and sites, named fields of LINK_FRAMES and SITE_FRAMES, and rates at which the loops
 #: open, (closure rows,)
@@ -114,7 +114,7 @@ def _of_joints(model: Model) -> Iterator[Rate]:
 
 def _of_modes(model: Model) -> Iterator[Rate]:
     bundles = {link.flexible: link.bundle for link in model.links if link.flexible and link.bundle is not None}
-    for name, values in given_modal_velocities(model.scene, bundles).items():
+    for name, values in given_modes(model.scene, bundles, "velocity").items():
         for c, value in zip(model.numbering.modal_coordinates[model.mechanism.link_of[name]], values, strict=True):
             yield Rate(f"[start.modal.{name}.velocity]", float(value), float(model.speed_scales[c]), c)
 

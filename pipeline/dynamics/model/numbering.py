@@ -99,16 +99,16 @@ def number(mechanism: Mechanism) -> Numbering:
     numbering = Numbering(mechanism)
     _number_positions(numbering, mechanism.links)
     _number_coordinates(numbering, mechanism.links)
+    for i, link in enumerate(mechanism.links):
+        if link.drives:  # of which there are as many as positions and speeds
+            first, count = mechanism.drives.index(link.drives[0]), len(link.drives)
+            numbering.positions[i] = range(numbering.nq + first, numbering.nq + first + count)
+            numbering.coordinates[i] = range(numbering.nv + first, numbering.nv + first + count)
     numbering.columns = numbering.nv + numbering.known
     for link in mechanism.links[1:]:
         assert link.inboard is not None
         numbering.add_site(link.inboard)
     return numbering
-
-
-def _drive(mechanism: Mechanism, link: Link) -> int:
-    """Number of the first drive of a link whose joint is prescribed."""
-    return mechanism.drives.index(link.drives[0])
 
 
 def _number_positions(numbering: Numbering, links: list[Link]) -> None:
@@ -121,10 +121,6 @@ def _number_positions(numbering: Numbering, links: list[Link]) -> None:
             numbering.modal_positions[i] = range(numbering.nq, numbering.nq + link.bundle.sizes["mode"])
             numbering.bases[i] = interface_basis(numbering.mechanism, i)
             numbering.nq = numbering.modal_positions[i].stop
-    for i, link in enumerate(links):
-        if link.drives:
-            first = numbering.nq + _drive(numbering.mechanism, link)
-            numbering.positions[i] = range(first, first + len(joint_type(link.kind).POSITIONS))
 
 
 def _number_coordinates(numbering: Numbering, links: list[Link]) -> None:
@@ -145,7 +141,3 @@ def _number_coordinates(numbering: Numbering, links: list[Link]) -> None:
             numbering.nv = numbering.coordinates[i].stop
 
     visit(0)
-    for i, link in enumerate(links):
-        if link.drives:
-            first = numbering.nv + _drive(numbering.mechanism, link)
-            numbering.coordinates[i] = range(first, first + len(joint_type(link.kind).SPEEDS))

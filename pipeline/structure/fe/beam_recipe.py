@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.numerics.rotations import axes_to_matrix, axis_to_matrix
-from flexclear.pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, given_once
-from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, check_interfaces
+from flexclear.pipeline.core.scene.fields import Inertia, Length, Mass, Part, Pose, Position
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive, TurnedFrame
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
@@ -92,35 +91,21 @@ class LumpedMass(Part):
 FRAME_ROTATION = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-class NodeFrame(Part):
-    """A named frame at a node."""
+class NodeFrame(TurnedFrame):
+    """A named frame at a node; default: z along the beam (x of the rod), x = y of the rod.
+
+    A pin across the beam needs other axes, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``, or
+    ``axis = [0, 0, 1]``; directions in the rod's axes.
+    """
 
     x: Length
     """position along the rod, at a node"""
-    axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
-    """as of a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod. A pin
-    across the beam needs others, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``"""
-    axis: Direction | None = None
-    """as of a pose, the direction of z alone: ``axis = [0, 0, 1]``"""
-
-    @model_validator(mode="after")
-    def _orthogonal_axes(self) -> NodeFrame:
-        given_once(self, ("axes", "axis"))
-        self.orientation()
-        return self
-
-    def orientation(self) -> np.ndarray:
-        """Columns: x, y, z of the frame in rod axes."""
-        if self.axis is not None:
-            return axis_to_matrix(self.axis)
-        return FRAME_ROTATION if self.axes is None else axes_to_matrix(self.axes)
+    default: ClassVar[np.ndarray] = FRAME_ROTATION
 
 
-class BeamRecipe(Part):
+class BeamRecipe(BodyRecipe):
     """What all beams have."""
 
-    title: str = ""
-    """what the body is, in words"""
     theory: Literal["euler-bernoulli", "rayleigh", "timoshenko"] = "rayleigh"
     """of bending; Euler-Bernoulli has no rotary inertia, Rayleigh has it, Timoshenko has shear too"""
     torsion: Literal["linear", "quadratic"] = "linear"
@@ -133,13 +118,6 @@ class BeamRecipe(Part):
     """lumped masses by name"""
     frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
     """named frames at nodes"""
-    interfaces: tuple[str, ...] = ()
-    """frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis"""
-
-    @model_validator(mode="after")
-    def _interfaces_are_frames(self) -> BeamRecipe:
-        check_interfaces(self.interfaces, self.frames)
-        return self
 
 
 class StraightBeamRecipe(BeamRecipe):

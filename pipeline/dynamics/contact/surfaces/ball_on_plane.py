@@ -19,7 +19,10 @@ def separation(axes, numbers, p, v):
 
 
 def stiffness(joint: BallOnPlane, exponent: float) -> float:
-    """K [N/m^exponent], given or of Hertz; ValueError where nothing is published."""
+    """K [N/m^exponent], given or of Hertz; ValueError where nothing is published.
+
+    Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
+    """
     return given_or(joint, exponent, {1.5: plane_stiffness})
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from flexclear.pipeline.core.scene.fields import Part
-from flexclear.pipeline.structure.fe.recipe_parts import TurnedFrame, check_interfaces
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, TurnedFrame
 
 
 class Matrices(Part):
@@ -52,19 +52,10 @@ class NodeFrame(TurnedFrame):
         return self
 
 
-class MatricesRecipe(Part):
+class MatricesRecipe(BodyRecipe):
     """A body given by its matrices."""
 
-    title: str = ""
-    """what the body is, in words"""
     shape: Matrices
     """files of the matrices"""
     frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
     """named frames and their nodes"""
-    interfaces: tuple[str, ...] = ()
-    """frames at which the body is joined to others"""
-
-    @model_validator(mode="after")
-    def _known(self) -> MatricesRecipe:
-        check_interfaces(self.interfaces, self.frames)
-        return self

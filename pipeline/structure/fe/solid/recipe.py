@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from flexclear.pipeline.core.scene.fields import Direction, Length, Part, Position
-from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, TurnedFrame, check_interfaces
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive, TurnedFrame
 
 Cells = Annotated[int, Field(ge=1, le=1000)]
 ElementName = Literal["hex8", "hex20", "hex27", "tet4", "tet10"]
@@ -138,11 +138,9 @@ class TiedFrame(TurnedFrame):
     """origin in the mesh frame; default: the centre of the nodes"""
 
 
-class SolidRecipe(Part):
+class SolidRecipe(BodyRecipe):
     """A solid body."""
 
-    title: str = ""
-    """what the body is, in words"""
     shape: Annotated[Cylinder | Block | MeshFile, Field(discriminator="type")]
     """the solid"""
     material: Isotropic | None = None
@@ -151,12 +149,9 @@ class SolidRecipe(Part):
     """elastic constants and density by region"""
     frames: Annotated[dict[str, TiedFrame], Field(min_length=1)]
     """named frames and their nodes"""
-    interfaces: tuple[str, ...] = ()
-    """frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis"""
 
     @model_validator(mode="after")
     def _complete(self) -> SolidRecipe:
         if (self.material is None) == (not self.materials):
             raise ValueError("give either `material` for the whole body or `materials` by region")
-        check_interfaces(self.interfaces, self.frames)
         return self
