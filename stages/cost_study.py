@@ -23,8 +23,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     points, and a run by another method confirms it.
     """
     from flexclear.pipeline.core.scene.quantity import Quantity
-    from flexclear.pipeline.post.cost import answer, causes, price, statistics, work_precision
-    from flexclear.pipeline.post.cost.split import causes_of
+    from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
+    from flexclear.pipeline.post.cost.causes import causes_of
     from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
     from flexclear.pipeline.post.plotting.table import files
 
@@ -45,8 +45,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     said += (f"Not run within the budget: {params['undone']}.",) if params["undone"] else ()
     study = causes.with_causes(study, split)
     result: dict[str, Any] = {"nc": study}
-    result |= files("price", price.price_list(study, f"What accuracy costs: {title}", said))
-    result |= files("quantities", price.by_quantity(study, f"What each quantity costs: {title}"))
+    result |= files("price", answer.price_list(study, f"What accuracy costs: {title}", said))
+    result |= files("quantities", answer.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
     result |= answer.figure("accuracy", study, f"What accuracy costs: {title}")
     result |= causes.make("causes", split, f"Where the error comes from: {title}")

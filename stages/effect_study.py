@@ -71,8 +71,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def page(scene: Scene, words: str, picture: bytes) -> bytes:
     """The page of the table and the chart."""
-    from flexclear.pipeline.post.overview.page import Part, media
-    from flexclear.pipeline.post.overview.page import page as written
+    from flexclear.pipeline.post.pages import Part, media
+    from flexclear.pipeline.post.pages import page as written
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
     parts = [

@@ -1,7 +1,5 @@
 """Python in processes of its own, and copies of the sources that are to be edited."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -31,7 +29,7 @@ def printed(code: str, *arguments: str | Path, **options: str) -> str:
 def copied(folder: Path, *more: str) -> Path:
     """A folder with a copy of the program's sources, and of more folders of the project."""
     for name in (*PACKAGES, *more):
-        ignored = shutil.ignore_patterns("__pycache__")
+        ignored = shutil.ignore_patterns("*.pyc.*")  # half written
         shutil.copytree(ROOT / name, folder / name, symlinks=True, ignore=ignored)
     shutil.copy(ROOT / "pyproject.toml", folder)
     return folder

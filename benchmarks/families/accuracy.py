@@ -17,7 +17,7 @@ from flexclear.commands import cost
 from flexclear.commands.scenes import find_scene, open_workplace
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.post.cost.page import Studied, sections
+from flexclear.pipeline.post.cost.answer import Studied, sections
 from flexclear.pipeline.post.plotting.table import Table, as_markdown, from_markdown
 
 #: processor time of a study [s]

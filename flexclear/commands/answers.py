@@ -58,7 +58,7 @@ def said(name: str, answer: Made, scene: Scene) -> Said:
     """What is shown of the answer called accuracy, stability or matters."""
     from flexclear.pipeline.post.answers import matters
     from flexclear.pipeline.post.cost.answer import sentences
-    from flexclear.pipeline.post.overview.page import prose
+    from flexclear.pipeline.post.pages import prose
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
     data = answer.dataset()

@@ -18,7 +18,7 @@ from flexclear.stages.workplace import Made, Workplace, check, open_workplace
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.post.overview.page import Part
+    from flexclear.pipeline.post.pages import Part
 
 #: what `--ideal` takes away: everything at once, one effect, or one after the other
 IDEAL = ("both", *EFFECTS, "each")
@@ -63,7 +63,7 @@ def bring(
     without: one of IDEAL, or None for the scenes alone.  alongside: tasks made while the runs leave a processor idle,
     which may fail.  Raises InputError for what cannot be compared.
     """
-    from flexclear.pipeline.post.overview.page import page
+    from flexclear.pipeline.post.pages import page
 
     sides = [side for scene in scenes for side in (*ideal_scenes(scene, without), scene)] if without else scenes
     if len(sides) < 2:
@@ -108,7 +108,7 @@ def ideal_scenes(scene: Scene, without: str) -> list[Scene]:
 
 def parts(made: Made) -> list[Part]:
     """What a page shows of a comparison."""
-    from flexclear.pipeline.post.overview.page import Part
+    from flexclear.pipeline.post.pages import Part
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
     tables = "".join(as_html(from_markdown(made.text(name))) for name in TABLES)

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.post.cost.page import Studied
+    from flexclear.pipeline.post.cost.answer import Studied
 
 #: a `Peer` as parameters of tasks have it
 Track = dict[str, Any]
@@ -309,7 +309,7 @@ def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, d
 
     made: as `bring` returned it.  pictures: folder for them next to the page.
     """
-    from flexclear.pipeline.post.cost.page import Studied, advice
+    from flexclear.pipeline.post.cost.answer import Studied, advice
 
     shown = {stem: f"{pictures}/{name.replace('/', '_')}_{stem}.png" for stem in FIGURES}
     shown = {stem: path for stem, path in shown.items() if f"{stem}.png" in made.record.files}
@@ -323,7 +323,7 @@ def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> No
 
     studies: what `bring` returned, by scene.  options: the command's other options.
     """
-    from flexclear.pipeline.post.cost.page import markdown
+    from flexclear.pipeline.post.cost.answer import markdown
 
     sections = []
     with disk_limits(page.parent):

@@ -214,8 +214,8 @@ def page(planned: Planned) -> bytes:
     import html
 
     from flexclear.pipeline.post.answers.plan import words
-    from flexclear.pipeline.post.overview.page import Part, media
-    from flexclear.pipeline.post.overview.page import page as made
+    from flexclear.pipeline.post.pages import Part, media
+    from flexclear.pipeline.post.pages import page as made
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
     picture = media("plan.png", planned.made.read("plan.png"), "Estimated size of each effect, at most")

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from flexclear.commands.answers import Answers
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.post.overview.page import Part
+    from flexclear.pipeline.post.pages import Part
     from flexclear.stages.graph import Graph
 
 #: what a report shows of the motion, by the names of `Graph.render`
@@ -168,7 +168,7 @@ def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
     if not folder:
         publish(where / f"{name}.html", page)
         return where / f"{name}.html"
-    from flexclear.pipeline.post.overview.page import in_folder
+    from flexclear.pipeline.post.pages import in_folder
 
     (where / name).mkdir(parents=True, exist_ok=True)
     for file, content in in_folder(page).items():
@@ -193,7 +193,7 @@ def _answers(answers: Answers, workplace: Workplace) -> dict[str, Made]:
 def _answered(scene: Scene, result: Mapping[str, Made]) -> list[Part]:
     """The three sections: each with a sentence that answers, a picture and a table."""
     from flexclear.commands.answers import said
-    from flexclear.pipeline.post.overview.page import Part
+    from flexclear.pipeline.post.pages import Part
 
     parts = []
     for name, answer in result.items():
@@ -212,7 +212,7 @@ def _page(
 ) -> bytes:
     from flexclear.pipeline.post.answers.matters import ideal_sentences
     from flexclear.pipeline.post.answers.summary import answer, by_weight, effects
-    from flexclear.pipeline.post.overview.page import Part, downloads, listed, page
+    from flexclear.pipeline.post.pages import Part, downloads, listed, page
     from flexclear.pipeline.post.single_run.series import parameters
 
     scene = graph.scene
@@ -271,7 +271,7 @@ def _members(graph: Graph, made: Mapping[Task, Made]) -> float | None:
 
 
 def _stability(run: xr.Dataset | None, members: float | None) -> dict[str, str]:
-    from flexclear.pipeline.post.single_run.horizon import sentence
+    from flexclear.pipeline.post.single_run.series import sentence
 
     if run is None:
         return {}

@@ -55,7 +55,7 @@ def print_files(folder: Path, files: Mapping[str, str]) -> None:
 
 def pictures(made: Made | None, captions: Mapping[str, Sequence[str]]) -> str:
     """Those pictures and films of an artifact that are there, as HTML; by name their captions, and what they show."""
-    from flexclear.pipeline.post.overview.page import media
+    from flexclear.pipeline.post.pages import media
 
     files = made.record.files if made is not None else {}
     return "".join(media(name, made.read(name), *text) for name, text in captions.items() if made and name in files)

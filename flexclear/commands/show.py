@@ -117,7 +117,7 @@ def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False
     content = {f"{stem}_start.html": _page(scene, seen)}
     if gl.works():
         from flexclear.pipeline.post.render.pictures import png
-        from flexclear.pipeline.post.render.start_picture import picture
+        from flexclear.pipeline.post.render.start_view import picture
 
         content[f"{stem}_start.png"] = png(picture(seen, scene.title or stem))
     elif not quiet:
@@ -131,8 +131,7 @@ def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False
 
 
 def _page(scene: Scene, seen: StartView) -> bytes:
-    from flexclear.pipeline.post.overview.page import viewer_page
-    from flexclear.pipeline.post.pages import viewer
+    from flexclear.pipeline.post.pages import viewer, viewer_page
     from flexclear.pipeline.post.render.start_view import page_view
 
     title = scene.title or Path(scene.name).name

@@ -48,16 +48,13 @@ class Scenes:
         They are seconds of the processor, and so are measured while other tasks run: alone they would be a third of the
         whole report's time, with all other cores idle.
         """
-        if family not in self.times:
-            self.times[family] = self._timing(family)
-        return self.times[family]
-
-    def _timing(self, family: str) -> Task:
+        if family in self.times:
+            return self.times[family]
         files = sorted((DATA / "scenes" / family).glob("*.toml"))
         if not files:
             raise InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")
         graphs = [self.graph(f"{family}/{path.stem}") for path in files]
-        return Task(
+        self.times[family] = Task(
             stage="timing",
             scene=family,
             run="flexclear.papers.wang_wang_2019.timing:run",
@@ -68,6 +65,7 @@ class Scenes:
             folder=f"runs/{family}",
             names={"nc": "timing.nc"},
         )
+        return self.times[family]
 
 
 def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:

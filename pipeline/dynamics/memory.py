@@ -9,8 +9,8 @@ A kernel's code depends only on the kinds of parts present. Everything else is i
 - ``n`` (integers): what changes while a run continues.
 
 Kernels read and write all of it by the names that are declared here (`fields`).  Python reads the same rows by the
-names of their fields (`named`), and rows of the record by what they hold (`record`).  ``h[m.NV]`` is a size,
-``h[m.FORCE]`` the index in w where a stretch begins, ``h[m.LINKS.place]`` that of a table in its array, and
+names of their fields (`named`), and rows of the record by what they hold (`integrate.recording`).  ``h[m.NV]`` is a
+size, ``h[m.FORCE]`` the index in w where a stretch begins, ``h[m.LINKS.place]`` that of a table in its array, and
 ``m.LINKS.parent`` where a field begins in a row of it.
 
 Arrays are flat, since calls and compilation cost what the arguments cost.  No two overlap, and the compiler knows:
@@ -33,7 +33,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import count
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -432,33 +432,9 @@ ROOM, EVENTS_OF_A_CONTACT = 8, 4
 STEEPLY = 1e300
 
 
-def _record_columns(contacts: int) -> tuple[int, int, int]:
+def columns_of_record(contacts: int) -> tuple[int, int, int]:
     """Where a row of the record has the contacts' modes, their impact rates and the state; its time is first."""
     return 1, 1 + contacts, 1 + 2 * contacts
 
 
-record_columns = kernel(_record_columns)
-
-
-class Record(NamedTuple):
-    """Rows of the record by what they hold, all views.
-
-    time: [s], shape (rows,).  modes, latched: 1 of closed contacts and 0 of open ones, and their impact rates [m/s];
-    shape (rows, contacts).  state: shape (rows, NY).
-    """
-
-    time: np.ndarray
-    modes: np.ndarray
-    latched: np.ndarray
-    state: np.ndarray
-
-
-def record(rows: np.ndarray, contacts: int) -> Record:
-    """Rows of the record, shape (rows, columns), by what they hold."""
-    mode, latched, state = _record_columns(contacts)
-    return Record(rows[:, 0], rows[:, mode:latched], rows[:, latched:state], rows[:, state:])
-
-
-def empty_record(rows: int, contacts: int, ny: int) -> np.ndarray:
-    """Rows of the record, all zero, shape (rows, columns)."""
-    return np.zeros((rows, _record_columns(contacts)[-1] + ny))
+record_columns = kernel(columns_of_record)

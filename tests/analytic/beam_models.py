@@ -1,7 +1,5 @@
 """Rods as finite elements, taken apart into planes: recipes, and frequencies with the ends held."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Exact solutions of uniform rods, written down independently of the package's own closed forms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Smooth mechanisms and single runs of the stepper, for tests of integrators."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Runs of scenes for the tests, straight from the engine; each is made once per session."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

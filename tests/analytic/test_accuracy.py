@@ -1,7 +1,5 @@
 """Runs whose accuracy the scene asks for: what is delivered, against a run at the tightest tolerance."""
 
-from __future__ import annotations
-
 import json
 from contextlib import suppress
 

@@ -1,7 +1,5 @@
 """Beam frequencies: the elements against closed forms, and the closed forms against independent ones."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

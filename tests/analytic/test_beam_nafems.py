@@ -1,7 +1,5 @@
 """Published benchmarks of beams, NAFEMS FV4 and FV5, from the recipes in meshes/checks; FV2 is with the turned rods."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Section constants against quadrature, tables and a solution of the torsion problem, and sections in skew axes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stepped rods and rods with masses: frequencies, static compliance and rigid inertia against exact ones."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Tapered rods against the closed forms of cones and wedges, whose sections the elements must not make a staircase."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Each theory of beams, with all kinds of ends, against the exact roots of its own frequency equation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """LuGre friction in the engine: a ball that rolls, sticks and slides in its socket on bristles."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

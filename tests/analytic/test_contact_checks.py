@@ -1,7 +1,5 @@
 """Scenes of one ball in a socket: engine against closed forms and one-dimensional integration."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Events that are easily missed: grazing, simultaneous and resting contacts, short stops of the sliding."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

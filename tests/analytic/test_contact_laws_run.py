@@ -1,7 +1,5 @@
 """Normal laws and their events in the engine: a ball thrown at the wall of a wide socket."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

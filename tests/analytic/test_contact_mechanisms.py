@@ -1,7 +1,5 @@
 """Mechanisms held by clearance joints: engine against a second derivation in maximal coordinates with SciPy."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

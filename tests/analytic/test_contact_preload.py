@@ -4,8 +4,6 @@ The numbers named KNOWN are those of CONTACT-SOCKET-PRELOAD of the project's ref
 closed forms by a program that shares nothing with this one.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """PID controllers against matrix exponentials, and a sampled one against its exact discretisation."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs whose energy balance is off say so, and those that are far off, or diverge, are refused."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

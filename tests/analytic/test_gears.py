@@ -1,7 +1,5 @@
 """Gears and racks against closed forms: Willis' equation, equivalent inertia, reactions; what repeats is redundant."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Contacts under every integrator: a bouncing ball against one dimension, the mechanism against itself."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

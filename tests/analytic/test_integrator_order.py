@@ -1,7 +1,5 @@
 """Every integrator has the order that it claims, on a tree and on a closed loop; Radau goes where SciPy's goes."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

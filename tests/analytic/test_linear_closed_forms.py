@@ -1,7 +1,5 @@
 """Equilibria and natural frequencies with closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Equilibria and vibrations under springs, dampers and forces, against closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The mechanism with clearance at A1: engine against a second derivation in minimal form."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

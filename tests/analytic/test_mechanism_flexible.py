@@ -1,7 +1,5 @@
 """The mechanism with the flexible rod: engine against sums over mass points, and against its own rigid limit."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

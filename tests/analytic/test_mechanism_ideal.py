@@ -1,7 +1,5 @@
 """The ideal mechanism: engine against closed-form motion and inverse dynamics."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

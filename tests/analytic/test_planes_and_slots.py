@@ -1,7 +1,5 @@
 """Balls on planes and pins in slots against closed forms: bounces, rolling and sliding, the Scotch yoke."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """One grammar of quantities: what a run holds is had by name everywhere, and equal to what is known."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from functools import cache

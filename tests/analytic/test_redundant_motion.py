@@ -1,7 +1,5 @@
 """Motion of mechanisms whose loops ask for the same thing several times, some of them for nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

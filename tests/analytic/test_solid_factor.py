@@ -1,7 +1,5 @@
 """Nested dissection and the multifrontal factors against dense linear algebra and SciPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp

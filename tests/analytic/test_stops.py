@@ -1,7 +1,5 @@
 """Ends of joint coordinates against closed forms: half sines, restitution, angles beyond a full turn."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Scenes that were tried from outside and came out wrong once; each beside its closed form, or refused in words."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Beams that turn: with geometric stiffening they are right, without it they are the linear theory."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

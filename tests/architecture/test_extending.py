@@ -4,8 +4,6 @@ Each is installed in a copy of the sources, a scene that names it runs there fro
 compared with a closed form. Uncompiled, because the scenes take some hundred evaluations, and compiling takes longer.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 from math import exp, sinh

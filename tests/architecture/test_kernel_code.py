@@ -1,7 +1,5 @@
 """Kernels are optimised and assembled with the function that Python calls, and nowhere else."""
 
-from __future__ import annotations
-
 import ast
 from collections import defaultdict
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """The shape of the project: where things are, who imports whom, how long a module may be."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re

@@ -1,7 +1,5 @@
 """What is taken from inside Numba is a gain of time, and no need: hidden, the same comes out of its public ways."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Named fields: compiled, interpreted and traced kernels read and write what `memory` declares."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numba import njit, types

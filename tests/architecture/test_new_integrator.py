@@ -1,7 +1,5 @@
 """A new integrator is one module and one line: a copy of the project with Heun's method added, used in every place."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 from collections.abc import Callable

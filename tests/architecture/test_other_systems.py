@@ -27,7 +27,7 @@ from tests.processes import python
 #: what of `os` and `signal` is not on Windows, or means something else there
 ELSEWHERE = (*rules.MODULES, *rules.FUNCTIONS, "SIGKILL", "link", "kill")
 #: the one module of each tree that may ask for them
-ONES = ("pipeline/core/system/platforms.py", "benchmarks/system.py")
+ONES = ("pipeline/core/system/platforms.py", "benchmarks/processes.py")
 
 
 def run(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:

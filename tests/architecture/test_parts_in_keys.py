@@ -1,7 +1,5 @@
 """Every part of every family is in the key of the runs that name it, with all that it imports and compiles."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Chains and trees of rods, and their accelerations with either way of factoring the mass matrix, made in Python."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kernels called from Python."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any

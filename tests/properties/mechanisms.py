@@ -1,7 +1,5 @@
 """Small mechanisms for tests, as scenes in tables of SI numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -59,8 +57,8 @@ def scene(bodies: Table, joints: Table, end: float = 0.2, rtol: float = 1e-12, *
     }
 
 
-def joint(kind: str, first: str, second: str) -> Table:
-    return {"type": kind, "between": [first, second]}
+def joint(kind: str, first: str, second: str, **more: Any) -> Table:
+    return {"type": kind, "between": [first, second], **more}
 
 
 def turned(R: np.ndarray, vector: Any) -> list[float]:

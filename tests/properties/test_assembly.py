@@ -1,7 +1,5 @@
 """Assembly from joints alone, on either branch, and what ``[start]`` may not say; nothing is compiled for that."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Mechanisms that cannot be are refused in words, before anything is compiled."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 from typing import Any
 

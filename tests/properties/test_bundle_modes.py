@@ -1,7 +1,5 @@
 """Modes: the same in every process, oriented and signed, whole clusters only, complete when asked."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

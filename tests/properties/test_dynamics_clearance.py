@@ -1,7 +1,5 @@
 """Forces of a clearance joint on the two bodies that it joins, at any relative motion, for every pair of laws."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -1,7 +1,5 @@
 """No contact is stepped over, however long the steps: a sprung ball swings a little beyond its socket's wall."""
 
-from __future__ import annotations
-
 from random import Random
 from typing import Any
 
@@ -12,37 +10,32 @@ from scipy.spatial.transform import Rotation
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
-from tests.properties.mechanisms import Table, joint, rigid, simulate
+from tests.properties.mechanisms import Table, joint, rigid, scene, simulate
 
 #: radius of the swing [m] and its rate [rad/s]; the period is 2 pi s
 SWING, RATE = 1.0, 1.0
 
 
-def scene(clearance: float, phase: float, solver: dict[str, Any]) -> Table:
+def sprung(clearance: float, phase: float, solver: dict[str, Any]) -> Table:
     """A ball on a spring along x, let go inside the socket at a phase of its swing, until it is back there."""
     along = {"axes": {"z": [1, 0, 0], "x": [0, 1, 0]}}
     start = {
         "pose": {"position": [SWING * np.sin(phase), 0.0, 0.0]},
         "velocity": [SWING * RATE * np.cos(phase), 0.0, 0.0],
     }
-    contact = {
-        **joint("clearance-spherical", "ground.socket", "ball.centre"),
-        "clearance": clearance,
-        "ball_radius": 0.5,
-        "normal": {"law": "hertz", "stiffness": 1e6},
-    }
-    return {
-        "title": "sprung ball",
-        "time": {"end": 2.0 * np.pi / RATE},
-        "output": {"interval": 10.0},
-        "solver": {**solver, "ledger_tolerance": 1.0},  # loose on purpose
-        "body": {
+    normal = {"law": "hertz", "stiffness": 1e6}
+    contact = joint("clearance-spherical", "ground.socket", "ball.centre", clearance=clearance, ball_radius=0.5)
+    return scene(
+        {
             "ground": {"type": "ground", "frames": {"socket": {}, "rail": along}},
             "ball": rigid(1.0, 0.1, {"centre": {}, "rail": along}, **start),
         },
-        "joint": {"rail": joint("prismatic", "ground.rail", "ball.rail"), "contact": contact},
-        "load": {"spring": {"type": "joint-spring", "joint": "rail", "stiffness": RATE**2}},
-    }
+        {"rail": joint("prismatic", "ground.rail", "ball.rail"), "contact": contact | {"normal": normal}},
+        end=2.0 * np.pi / RATE,
+        output={"interval": 10.0},
+        solver={**solver, "ledger_tolerance": 1.0},  # loose on purpose
+        load={"spring": {"type": "joint-spring", "joint": "rail", "stiffness": RATE**2}},
+    )
 
 
 @pytest.mark.parametrize("clearance", [0.9, 0.97, 0.995])
@@ -52,7 +45,7 @@ def scene(clearance: float, phase: float, solver: dict[str, Any]) -> Table:
 )
 def test_the_first_touch_is_found_at_any_tolerance(clearance: float, phase: float, solver: dict[str, Any]) -> None:
     """Steps of order 8 at loose tolerances are longer than the swing takes to and from the wall."""
-    run = simulate(scene(clearance, phase, solver))
+    run = simulate(sprung(clearance, phase, solver))
     touch = (np.arcsin(clearance / SWING) - phase) / RATE
     assert len(run.event_time) > 0
     # the error of a step is rtol of the swing, and the ball meets the wall at sqrt(1 - c^2) of its largest speed
@@ -67,7 +60,7 @@ def test_the_first_touch_is_found_in_a_step_of_many_clearances(clearance: float,
     gravity, below = 10.0, 0.3 * clearance
     up = np.sqrt(2.0 * gravity * (1.02 * clearance + below))
     touch = (up - np.sqrt(up**2 - 2.0 * gravity * (clearance + below))) / gravity
-    parts = scene(clearance, 0.0, solver)
+    parts = sprung(clearance, 0.0, solver)
     del parts["joint"]["rail"]
     parts["load"] = {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -gravity]}}
     parts["body"]["ground"]["frames"]["socket"] = {"position": [3.0, 0.0, 0.0]}
@@ -97,26 +90,17 @@ def graze(random: Random, rtol: float, unit: float = 0.0, depth: float = 0.0) ->
     def at(height: float) -> dict[str, object]:
         return {"position": (unit * height * turn[:, 2]).tolist(), "axes": axes}
 
-    table = {
-        "title": "graze",
-        "time": {"end": 3.0},
-        "output": {"interval": 0.5},
-        "body": {
-            "ground": {"type": "ground", "frames": {"o": at(0.0), "f": at(-0.1 - RADIUS + 0.1 * depth)}},
-            "b": {"type": "rigid", "mass": 1.0, "inertia": [1.0] * 3, "pose": at(0.1), "frames": {"c": {}}},
-        },
-        "joint": {
-            "p": {"type": "prismatic", "between": ["ground.o", "b.c"]},
-            "f": {
-                "type": "ball-on-plane",
-                "between": ["ground.f", "b.c"],
-                "ball_radius": unit * RADIUS,
-                "normal": {"law": "hertz", "stiffness": 1e8 / unit**0.5},
-            },
-        },
-        "load": {"s": {"type": "joint-spring", "joint": "p", "stiffness": FREQUENCY**2}},
-        "solver": {"rtol": rtol, "ledger_tolerance": 0.1},  # a few periods at 1e-3 gain a percent
-    }
+    ground = {"type": "ground", "frames": {"o": at(0.0), "f": at(-0.1 - RADIUS + 0.1 * depth)}}
+    normal = {"law": "hertz", "stiffness": 1e8 / unit**0.5}
+    plane = joint("ball-on-plane", "ground.f", "b.c", ball_radius=unit * RADIUS, normal=normal)
+    table = scene(
+        {"ground": ground, "b": rigid(1.0, 1.0, {"c": {}}, pose=at(0.1))},
+        {"p": joint("prismatic", "ground.o", "b.c"), "f": plane},
+        end=3.0,
+        output={"interval": 0.5},
+        load={"s": {"type": "joint-spring", "joint": "p", "stiffness": FREQUENCY**2}},
+        solver={"rtol": rtol, "ledger_tolerance": 0.1},  # a few periods at 1e-3 gain a percent
+    )
     return Scene.model_validate(table), 0.1 * unit * depth
 
 

@@ -1,7 +1,5 @@
 """Friction laws: what every one must do, whoever adds one."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Every joint type moves as its pose says."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Normal contact laws: what every one must do, whoever adds one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

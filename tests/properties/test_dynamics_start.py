@@ -1,7 +1,5 @@
 """Starts: what the scene gives is kept where the joints allow it, and refused where they do not."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Scene files of the worst kind: each refused in words, with place and remedy, and never by a traceback."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What post derives from runs: angles, deviations, horizons, impacts, sections."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -19,7 +17,7 @@ from flexclear.pipeline.core.numerics.rotations import (
     turning,
 )
 from flexclear.pipeline.post import derive
-from flexclear.pipeline.post.single_run.horizon import horizon, spread
+from flexclear.pipeline.post.single_run.series import horizon, spread
 from tests.paper import synthetic
 
 angles = st.floats(-1.5, 1.5)

@@ -1,7 +1,5 @@
 """Drives, laws, joints and loads that cannot be are refused before anything is compiled, in words."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Closed loops move alike wherever they stand, whatever their parts are called, in whatever units they are written."""
 
-from __future__ import annotations
-
 import tomllib
 from functools import cache
 from pathlib import Path

@@ -5,8 +5,6 @@ Free impact of a mass m: :math:`m\ddot\delta = -K\delta^n(1 + a\dot\delta/\dot\d
 :math:`w = -e` obeys :math:`\ln[(1+a)/(1-ae)] = a(1+e)` for every K, n, m and speed.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

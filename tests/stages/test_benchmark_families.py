@@ -1,7 +1,5 @@
 """The benchmarks as families: one entry, one log, pages that follow from the log alone."""
 
-from __future__ import annotations
-
 import io
 import json
 import sys

@@ -1,7 +1,5 @@
 """One file repeats elsewhere what a scene does here, and tells nothing of this machine."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil

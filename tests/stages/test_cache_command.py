@@ -1,12 +1,11 @@
 """``flexclear cache``: tells what is kept and whether it is whole, and removes nothing that is shown or needed."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
 import pytest
 
+import flexclear as fc
 from flexclear.commands import why
 from flexclear.pipeline.core.artifacts.disk import checked
 from flexclear.pipeline.core.artifacts.store import Record, Store
@@ -124,7 +123,57 @@ def test_results_of_another_processor_are_reported_and_are_fresh():
     assert why.elsewhere("simulate", Record("simulate", "a" * 32, {"nc": "b"}, {})) == []
 
 
-def test_the_record_of_a_run_names_its_processor(fresh: Path, command: Command):
-    command("run", "checks/pendulum", "-q", "--jobs", "1")
-    said = command("cache", "explain", fresh / "runs" / "checks" / "pendulum" / "run.nc").out
+# Files that are shown below results/runs ----------------------------------------------------------------------------
+
+SCENE = "checks/pendulum"
+
+
+@pytest.fixture
+def shown(fresh: Path, command: Command) -> Path:
+    command("run", SCENE, "-q", "--jobs", "1")
+    return fresh / "runs" / SCENE / "run.nc"
+
+
+def rot(path: Path) -> None:
+    """One byte changed, size and time as before."""
+    status = path.stat()
+    path.chmod(0o644)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(bytes(content))
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    path.chmod(0o444)
+
+
+def test_the_record_of_a_run_names_its_processor(shown: Path, command: Command):
+    said = command("cache", "explain", shown).out
     assert f"computed by processor: {machine.instruction_set()['processor']}" in said
+
+
+def test_bit_rot_in_a_shown_file_is_found_and_run_shows_it_again(shown: Path, command: Command):
+    good = shown.read_bytes()
+    command("cache", "check")
+    rot(shown)
+    assert "run.nc differs from what was shown" in command("cache", "check", code=4).out
+    with pytest.raises(fc.ResourceError, match="flexclear run checks/pendulum"):
+        fc.open(SCENE)
+    command("run", SCENE, "-q", "--jobs", "1")
+    assert shown.read_bytes() == good
+    assert "run" in fc.open(SCENE)
+
+
+@pytest.mark.parametrize("kind", ["shown", "artifact", "record", "lock"])
+def test_a_folder_in_the_place_of_a_file_is_renamed(shown: Path, fresh: Path, command: Command, kind: str):
+    artifact = next((fresh / "cache" / "simulate").glob("*.nc"))
+    places = {"shown": shown, "artifact": artifact}
+    places |= {"record": artifact.with_suffix(".json"), "lock": artifact.with_suffix(".lock")}
+    place, good = places[kind], shown.read_bytes()
+    place.unlink(missing_ok=True)
+    place.mkdir()
+    (place / "somebody's").write_text("kept")
+    if kind == "lock":
+        artifact.with_suffix(".json").unlink()
+    command("run", SCENE, "-q", "--jobs", "1")
+    assert shown.read_bytes() == good
+    assert [path.read_text() for path in fresh.rglob("somebody's")] == ["kept"]
+    command("cache", "prune")

@@ -1,7 +1,5 @@
 """What the command says to a user who made a mistake: place, value, rule, remedy, and the exit code."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

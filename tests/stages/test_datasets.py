@@ -13,7 +13,8 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
-from benchmarks.site import datasets, keys
+from benchmarks.site import keys
+from benchmarks.site import reference as datasets
 from benchmarks.site.__main__ import stale
 from flexclear.commands.__main__ import main
 from flexclear.commands.new import write

@@ -1,7 +1,5 @@
 """``flexclear doctor`` tells what is there, computes something with a known answer, and says when it does not."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

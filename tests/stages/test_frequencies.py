@@ -1,7 +1,5 @@
 """Equilibria and natural frequencies through the stages: what the command prints, what is kept, what is refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a machine cannot hold is refused before anything is computed, with exit code 4 and in words."""
 
-from __future__ import annotations
-
 import errno
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """What a process keeps of memory: many runs, as in a notebook, do not make it grow; a command is not given it anew."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

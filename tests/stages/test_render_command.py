@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.post.overview.overlay import colors
+from flexclear.pipeline.post.overview.comparison import colors
 from flexclear.stages.graph import Graph
 from tests.stages.conftest import Command
 

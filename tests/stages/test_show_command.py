@@ -1,7 +1,5 @@
 """``flexclear show``: the start pose with names, for every scene, without anything that computes or compiles."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -13,8 +11,7 @@ import flexclear as fc
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.render import gl, surfaces
 from flexclear.pipeline.post.render.ruler import pixels_per_metre, project, round_length
-from flexclear.pipeline.post.render.start_picture import columns, heights
-from flexclear.pipeline.post.render.start_view import AXIS, page_view
+from flexclear.pipeline.post.render.start_view import AXIS, columns, heights, page_view
 from tests.processes import printed
 from tests.stages.conftest import Command
 

@@ -1,7 +1,5 @@
 """The store: atomic, checked, deterministic, and honest about full disks."""
 
-from __future__ import annotations
-
 import errno
 import os
 import resource

@@ -1,7 +1,5 @@
 """Sweeps: their points have known answers, and none is run twice."""
 
-from __future__ import annotations
-
 import runpy
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The command at work on a copy of the project with small engines: what runs, when, and how often."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -15,6 +15,7 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile.folder import processor
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.progress_rate import Look
@@ -70,7 +71,7 @@ def in_order(rows: np.ndarray, contacts: int) -> np.ndarray:
 
     An event on an output time is one row, the later.
     """
-    time = m.record(rows, contacts).time
+    time = recording.record(rows, contacts).time
     order = np.argsort(time, kind="stable")
     return rows[order[np.append(np.diff(time[order]) > 0.0, True)]]
 

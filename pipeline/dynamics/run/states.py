@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project, rates_at_speeds
 
@@ -26,8 +26,8 @@ def rows_of(
     modes, latched: of the contacts, shape (contacts,), or one for all: open, without an impact rate.
     """
     contacts = len(engine.model.contacts)
-    rows = m.empty_record(len(states), contacts, engine.model.ny)
-    made = m.record(rows, contacts)
+    rows = recording.empty_record(len(states), contacts, engine.model.ny)
+    made = recording.record(rows, contacts)
     made.time[:], made.modes[:], made.latched[:], made.state[:] = time, modes, latched, states
     return rows
 

@@ -13,6 +13,7 @@ from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
@@ -50,7 +51,7 @@ def never(rows: np.ndarray) -> bool:
 class Trajectory:
     """What the stepper left.
 
-    rows: of the record (see `memory.record`); events: of the event table, by time.
+    rows: of the record (see `integrate.recording`); events: of the event table, by time.
     contacts: number of clearance joints.  selections: closure rows solved for, each from a time on.
     drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
@@ -72,12 +73,12 @@ class Trajectory:
     @property
     def time(self) -> np.ndarray:
         """Times of the rows [s], strictly increasing."""
-        return m.record(self.rows, self.contacts).time
+        return recording.record(self.rows, self.contacts).time
 
     @property
     def state(self) -> np.ndarray:
         """States, shape (rows, NY)."""
-        return m.record(self.rows, self.contacts).state
+        return recording.record(self.rows, self.contacts).state
 
     def parts(self) -> list[tuple[slice, np.ndarray]]:
         """Stretches of rows, each with the closure rows that were solved for to reach them."""
@@ -181,7 +182,7 @@ def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
 def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
     """A tape with its first row, and contacts that are closed at the start."""
     tape = _prepare(engine, y, engine.start, outputs)
-    first = m.record(tape.rows[:1], len(engine.model.contacts))
+    first = recording.record(tape.rows[:1], len(engine.model.contacts))
     first.time[:], first.state[:] = engine.start, y
     engine.n[m.N_RECORDED], engine.n[m.NEXT_OUTPUT] = 1, 1
     if engine.model.contacts:
@@ -222,7 +223,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
     n[m.CAP] = solver.evaluations
     engine.modes[:], engine.latched[:] = 0, 0.0
     room = EVENT_ROWS if contacts else m.ROOM
-    rows = m.empty_record(len(outputs) + room + m.ROOM, contacts, len(y))
+    rows = recording.empty_record(len(outputs) + room + m.ROOM, contacts, len(y))
     events = np.full((room + m.ROOM, m.EVENT.size), np.nan)
     return Tape(outputs, rows, events, [(t, _select(engine, y, t))])
 
@@ -239,7 +240,7 @@ def _leave_singular_start(engine: Engine, tape: Tape) -> None:
     """Leave a way out of the singular start to the stepper, and begin with the speeds of its branch."""
     from flexclear.pipeline.dynamics.run.singular_poses.beginning import start_motion  # which few mechanisms need
 
-    first = m.record(tape.rows[:1], len(engine.model.contacts)).state[0]
+    first = recording.record(tape.rows[:1], len(engine.model.contacts)).state[0]
     engine.select_pieces_after(engine.start)
     way = start_motion(engine, first.copy())
     way.lay(engine)

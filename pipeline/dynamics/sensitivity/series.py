@@ -15,6 +15,7 @@ import numpy as np
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
@@ -64,7 +65,7 @@ def derivatives(
 def moved(run: Differentiated, k: int, rows: np.ndarray, step: float) -> Differentiated:
     """Return some rows of a run, moved by a step along direction k."""
     some = run.trajectory.rows[rows]
-    record = m.record(some, run.trajectory.contacts)
+    record = recording.record(some, run.trajectory.contacts)
     record.state[:] += step * run.changes[rows, k]
     record.latched[:] += step * run.impact_rates[rows, k]
     return replace(run, trajectory=replace(run.trajectory, rows=some))
@@ -82,7 +83,7 @@ def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter) ->
         sides = [(family.changed(parameter, j * probe), moved(run, k, everything, j * probe)) for j in (-1, 1)]
         gaps = [observed(engine, side.trajectory).touch["gap"] for engine, side in sides]
         depth, change = -0.5 * (gaps[0] + gaps[1]), np.abs(gaps[1] - gaps[0]) / (2.0 * probe)
-        closed = (m.record(run.trajectory.rows, run.trajectory.contacts).modes == 1) & (depth > 0.0)
+        closed = (recording.record(run.trajectory.rows, run.trajectory.contacts).modes == 1) & (depth > 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             allowed = np.where(closed & (change > 0.0), OF_DEPTH * depth / change, np.inf)
         steps = np.minimum(steps, allowed.min(axis=1))

@@ -144,8 +144,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
 
 def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
     """Whether an error is so large that the reference can measure it; same shape as ``error_by_<group>``."""
-    mask: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
-    return mask
+    return study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
 
 
 def _reason(refused: xr.Dataset) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Inertia, Length, Mass, Part, Pose, Position
+from flexclear.pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position
 from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive, TurnedFrame
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
@@ -92,14 +92,15 @@ FRAME_ROTATION = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 class NodeFrame(TurnedFrame):
-    """A named frame at a node; default: z along the beam (x of the rod), x = y of the rod.
-
-    A pin across the beam needs other axes, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``, or
-    ``axis = [0, 0, 1]``; directions in the rod's axes.
-    """
+    """A named frame at a node."""
 
     x: Length
     """position along the rod, at a node"""
+    axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+    """as of a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod. A pin
+    across the beam needs others, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``"""
+    axis: Direction | None = None
+    """as of a pose, the direction of z alone: ``axis = [0, 0, 1]``"""
     default: ClassVar[np.ndarray] = FRAME_ROTATION
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
 from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, moved_start
@@ -64,7 +65,7 @@ def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
     sides = []
     for sign in (-1.0, 1.0):
         rows = trajectory.rows.copy()
-        m.record(rows, trajectory.contacts).state[:] += sign * steps[:, None] * changes
+        recording.record(rows, trajectory.contacts).state[:] += sign * steps[:, None] * changes
         sides.append(metric.motion(engine, rows))
     change = (sides[1] - sides[0]) / (2.0 * steps[:, None])
     largest = metric.norms(metric.motion(engine, trajectory.rows)).max(axis=0, initial=0.0)

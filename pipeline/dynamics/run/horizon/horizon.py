@@ -26,6 +26,7 @@ from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import TICK
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.observation import frames
@@ -175,7 +176,7 @@ class Pair:
 
     def _unseen(self) -> _Seen:
         model = self._looking.model
-        return _Seen(m.empty_record(0, len(model.contacts), model.ny), np.zeros((0, self._metric.entries)))
+        return _Seen(recording.empty_record(0, len(model.contacts), model.ny), np.zeros((0, self._metric.entries)))
 
     def _look(self, seen: _Seen) -> None:
         """Add the motion at the times of comparison that a run has come to since the last look."""
@@ -186,7 +187,7 @@ class Pair:
             seen.motion = np.concatenate([seen.motion, new])
 
     def _time(self, rows: np.ndarray) -> np.ndarray:
-        return m.record(rows, len(self._looking.model.contacts)).time
+        return recording.record(rows, len(self._looking.model.contacts)).time
 
     def _motion(self, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Motion at times of which there are rows, shape (time, entries)."""
@@ -226,7 +227,7 @@ class Metric:
     def motion(self, engine: Engine, rows: np.ndarray) -> np.ndarray:
         """Entries of all bodies in rows of the record [sqrt(J)], shape (row, entries)."""
         seen = frames(engine, rows).links
-        speeds = m.record(rows, len(engine.model.contacts)).state[:, engine.model.speeds]
+        speeds = recording.record(rows, len(engine.model.contacts)).state[:, engine.model.speeds]
         entries = [np.zeros((len(rows), 0))]
         for i, mass, com, turning, modes in self._bodies:
             R_WB, omega = seen["axes"][:, i], seen["omega"][:, i]

@@ -26,6 +26,7 @@ from flexclear.pipeline.core.scene.loads import SampledPid
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, assemble
 from flexclear.pipeline.dynamics.run.evaluation.straight_code import suited
@@ -160,7 +161,7 @@ class _Jumps:
         self.seen = int(engine.n[m.N_EVENTS])
         for event in events[np.isin(events["kind"], (m.CLOSING, m.OPENING)) & (events["time"] > engine.start)]:
             self._change_mode(engine, int(event["contact"]), closes=event["kind"] == m.CLOSING)
-        last = m.record(tape.rows[: engine.n[m.N_RECORDED]][-1:], len(engine.model.contacts))
+        last = recording.record(tape.rows[: engine.n[m.N_RECORDED]][-1:], len(engine.model.contacts))
         if last.time[0] == engine.control[m.TIME]:
             last.state[0, self.ny :] = engine.view(m.Y)[self.ny :]
 

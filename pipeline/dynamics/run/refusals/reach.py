@@ -18,6 +18,7 @@ import numpy as np
 
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
@@ -111,7 +112,7 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
     if not J.size or values[-1] > SINGULAR * values[0]:
         return ""
     moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > REST_FRACTION)
-    states = m.record(rows, len(model.contacts)).state
+    states = recording.record(rows, len(model.contacts)).state
     before, now = (np.abs(s[..., model.speeds] / model.speed_scales)[..., moving] for s in (states, y))
     if np.max(now, initial=0.0) > DYING * np.max(before, initial=0.0):
         return _too_fast(engine, t, where)

@@ -21,6 +21,7 @@ from numpy.polynomial import chebyshev
 from flexclear.pipeline.core.numerics.rotations import continued
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Blocks
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import ROUNDING as CLOSED
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe_with
@@ -294,7 +295,7 @@ def _open(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> float:
 
 def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
     """Whether a row of the record is so close to a singular pose that its accelerations and forces are rounding."""
-    one = m.record(row[None], len(engine.model.contacts))
+    one = recording.record(row[None], len(engine.model.contacts))
     seen = engine.attempt(one.state[0], float(one.time[0]))
     return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear
 
@@ -311,7 +312,7 @@ def observe_around(engine: Engine, row: np.ndarray, motion: Collocation, clear: 
     pieces = np.tile(engine.pieces[engine.segments(0.5 * (motion.start + motion.end), after=True)], (len(SIDES), 1))
     for k in range(DISTANCE_TRIES):
         rows = np.tile(row, (len(SIDES), 1))
-        rows_around = m.record(rows, len(engine.model.contacts))
+        rows_around = recording.record(rows, len(engine.model.contacts))
         rows_around.time[:] += FIRST_DISTANCE * motion.span * WIDER**k * SIDES
         rows_around.state[:] = motion.states(rows_around.time)
         if not any(blurred(engine, side, clear) for side in rows):
