@@ -187,7 +187,7 @@ def test_a_worker_that_dies_in_the_opening_check_is_not_one_that_lacks_this_prog
         sweep_engine._threads(Cluster({"tcp://b": OSError("Address removed.")}, {}), "there")
     with pytest.raises(InputError, match="tcp://b cannot import flexclear"):
         sweep_engine._threads(Cluster({**fine, "tcp://b": ModuleNotFoundError("flexclear")}), "there")
-    monkeypatch.setattr(sweep_engine, "PATIENCE", 0.3)
+    monkeypatch.setattr(sweep_engine, "SCHEDULER_TIMEOUT", 0.3)
     with pytest.raises(ResourceError, match="tcp://b does not answer"):
         sweep_engine._threads(Cluster({**fine, "tcp://b": OSError("timed out")}), "there")
 
