@@ -147,12 +147,9 @@ def equilibrium(
     Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium.
     """
     from flexclear.pipeline.dynamics.linear import dataset
-    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as at_rest
-    from flexclear.pipeline.dynamics.linear.steady import steady
+    from flexclear.pipeline.dynamics.linear.equilibrium import balanced
 
-    if not moving:
-        return dataset.equilibrium(*at_rest(scene, bundles, progress, time, drives), moving)
-    bench, rest, _ = steady(scene, bundles, progress, time, drives)
+    bench, rest, _ = balanced(scene, bundles, progress, time, drives, moving)
     return dataset.equilibrium(bench, rest, moving)
 
 
@@ -166,11 +163,8 @@ def frequencies(
 ) -> xr.Dataset:
     """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
     from flexclear.pipeline.dynamics.linear import dataset
-    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as at_rest
-    from flexclear.pipeline.dynamics.linear.steady import steady
+    from flexclear.pipeline.dynamics.linear.equilibrium import balanced
     from flexclear.pipeline.dynamics.linear.vibrations import vibrations
 
-    if moving:
-        return dataset.linear(*steady(scene, bundles, progress, time, drives), moving)
-    bench, rest = at_rest(scene, bundles, progress, time, drives)
-    return dataset.linear(bench, rest, vibrations(bench, rest.at), moving)
+    bench, rest, small = balanced(scene, bundles, progress, time, drives, moving)
+    return dataset.linear(bench, rest, small or vibrations(bench, rest.at), moving)

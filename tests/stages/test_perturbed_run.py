@@ -76,8 +76,7 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(
         return hear(self, rows)
 
     def late_twin(self: Pair, twin: Any, alive: Progress) -> bool:
-        with self._news:
-            assert self._news.wait_for(lambda: self._ended, PATIENCE)
+        assert self._ended.wait(PATIENCE)
         return enough(self, twin, alive)
 
     if ahead == "twin":
@@ -234,8 +233,7 @@ def test_both_are_stopped_in_good_order_and_go_on_to_the_same_bits(
             stopping.request("the time is over")
 
     def late_twin(self: Pair, twin: Any, alive: Progress) -> bool:
-        with self._news:
-            assert self._news.wait_for(lambda: self._ended, PATIENCE)
+        assert self._ended.wait(PATIENCE)
         stopping.request("the time is over")
         return False
 

@@ -122,7 +122,7 @@ class _Plan:
         conditions = {n: self._condition(e) for n, e in due.items() if not isinstance(e.at, float)}
         watch = Watch(engine, y, conditions, known)
         begins = _energies(engine, y, t)
-        phase = Phase(None, t, t, begins, begins, watch.coordinates)
+        phase = Phase(None, t, begins, begins, watch.coordinates)
         if watch.held and start.before is None:
             name = watch.held[0]
             raise InputError(

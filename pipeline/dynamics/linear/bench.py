@@ -26,6 +26,7 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
 from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, mass_factor
 from flexclear.pipeline.dynamics.run.run import begun, driven
+from flexclear.pipeline.dynamics.run.states import rows_of
 
 Pose = TypeVar("Pose")
 
@@ -105,10 +106,7 @@ def hold(
     if not moving:
         last[:, 1] = 0.0
     for name, value in (drives or {}).items():
-        if name not in model.drives:
-            remedy = suggestion(name, list(model.drives)) if model.drives else "the scene has no drives"
-            raise InputError(f"drive '{name}'", "there is no such drive", remedy)
-        k = model.drives.index(name)
+        k = drive_number(model, name)
         last[k, 0] = model.drive_signs[k] * value
     engine.modes[:], engine.latched[:] = 1, NO_IMPACT
     first[:, 1] = 0.0
@@ -117,6 +115,14 @@ def hold(
     q = carry(bench, closed(bench, start[: model.nq]), last[:, 0])
     set_drives(bench, last)
     return replace(bench, drives=last), q
+
+
+def drive_number(model: Model, name: str) -> int:
+    """Number of a drive; InputError where there is none of this name."""
+    if name not in model.drives:
+        remedy = suggestion(name, list(model.drives)) if model.drives else "the scene has no drives"
+        raise InputError(f"drive '{name}'", "there is no such drive", remedy)
+    return model.drives.index(name)
 
 
 def drive_state(engine: Engine, time: float) -> np.ndarray:
@@ -184,11 +190,7 @@ def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarra
 
 def rows(bench: Bench, states: np.ndarray) -> np.ndarray:
     """Rows of the record for states; contacts act as they are."""
-    contacts = len(bench.model.contacts)
-    made = m.empty_record(len(states), contacts, bench.model.ny)
-    record = m.record(made, contacts)
-    record.time[:], record.modes[:], record.latched[:], record.state[:] = bench.time, 1, NO_IMPACT, states
-    return made
+    return rows_of(bench.engine, states, bench.time, 1.0, NO_IMPACT)
 
 
 def observe(bench: Bench, states: np.ndarray) -> Observed:
@@ -223,14 +225,15 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     forces = bias(engine)
     if not np.all(np.isfinite(forces)):
         raise SolverError(f"at t = {bench.time:.6g} s: the forces are not numbers in this pose")
+    slip = engine.view(m.RESIDUAL_RATE)[selection.kept_places(engine.model, engine.h)]
+    return Balance(modes_of(engine.model.arrays) @ forces, *inertia(engine), slip)
+
+
+def inertia(engine: Engine) -> tuple[np.ndarray, np.ndarray]:
+    """Mass and Jacobian of the rows solved for in the state evaluated last, shapes (nv, nv) and (rows, nv)."""
     modes = modes_of(engine.model.arrays)
     L = modes @ mass_factor(engine)
-    return Balance(
-        modes @ forces,
-        L @ L.T,
-        engine.rows(m.JACOBIAN) @ modes.T,
-        engine.view(m.RESIDUAL_RATE)[selection.kept_places(engine.model, engine.h)],
-    )
+    return L @ L.T, engine.rows(m.JACOBIAN) @ modes.T
 
 
 def balancing(bench: Bench) -> float:

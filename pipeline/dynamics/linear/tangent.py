@@ -72,25 +72,32 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     """The free motions at positions q whose loops are closed; SolverError where these are far beyond any real pose."""
     b, forces = balance(bench, q), balancing(bench)
     try:
-        lower = np.linalg.cholesky(b.mass)
+        Z, lower, spread = free_motions(b.mass, b.jacobian)
     except np.linalg.LinAlgError:
         raise SolverError(
             f"at t = {bench.time:.6g} s: bodies are so far deformed that the mass matrix is not positive definite"
         ) from None
-    spread = scipy.linalg.solve_triangular(lower, b.jacobian.T, lower=True).T
-    scale = np.linalg.norm(spread, axis=1)
-    rows = spread[scale > 0.0] / scale[scale > 0.0, None]
-    rank, free = 0, np.eye(len(b.bias))
-    if len(rows):
-        _, values, axes = np.linalg.svd(rows)
-        rank = int(np.sum(values > REDUNDANT_ROW * values[0]))
-        free = axes[rank:].T
-    Z = scipy.linalg.solve_triangular(lower.T, free)
     load = scipy.linalg.solve_triangular(lower, b.bias, lower=True)
     multipliers = np.linalg.lstsq(spread.T, load, rcond=REDUNDANT_ROW)[0] if len(spread) else np.zeros(0)
     moves = displacement_map(bench, q)
-    redundant = len(b.jacobian) - rank + bench.engine.mobility.redundant
+    redundant = len(b.jacobian) - (len(b.bias) - Z.shape[1]) + bench.engine.mobility.redundant
     return Tangent(q, Z, moves, b.bias, b.mass, multipliers, redundant, forces)
+
+
+def free_motions(mass: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Z, shape (nv, mobility); the mass' factor L, and J L^-T.
+
+    Raises LinAlgError for a mass that is not positive definite.
+    """
+    lower = np.linalg.cholesky(mass)
+    spread = scipy.linalg.solve_triangular(lower, jacobian.T, lower=True).T
+    scale = np.linalg.norm(spread, axis=1)
+    rows = spread[scale > 0.0] / scale[scale > 0.0, None]
+    free = np.eye(len(mass))
+    if len(rows):
+        _, values, axes = np.linalg.svd(rows)
+        free = axes[int(np.sum(values > REDUNDANT_ROW * values[0])) :].T
+    return scipy.linalg.solve_triangular(lower.T, free), lower, spread
 
 
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -154,12 +154,12 @@ class Piece:
         arrays["events"] = tape.events[: n[m.N_EVENTS]].copy()
         arrays["selections"] = np.array([rows for _, rows in tape.selections])
         for k, laid in enumerate(tape.collocations):
-            arrays[f"series{k}"], arrays[f"independence{k}"] = laid.series, laid.independence
+            arrays[f"series{k}"] = laid.series
         notes = {
             "done": done,
             "room": [len(tape.rows), len(tape.events)],
             "selections": [float(time) for time, _ in tape.selections],
-            "collocations": [[laid.start, laid.span, laid.evaluations] for laid in tape.collocations],
+            "collocations": [[laid.start, laid.span] for laid in tape.collocations],
             "passes": [[getattr(one, item.name) for item in fields(one)] for one in tape.passes],
             "doubted": sorted(tape.doubted),
             "looks": [list(one) for one in tape.looks],
@@ -180,10 +180,7 @@ class Piece:
             np.zeros((rows, state.grown.shape[1])),
             np.full((events, m.EVENT.size), np.nan),
             list(zip(notes["selections"], arrays["selections"], strict=True)),
-            [
-                Collocation(start, span, arrays[f"series{k}"], arrays[f"independence{k}"], evaluations)
-                for k, (start, span, evaluations) in enumerate(notes["collocations"])
-            ],
+            [Collocation(a, b, arrays[f"series{k}"]) for k, (a, b) in enumerate(notes["collocations"])],
             [Pass(*one) for one in notes["passes"]],
             set(notes["doubted"]),
             [Look(*one) for one in notes["looks"]],
@@ -251,17 +248,7 @@ def _arrays(left: Handover | None) -> Iterator[np.ndarray]:
     """What decides how another method continues; nothing of how singular poses were passed before does."""
     if left is None:
         return
-    here = left.here
-    yield from (
-        here.y,
-        here.modes,
-        here.latched,
-        here.watched,
-        left.counters,
-        left.lasting,
-        left.tape.rows,
-        here.events,
-    )
+    yield from (*vars(left.here).values(), left.counters, left.lasting, left.tape.rows)
     for time, rows in left.tape.selections:
         yield np.array([time])
         yield rows

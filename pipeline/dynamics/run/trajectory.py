@@ -92,10 +92,6 @@ class Trajectory:
         dropped = np.isin(self.time, times) & ~np.isin(self.time, self.events["time"])
         return replace(self, rows=self.rows[~dropped]) if dropped.any() else self
 
-    def selection(self, row: int) -> np.ndarray:
-        """Closure rows that were solved for to reach a row."""
-        return next(selected for part, selected in self.parts() if part.start <= row < part.stop)
-
 
 #: the engine that came to the end, what it followed, and why it is not the one that began
 Followed = tuple[Engine, Trajectory, str]

@@ -24,13 +24,13 @@ from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
-from flexclear.pipeline.dynamics.run.displacement import per_speed
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, project
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian
 from flexclear.pipeline.dynamics.run.run import driven
+from flexclear.pipeline.dynamics.run.states import per_speed, rows_of
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
 
 #: a pin has its final position when it is this fraction of the clearance from it; passes in which that is reached, at
@@ -137,11 +137,7 @@ def _modal_speeds(engine: Engine) -> list[int]:
 
 def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray]:
     """Force of every joint on its second body at the start [N], world axes, by name."""
-    contacts = len(engine.model.contacts)  # with stops
-    rows = m.empty_record(1, contacts, len(y))
-    start = m.record(rows, contacts)
-    start.time[:], start.state[:] = engine.start, y
-    seen = observe(engine, rows, after=True)
+    seen = observe(engine, rows_of(engine, y[None], engine.start), after=True)
     return {name: wrench[1][0] for name, wrench in joint_wrenches(Motions(engine.model, seen)).items()}
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -86,11 +86,14 @@ def _given(values: np.ndarray) -> Any:
 def _begun(scene: Scene, modal: dict[str, ModalStart]) -> Start:
     """The start without what the poses say now."""
     old = scene.start if scene.start is not None else Start()
-    rates = {
-        joint: {
-            name: JointStart(velocity=one.velocity) for name, one in coordinates.items() if one.velocity is not None
-        }
-        for joint, coordinates in old.joint.items()
+    rates = joint_starts(old, lambda one: None if one.velocity is None else JointStart(velocity=one.velocity))
+    return old.model_copy(update={"at": None, "joint": rates, "modal": modal})
+
+
+def joint_starts(start: Start, left: Callable[[JointStart], JointStart | None]) -> dict[str, dict[str, JointStart]]:
+    """What is left of what a start says of each joint coordinate, by joint."""
+    made = {
+        joint: {name: new for name, one in coordinates.items() if (new := left(one)) is not None}
+        for joint, coordinates in start.joint.items()
     }
-    nonempty = {joint: coordinates for joint, coordinates in rates.items() if coordinates}
-    return old.model_copy(update={"at": None, "joint": nonempty, "modal": modal})
+    return {joint: coordinates for joint, coordinates in made.items() if coordinates}

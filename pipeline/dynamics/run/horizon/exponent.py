@@ -15,11 +15,11 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.displacement import askew
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
 from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, moved_start
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, Direction
+from flexclear.pipeline.dynamics.run.states import askew
 
 #: batches of the exponent's error, and Student's t of their number at 95 %
 EXPONENT_BATCHES, STUDENT = 10, 2.262
@@ -31,13 +31,10 @@ STATE_CHANGE = 1e-6
 class Growth:
     """How a change of the start grows.
 
-    time [s], separation: predicted for a perturbed run, a fraction of the largest motion; (n,).  exponent, error: the
-    mean growth of its logarithm over the run and half of the 95 % interval, from batch means [1/s].  horizon [s]: end
-    of the run where the separation is never visible.
+    exponent, error: the mean growth of its logarithm over the run and half of the 95 % interval, from batch means
+    [1/s].  horizon [s]: when a perturbed run would be visibly separated; end of the run where it never is.
     """
 
-    time: np.ndarray
-    separation: np.ndarray
     exponent: float
     error: float
     horizon: float
@@ -75,7 +72,7 @@ def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
     time, span = trajectory.time, engine.end - engine.start
     first = lasting(time, separation > SEPARATED, LASTING * span)
     mean, error = _slope(time, np.log(np.maximum(np.linalg.norm(change, axis=1), 1e-300)))
-    return Growth(time, separation, mean, error, engine.end if first is None else float(time[first]))
+    return Growth(mean, error, engine.end if first is None else float(time[first]))
 
 
 def _far(engine: Engine) -> np.ndarray:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from threading import Condition
+from threading import Event
 
 import numpy as np
 
@@ -26,10 +26,10 @@ from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import TICK
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.run.displacement import displaced, per_speed
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.observation import frames
+from flexclear.pipeline.dynamics.run.states import displaced, per_speed
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
 
 #: the two are compared at about this many times, which bounds the cost; where outputs are rarer, between them as well
@@ -73,8 +73,7 @@ class Pair:
         self.times = np.union1d(self.outputs[:: max(1, len(self.outputs) // SAMPLES)], self.outputs[-1])
         self._engine, self._looking = another(engine), another(engine)
         self._metric = Metric(engine)
-        self._run, self._news = self._unseen(), Condition()
-        self._complete, self._ended = False, False
+        self._run, self._complete, self._ended = self._unseen(), False, Event()
 
     def run(self, steps: Callable[[Stop, np.ndarray], Followed]) -> Followed:
         """Result of the run that takes these steps, without the rows that serve comparisons alone."""
@@ -88,9 +87,7 @@ class Pair:
                 stopped.partial = engine, trajectory.without(self.added)
             raise
         finally:
-            with self._news:
-                self._ended = True
-                self._news.notify_all()
+            self._ended.set()
         return engine, trajectory.without(self.added), switched
 
     def perturbed_run(
@@ -112,7 +109,7 @@ class Pair:
             other.rows = steps(engine, moved_start(engine, start), enough, self.outputs)[1].rows
         except SolverError:
             failed = True
-        self._wait(lambda: self._ended, alive)
+        self._await_run(alive)
         time, separation, horizon = self._compared(other)
         if failed and horizon is None:
             # a neighbour that cannot be run says nothing for the run itself: no value is predictable
@@ -121,38 +118,31 @@ class Pair:
 
     def _hear(self, rows: np.ndarray) -> bool:
         """Note the rows that the run has so far; it continues."""
-        with self._news:
-            self._run.rows = rows
-            self._news.notify_all()
+        self._run.rows = rows
         return False
 
     def _enough(self, other: _Seen, alive: Progress) -> bool:
         """Whether the perturbed run has gone far enough beyond the horizon.
 
         What is visible depends on the largest motion of the whole run. Where the two are separated by the largest one
-        so far, the perturbed run waits for the run instead of going on, since that seldom changes.
+        so far, the perturbed run waits for the run to end instead of going on, since that seldom changes.
         """
-        while True:
-            with self._news:
-                complete, ended, known = self._complete, self._ended, self._run.rows
-            self._look(self._run)
-            self._look(other)
-            first = self._separated(self._separation(other))
-            if first is None or self._time(other.rows)[-1] < self._judged(first):
-                return False
-            if complete or ended:
-                return complete
-            self._wait_beyond(known, alive)
+        if not self._beyond(other):
+            return False
+        self._await_run(alive)
+        return self._complete and self._beyond(other)
 
-    def _wait_beyond(self, known: np.ndarray, alive: Progress) -> None:
-        """Wait until the run has more rows than the known ones, or has ended."""
-        self._wait(lambda: self._ended or self._run.rows is not known, alive)
+    def _beyond(self, other: _Seen) -> bool:
+        """Whether the two have been visibly separated for long enough, by what is known of the run."""
+        self._look(self._run)
+        self._look(other)
+        first = self._separated(self._separation(other))
+        return first is not None and bool(self._time(other.rows)[-1] >= self._judged(first))
 
-    def _wait(self, until: Callable[[], bool], alive: Progress) -> None:
-        """Wait for news of the run; a run that fails before it begins sends none."""
-        with self._news:
-            while not self._news.wait_for(until, TICK):
-                alive(None, "")
+    def _await_run(self, alive: Progress) -> None:
+        """Wait for the end of the run; one that fails before it begins has none."""
+        while not self._ended.wait(TICK):
+            alive(None, "")
 
     def _compared(self, other: _Seen) -> tuple[np.ndarray, np.ndarray, float | None]:
         """Times of comparison [s], separation and the horizon [s], when both have ended; None where they stay close."""

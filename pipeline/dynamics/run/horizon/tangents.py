@@ -68,17 +68,13 @@ def differentiate(
     y: np.ndarray,
     directions: Sequence[Direction],
     progress: Progress,
-    outputs: np.ndarray | None = None,
 ) -> Differentiated:
-    """Run from a consistent start with derivatives along directions; SolverError where there are none.
-
-    outputs: times [s], as of `trajectory.integrate`.
-    """
+    """Run from a consistent start with derivatives along directions; SolverError where there are none."""
     model, count, ny = engine.model, len(directions), engine.model.ny
     mine, jumps = differentiated_engine(engine, directions), _Jumps(ny, count)
     start = np.concatenate([y, *(direction.start for direction in directions)])
     try:
-        whole = integrate(mine, start, progress, outputs=outputs, jumps=jumps)
+        whole = integrate(mine, start, progress, jumps=jumps)
     except UnsuitedError as error:
         raise SolverError(f"the equations of this mechanism are not differentiated: {error}") from None
     if whole.collocations:

@@ -1,10 +1,18 @@
 """Ends of a motion at a singular pose: a drive that pulls a loop further than it reaches, a rest in the pose, and what
-moves too fast there for a branch to be followed."""
+moves too fast there for a branch to be followed.
+
+A drive that leads a loop with ideal joints out of reach ends the run there. With clearance the contact gives way
+instead, in ever shorter steps, millions of which friction's slope at rest may ask for. What it must come to is a matter
+of geometry: the least depth at the drives' positions, over all that they leave free. It is followed from the pose that
+the run has come to along the drives' laws.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +21,8 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import project
+from flexclear.pipeline.dynamics.run.states import per_speed
 
 #: least singular value of the closures, as fraction of the largest, above which a pose is not yet at the end of reach;
 #: and above which it is not singular
@@ -21,6 +31,15 @@ END_OF_REACH, SINGULAR = 0.1, 1e-3
 REST_FRACTION, DYING = 0.1, 0.1
 #: at the end of reach speeds grow beyond bounds: so much faster than the drives' a loop does not move elsewhere
 FASTER = 40.0
+#: times ahead at which the least depth is searched for
+TIMES_AHEAD = 60
+#: a search proceeds in so many boxes of this half width, in fractions of the mechanism's size or in rad: coordinates
+#: of a box are those of the loops' tangents in its middle
+BOXES, HALF_WIDTH = 60, 0.1
+#: a depth is the least when another box takes off less than this fraction of it
+LEAST_GAIN = 1e-3
+#: of the search in a box, in which depths are fractions of that in its middle, so that no size of a mechanism matters
+OPTIONS: Any = {"eps": 1e-6}
 
 
 @contextmanager
@@ -54,7 +73,6 @@ def require_shallow(engine: Engine) -> None:
     shorter steps: the run would be refused at its end, if it ever came there.  The memory stays as it is.
     """
     from flexclear.pipeline.dynamics.contact.validity import SHALLOW, pressed_through
-    from flexclear.pipeline.dynamics.run.refusals.overtravel import forced_depth
 
     model, t = engine.model, float(engine.control[m.TIME])
     with preserved(engine):
@@ -66,10 +84,11 @@ def require_shallow(engine: Engine) -> None:
         if text := pressed_through(contact.words, contact.joint, float(depth)):
             remedy = "choose a stiffer contact, a slower impact or smaller loads"
             raise SolverError(f"at t = {t:.6g} s: {text}: {f'{away}; else {remedy}' if pulled else remedy}")
-        if not (pulled and model.mechanism.all_rigid and depth > SHALLOW * contact.joint.radius > 0.0):
+        shallow = SHALLOW * contact.joint.radius
+        if not (pulled and model.mechanism.all_rigid and depth > shallow > 0.0):
             continue
         with preserved(engine):
-            time, least = forced_depth(engine, k)
+            time, least = forced_depth(engine, k, shallow)
         if least:
             raise SolverError(
                 f"at t = {t:.6g} s: {contact.words}: the surfaces are {depth:.3g} m deep in each other, and "
@@ -158,3 +177,64 @@ def _pulling(engine: Engine) -> str | None:
 
 def _shorten(drive: str) -> str:
     return f"shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"
+
+
+def forced_depth(engine: Engine, contact: int, shallow: float) -> tuple[float, float]:
+    """When contact number `contact` must be deeper [m] than its inner radius, and how deep then; else (inf, 0).
+
+    From the stepper's state on, if the contact is deeper than `shallow` [m] already; rigid bodies only, since others
+    bend instead. Searches are local, as the motion is.  The memory is not preserved.
+    """
+    model, t = engine.model, float(engine.control[m.TIME])
+    radius, y = model.contacts[contact].joint.radius, engine.view(m.Y).copy()
+    try:
+        for time in np.linspace(t, engine.end, TIMES_AHEAD + 1)[:-1]:
+            y, depth = _shallowest(replace(engine, start=float(time)), y, contact, shallow)
+            if depth > radius:
+                return float(time), depth
+    except SolverError:
+        pass  # other loops do not reach so far either: the run will show it
+    return np.inf, 0.0
+
+
+def _shallowest(engine: Engine, y: np.ndarray, contact: int, enough: float) -> tuple[np.ndarray, float]:
+    """A state nearby in which the contact is least deep, or no deeper than `enough`; and how deep [m].
+
+    Drives are where they are at the engine's start.
+    """
+    y = project(engine, y)
+    depth = _depth(engine, y, contact)
+    for _ in range(BOXES):
+        if depth <= enough:
+            break
+        there, less = _shallower(engine, y, contact, depth)
+        if not less < (1.0 - LEAST_GAIN) * depth:
+            break
+        y, depth = there, less
+    return y, depth
+
+
+def _shallower(engine: Engine, y: np.ndarray, contact: int, depth: float) -> tuple[np.ndarray, float]:
+    """The same in the box about a state in which it is so deep."""
+    from scipy.optimize import minimize  # slow to import, and few runs come here
+
+    nq, scales = engine.model.nq, engine.model.speed_scales[: engine.model.nv]
+    ways = per_speed(engine, y, lambda rates: rates[:nq]) * scales
+
+    def there(x: np.ndarray) -> np.ndarray:
+        moved = y.copy()
+        moved[:nq] += ways @ x
+        return project(engine, moved)
+
+    def fraction(x: np.ndarray) -> float:
+        return _depth(engine, there(x), contact) / depth
+
+    box = [(-HALF_WIDTH, HALF_WIDTH)] * len(scales)
+    least = minimize(fraction, np.zeros(len(scales)), method="L-BFGS-B", bounds=box, options=OPTIONS)
+    return there(least.x), float(least.fun) * depth
+
+
+def _depth(engine: Engine, y: np.ndarray, contact: int) -> float:
+    """How deep the contact is [m]."""
+    engine.attempt(y, engine.start)
+    return -float(engine.table(m.TOUCH)["gap"][contact])

@@ -127,7 +127,7 @@ def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
     fastest = float(np.max(np.abs(rate / sampler.engine.model.state_scales), initial=0.0))
     lead = Lead(lambda at: y + (at - t) * rate, TURNING_BACK)
     for k in range(REACH_HALVINGS if fastest > 0.0 else 0):
-        made = collocate(sampler, t, y, _within(sampler, t, FIRST_REACH / fastest * 0.5**k), None, lead)
+        made = collocate(sampler, t, y, _within(sampler, t, FIRST_REACH / fastest * 0.5**k), lead)
         if made is not None:
             return made
     return None

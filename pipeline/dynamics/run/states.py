@@ -1,6 +1,6 @@
-"""Small displacements of a state at an engine's start, as drives and loops allow them.
+"""States of an engine: as rows of the record, and displaced a little from its start as drives and loops allow it.
 
-They follow from the rates at speeds, less those at the speeds of the drives alone: no step width enters.
+Displacements follow from the rates at speeds, less those at the speeds of the drives alone: no step width enters.
 """
 
 from __future__ import annotations
@@ -9,8 +9,27 @@ from collections.abc import Callable
 
 import numpy as np
 
+from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project, rates_at_speeds
+
+
+def rows_of(
+    engine: Engine,
+    states: np.ndarray,
+    time: float | np.ndarray,
+    modes: float | np.ndarray = 0.0,
+    latched: float | np.ndarray = 0.0,
+) -> np.ndarray:
+    """Rows of the record for states, shape (rows, NY), at a time or times [s].
+
+    modes, latched: of the contacts, shape (contacts,), or one for all: open, without an impact rate.
+    """
+    contacts = len(engine.model.contacts)
+    rows = m.empty_record(len(states), contacts, engine.model.ny)
+    made = m.record(rows, contacts)
+    made.time[:], made.modes[:], made.latched[:], made.state[:] = time, modes, latched, states
+    return rows
 
 
 def per_speed(engine: Engine, y: np.ndarray, read: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
