@@ -151,8 +151,8 @@ def sweep(
     >>> import flexclear as fc
     >>> where = {"load.gravity.acceleration.1": [-9.81, -1.62]}  # on the earth, and on the moon
     >>> kept, short = ["bob.velocity.largest"], {"time.end": "0.2 s"}
-    >>> found = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
-    >>> found["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
+    >>> result = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
+    >>> result["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
     [1.954, 0.324]
     """
     from flexclear.commands import sweep as sweep_command
@@ -173,9 +173,15 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
     The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
     why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
     """
-    from flexclear.commands import sections as sections_command
+    from flexclear.commands import scenes
+    from flexclear.stages.graph import Graph
+    from flexclear.stages.workplace import open_workplace
 
-    return sections_command.judge(_loaded(scene))
+    one = _loaded(scene)
+    graph = Graph(one, shown=scenes.as_in_its_file(one))
+    made = open_workplace().datasets(graph.sections, graph.verdict, jobs=1)
+    recorded, verdict = (data.assign_attrs(title=one.title, scene=one.name) for data in made)
+    return recorded, verdict
 
 
 def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str]) -> xr.Dataset:
@@ -189,13 +195,16 @@ def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str
 
     >>> import flexclear as fc
     >>> short = fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"})
-    >>> found = fc.sensitivities(short, ["bob.velocity.final"], ["load.gravity.acceleration.1"])
-    >>> found["bob.velocity.final"].sel(parameter="load.gravity.acceleration.1").values.shape
+    >>> result = fc.sensitivities(short, ["bob.velocity.final"], ["load.gravity.acceleration.1"])
+    >>> result["bob.velocity.final"].sel(parameter="load.gravity.acceleration.1").values.shape
     (3,)
     """
     from flexclear.commands import scenes
+    from flexclear.stages.graph import Graph
+    from flexclear.stages.workplace import open_workplace
 
-    return scenes.sensitivities(_loaded(scene), of, to)
+    scenes.examine(one := _loaded(scene))
+    return open_workplace().datasets(Graph(one, shown=False).sensitivities(of, to), jobs=1)[0]
 
 
 def quantity(run: xr.Dataset, name: str) -> xr.DataArray:
@@ -250,8 +259,8 @@ def frequencies(
     vibrations about steady motion at each of them (schema CAMPBELL).  drive: its name, where several drives move.
 
     >>> import flexclear as fc
-    >>> found = fc.frequencies("scenes/checks/oscillator.toml")
-    >>> round(found["frequency"].item(), 4), round(found["damping_ratio"].item(), 6)  # [Hz], [-]
+    >>> result = fc.frequencies("scenes/checks/oscillator.toml")
+    >>> round(result["frequency"].item(), 4), round(result["damping_ratio"].item(), 6)  # [Hz], [-]
     (1.5836, 0.1)
     """
     from flexclear.commands import scenes
@@ -312,9 +321,12 @@ def plan(
 
 def render(scene: Scene | str | Path) -> Path:
     """The folder with the scene's pictures, film and mode shapes, brought up to date.  Raises FlexclearError."""
-    from flexclear.commands import render as render_command
+    from flexclear.commands import scenes
+    from flexclear.stages.graph import Graph
+    from flexclear.stages.workplace import open_workplace
 
-    return render_command.rendered(_loaded(scene))
+    scenes.require_names(one := _loaded(scene))
+    return open_workplace().made(*Graph(one).render.values(), jobs=1)[0].folder
 
 
 def show(scene: Scene | str | Path, folder: str | Path | None = None) -> Any:
@@ -342,10 +354,13 @@ def report(scene: Scene | str | Path, budget: str | float | None = None, *, answ
     """
     from flexclear.commands import report as report_command
     from flexclear.commands import scenes
+    from flexclear.stages.graph import Graph
     from flexclear.stages.workplace import open_workplace, seconds
 
     given = None if budget is None else seconds(budget, "budget")
-    return report_command.of_scene(scenes.graph(_loaded(scene)), open_workplace(), budget=given, answers=answers)
+    scenes.examine(one := _loaded(scene))
+    graph = Graph(one, shown=one.path is None or scenes.as_in_its_file(one))
+    return report_command.of_scene(graph, open_workplace(), budget=given, answers=answers)
 
 
 def open(scene: Scene | str | Path) -> xr.DataTree:

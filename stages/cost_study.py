@@ -71,10 +71,10 @@ def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any])
     from flexclear.pipeline.post.cost.study import believed, cost, relative_errors
     from flexclear.pipeline.post.cost.work_precision import Mark
 
-    reference, found = runs[next(p.key for p in points if p.group == "reference")], []
+    reference, marks = runs[next(p.key for p in points if p.group == "reference")], []
     for name, group in (("this scene", "sampling"), ("paper's choice", "paper")):
         run = next((runs[p.key] for p in points if p.group == group and "refused" not in runs[p.key].attrs), None)
         if run is not None:
             errors = relative_errors(run, reference, chosen, believed(points, runs))
-            found.append(Mark(name, cost(run, "cpu_seconds"), errors))
-    return tuple(found)
+            marks.append(Mark(name, cost(run, "cpu_seconds"), errors))
+    return tuple(marks)

@@ -30,7 +30,7 @@ from benchmarks.page import Columns, table
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import read_checked
 from flexclear.pipeline.core.artifacts.store import Store, read_record
-from flexclear.pipeline.core.workflow.journal import Journal, State
+from flexclear.pipeline.core.workflow.journal import Journal
 from flexclear.pipeline.dynamics.compile.files import CODE, compiled
 
 SCENE = "checks/pendulum"
@@ -221,9 +221,8 @@ def _unfinished(folder: Path) -> list[Path]:
     import numpy as np
 
     journal = Journal(folder / "parts", "key")
-    journal.write(
-        "piece", State({"w": np.random.default_rng(1).normal(size=2000)}, {"done": False}, np.ones((500, 20)))
-    )
+    journal.store("piece", lambda: {"w": np.random.default_rng(1).normal(size=2000), "rows": np.ones((500, 20))})
+    journal.write()
     return sorted((folder / "parts").iterdir())
 
 

@@ -7,7 +7,7 @@ from benchmarks.site.text import table
 from flexclear.pipeline.core.artifacts import schema as artifacts
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
 from flexclear.pipeline.core.artifacts.schema import Schema
-from flexclear.pipeline.core.scene.variable import Variable
+from flexclear.pipeline.core.scene.output import Variable
 from flexclear.pipeline.post.sections.verdict import VERDICT
 from flexclear.pipeline.post.single_run.schema import POST
 
@@ -48,7 +48,7 @@ the recipes run as tests.
 - **Times.** The rows of a run are the regular outputs, and besides them breaks of drives, events and the deepest points
   of contacts.
 - **Attributes.** `title`; `source`, the version that made the file; `references`, publications of the methods that
-  the scene's parts stand for; `parameters` of the scene as JSON; `versions` of libraries; `warnings`. `sources` and
+  the scene's parts represent; `parameters` of the scene as JSON; `versions` of libraries; `warnings`. `sources` and
   `assumptions`, where the values of the scene and of its recipes come from, are attributes of post.nc and of what
   `flexclear.run` returns, so that another sentence there runs nothing again. No file holds the time or the machine of
   its making: equal inputs give equal bytes.

@@ -16,10 +16,6 @@ from flexclear.pipeline.core.scene.sweep import Sweep
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.structure.fe.recipe import Recipe
 
-#: how `Field` describes what may be written as a number or with a unit
-_QUANTITY = re.compile(r"(?:^|; )([a-z ]+): SI number, or text with a unit$")
-_VECTORS = ("length", "angular velocity", "velocity", "number", "acceleration", "angle")
-_OWN_UNIT = "SI number, or text with a unit that fits where the law is"
 #: unit of a bare number
 SI = {
     "length": "m",
@@ -119,7 +115,6 @@ def _references(node: Any) -> Iterator[str]:
 def _section(name: str, definitions: dict[str, Any], examples: dict[str, str]) -> str:
     part = definitions[name]
     entry = str(part.get("description", "")).partition("\n\n")[0].replace("\n", " ")
-    entry = re.split(r"(?<=\.) +\w[\w, ]*: ", entry)[0]
     key = _kind(part)
     example = f"```toml\n{examples[key]}\n```\n\n" if key in examples else ""
     return f"## {_heading(name, part)}\n\n{entry}\n\n{_table(part, definitions)}\n\n{example}"
@@ -165,10 +160,7 @@ def _default(entry: dict[str, Any]) -> str:
 
 
 def _meaning(entry: dict[str, Any]) -> str:
-    text = _QUANTITY.sub("", str(entry.get("description", ""))).removesuffix(_OWN_UNIT).removesuffix("; ")
-    for vector in _VECTORS:
-        text = text.removesuffix(f"; {vector}")
-    return text.replace("\n", " ")
+    return " ".join(str(entry.get("description", "")).split())
 
 
 def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
@@ -186,9 +178,8 @@ def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
             if set(_references(entry)) >= _LAW_KINDS and len(kinds) > 1:
                 return f"[law of time](#{_anchor('Constant', definitions)}), or a constant value"
             return " or ".join(dict.fromkeys(kinds))
-    quantity = _QUANTITY.search(str(entry.get("description", "")))
-    if quantity is not None:
-        return _with_unit(quantity[1])
+    if "format" in entry:
+        return _with_unit(entry["format"])
     return _plain(entry, definitions)
 
 
@@ -200,10 +191,9 @@ def _with_unit(quantity: str) -> str:
 def _plain(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
     kind = entry.get("type")
     if kind == "array":
-        vector = next((v for v in _VECTORS if str(entry.get("description", "")).endswith(v)), "")
-        if vector:
-            return f"three components, {_with_unit(vector)}"
         inner = entry.get("items") or (entry.get("prefixItems") or [{}])[0]
+        if "format" in inner and entry.get("maxItems") == 3:
+            return f"three components, {_with_unit(inner['format'])}"
         return f"list of {_value(inner, definitions)}" if inner else "list"
     if kind == "object":
         inner = entry.get("additionalProperties")

@@ -35,7 +35,7 @@ TIMES, LEAST = 3.0, 30.0
 AT_ONCE, COMPILING = 2.0, 4.0
 #: of variants without a clearance or a flexible body, the kernels of so many are compiled next to the scene's own run
 AHEAD = 2
-#: tolerance of members with contacts, at most so tight: they start a thousandth of the clearance apart
+#: tolerance of members with contacts, at most so tight: their starts differ by a thousandth of the clearance
 MEANS = 1e-7
 #: members with which effects are compared: more of them until the difference is decided or the budget is used
 MEMBERS = (4, 8, 16, 32)
@@ -244,8 +244,8 @@ class _Comparison:
         alone = {e.name: self._closed({e.name}) for e in self.effects}
         ideal = self._closed({e.name for e in self.effects if e.kind in (CLEARANCE, FLEXIBILITY)})
         both = {IDEAL: ideal} if ideal and (loose(self.scene) or self.scene.flexible()) else {}
-        order = sorted(alone, key=lambda name: _kind(self.effects, name) not in (CLEARANCE, FLEXIBILITY))
-        return both | {name: alone[name] for name in order}
+        order = sorted(self.effects, key=lambda effect: effect.kind not in (CLEARANCE, FLEXIBILITY))
+        return both | {effect.name: alone[effect.name] for effect in order}
 
     def _closed(self, names: set[str]) -> frozenset[str]:
         """With the effects that are nothing without one that is gone."""
@@ -293,7 +293,3 @@ class _Comparison:
             self.took[name] = float(stored.attrs["cpu_seconds"]) / (members if self._touching(name) else 1)
             if not self._repeats(name, names[:k]):
                 self.spent += self._seconds(name, members) + float(stored.attrs["compile_seconds"]) / AT_ONCE
-
-
-def _kind(effects: Sequence[Effect], name: str) -> str:
-    return next(effect.kind for effect in effects if effect.name == name)

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 from flexclear.commands import scenes
 from flexclear.pipeline.core.scene import lines
-from flexclear.pipeline.core.scene.file_kinds import RECIPE, SCENE, SWEEP, kind_of_file
 from flexclear.pipeline.core.scene.limits import Limits
-from flexclear.pipeline.core.scene.load import compose, read_toml
+from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, kind_of_file, read_toml
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError, InputErrors, ResourceError
 from flexclear.stages import meshing, rigid_body
@@ -38,11 +37,11 @@ MISTAKES = (InputError, ResourceError)
 #: larger files of meshes, and meshes with more unknowns, are left to the run [bytes, unknowns]
 LARGEST_FILE, LARGEST_MESH = 20 << 20, 150_000
 #: extents of a mesh from a file beyond which its unit of length is doubted [m]
-SMALLEST, LARGEST = 1e-3, 10.0
+SMALLEST_MESH_SIZE, LARGEST_MESH_SIZE = 1e-3, 10.0
 #: parts that a mechanism does not need in order to fit together
 ACTING = ("[load.", "[gear.", "[stop.")
 #: unused frames that are listed
-LISTED = 3
+LISTED_FRAMES = 3
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -128,17 +127,20 @@ def _of_scene(path: Path, settings: Sequence[str] = ()) -> tuple[list[FlexclearE
         scene = scenes.loaded(str(path), settings)
     except MISTAKES as error:
         errors += _each(error)
-    recipes = _collect(_recipes(path))
-    errors += recipes
+    # a recipe that several bodies name is meshed once
+    mesh_of = cache(partial(meshed, limits=Limits() if scene is None else scene.limits))
+    bodies = compose(path).get("body", {}).values()
+    for mesh in dict.fromkeys(body["mesh"] for body in bodies if isinstance(body.get("mesh"), str)):
+        errors += mesh_of(Path(mesh))[1].errors
     if scene is None:
         return _once(errors), Seen()
     errors += _collect([lambda: Graph(scene).up_to("post")], path)
     errors += _collect(_laws(scene), path)
     warnings, summary = scenes.implausibilities(scene, settings), scene.summary()
     if not errors:
-        found = computed(scene)
-        errors, warnings = found.errors, [*warnings, *found.warnings]
-        summary = "; ".join([summary, *found.notes])
+        findings = computed(scene, mesh_of)
+        errors, warnings = findings.errors, [*warnings, *findings.warnings]
+        summary = "; ".join([summary, *findings.notes])
     return _once(errors), Seen(summary, tuple(warnings))
 
 
@@ -160,41 +162,17 @@ def _of_sweep(path: Path) -> tuple[list[FlexclearError], Seen]:
 
 def _of_recipe(path: Path) -> tuple[list[FlexclearError], Seen]:
     """A recipe is examined as where a scene names it, with the limits of a scene that says none."""
-    errors = _collect([lambda: meshing.check_size(path, Limits())])
-    if any(isinstance(error, ResourceError) for error in errors):  # what is too large is not meshed
-        return errors, Seen()
-    body, found = meshed(path)
-    errors = _once([*errors, *found.errors])
-    if errors:
-        return errors, Seen()
+    body, findings = meshed(path)
+    if findings.errors:
+        return _once(findings.errors), Seen()
     table = meshing.params(path)["recipe"]
     frames = ", ".join(table.get("frames", {})) or "none"
     text = f"a mesh recipe, {table['shape']['type']}, frames: {frames}"
     text += f", mass {float(body.rigid.mass):.6g} kg" if body is not None else ""
-    return [], Seen(text, tuple(found.warnings))
+    return [], Seen(text, tuple(findings.warnings))
 
 
 OTHERS = {SWEEP: _of_sweep, RECIPE: _of_recipe}
-
-
-def _recipes(path: Path) -> Iterator[Callable[[], Any]]:
-    """A check for each mesh recipe that a scene names, also of a scene with other mistakes."""
-    from flexclear.pipeline.structure.fe.recipe import read_recipe
-
-    bodies = compose(path).get("body", {})
-    meshes = dict.fromkeys(body["mesh"] for body in bodies.values() if isinstance(body.get("mesh"), str))
-    for mesh in meshes:
-        if meshing.kind_of(Path(mesh)) == "beam":  # lays out the nodes at which frames and masses have to lie, too
-            yield partial(_beam, Path(mesh))
-        else:
-            yield partial(read_recipe, Path(mesh))
-
-
-def _beam(path: Path) -> None:
-    from flexclear.pipeline.structure.fe import beam_mesh
-    from flexclear.pipeline.structure.fe.recipe import parse, read_recipe
-
-    beam_mesh.build(parse(read_recipe(path), str(path)), path.parent, str(path))
 
 
 def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
@@ -271,10 +249,14 @@ class Body:
     interfaces: tuple[str, ...]
 
 
-def computed(whole: Scene) -> Findings:
+#: what gives `meshed` of a recipe
+MeshOf = Callable[[Path], tuple[Body | None, Findings]]
+
+
+def computed(whole: Scene, mesh_of: MeshOf) -> Findings:
     """Meshes and requested modes of a scene whose recipes can be read, and the mechanism made of them."""
     seen = Findings()
-    bodies = dict(_bodies(whole, seen))
+    bodies = dict(_bodies(whole, seen, mesh_of))
     for name, body in whole.flexible().items():
         if name in bodies:
             seen.attempt(partial(_modes, bodies[name], body), partial(_of_modes, whole, name))
@@ -286,19 +268,19 @@ def computed(whole: Scene) -> Findings:
     return seen
 
 
-def meshed(path: Path) -> tuple[Body | None, Findings]:
-    """A mesh recipe: its mesh, where that can be made in seconds, and what is to be said of it."""
+def meshed(path: Path, limits: Limits | None = None) -> tuple[Body | None, Findings]:
+    """A mesh recipe: its mesh, where that is allowed and can be made in seconds, and what is to be said of it."""
     seen = Findings()
     made: list[Body] = []
-    seen.attempt(lambda: made.extend(_meshed(path, seen)), lambda error: error)
+    if seen.attempt(partial(meshing.check_size, path, limits or Limits()), lambda error: error):
+        seen.attempt(lambda: made.extend(_meshed(path, seen)), lambda error: error)
     return (made[0] if made else None), seen
 
 
-def _bodies(whole: Scene, seen: Findings) -> Iterator[tuple[str, Body]]:
-    """Bodies with a mesh; a recipe that several of them name is meshed once."""
-    once = cache(meshed)
+def _bodies(whole: Scene, seen: Findings, mesh_of: MeshOf) -> Iterator[tuple[str, Body]]:
+    """Bodies with a mesh."""
     for name, path in whole.recipes().items():
-        body, of_recipe = once(Path(path))
+        body, of_recipe = mesh_of(Path(path))
         seen.errors += [error for error in of_recipe.errors if error not in seen.errors]
         seen.warnings += [warning for warning in of_recipe.warnings if warning not in seen.warnings]
         if body is not None:
@@ -334,8 +316,8 @@ def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[In
     if not isinstance(shape, dict) or shape.get("type") != "mesh-file":
         return
     size, unit = float(np.ptp(mesh["node_position"].values, axis=0).max()), shape.get("length_unit")
-    if not SMALLEST <= size <= LARGEST:
-        other = "mm" if size > LARGEST else "m"
+    if not SMALLEST_MESH_SIZE <= size <= LARGEST_MESH_SIZE:
+        other = "mm" if size > LARGEST_MESH_SIZE else "m"
         yield InputError(
             f"{path} [shape.length_unit]",
             f"with lengths in {unit} the mesh is {size:.4g} m long",
@@ -390,8 +372,8 @@ def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) -> No
         seen.warnings.append(_in_file(whole, InputError(f"[body.{body}]", text, remedy)))
     unused = unused_frames(mechanism)
     if unused:
-        more = f" and {len(unused) - LISTED} more" if len(unused) > LISTED else ""
-        seen.notes.append(f"frames that nothing uses: {', '.join(unused[:LISTED])}{more}")
+        more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
+        seen.notes.append(f"frames that nothing uses: {', '.join(unused[:LISTED_FRAMES])}{more}")
 
 
 def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:

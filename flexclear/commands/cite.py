@@ -1,7 +1,7 @@
 """``flexclear cite``: sources of the methods and data that a scene uses, from the modules that it reaches.
 
-What every run of the scene imports is apart from what functions import where they need it: another integrator where the
-scene's own is too slow, singular poses, accuracies, frequencies.
+What every run of the scene imports is listed separately from what functions import where they need it: another
+integrator where the scene's own is too slow, singular poses, accuracies, frequencies.
 """
 
 from __future__ import annotations

@@ -72,7 +72,9 @@ def bring(
             "one scene alone is compared with nothing",
             "name several, or compare it with its ideal mechanism: --ideal",
         )
-    graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(_labels(sides), sides, strict=True)}
+    names = [side.name for side in sides]
+    labels = [name if names.count(name) == 1 else f"{name} ({k + 1})" for k, name in enumerate(names)]
+    graphs = {label: Graph(side, shown=side in scenes) for label, side in zip(labels, sides, strict=True)}
     runs = workplace.bring([*(graph.simulate for graph in graphs.values()), *alongside])
     check(replace(runs, failures=tuple(failure for failure in runs.failures if failure.task not in alongside)))
     # their kernels are there now, so that these do not compile side by side what the first ones did
@@ -114,11 +116,6 @@ def parts(made: Made) -> list[Part]:
         Part("differences", "Differences and errors", tables),
         Part("runs", "Side by side", pictures(made, PICTURES)),
     ]
-
-
-def _labels(sides: list[Scene]) -> list[str]:
-    names = [side.name for side in sides]
-    return [name if names.count(name) == 1 else f"{name} ({k + 1})" for k, name in enumerate(names)]
 
 
 def _task(graphs: Mapping[str, Graph], tight: Mapping[str, Task]) -> Task:

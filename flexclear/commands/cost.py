@@ -46,7 +46,7 @@ BUDGET, POINT, COMPILING = 100.0, 0.6, 8.0
 #: a point may take so many times the evaluations of the scene's own run, or this fraction of the budget if that is more
 MOST_EVALUATIONS = 10.0
 #: of runs that were left undone, so many are named
-LISTED = 6
+LISTED_RUNS = 6
 #: tables of a study, in the order in which they are printed
 PRINTED = ("price.md", "quantities.md", "causes.md", "statistics.md")
 #: figures of a study and their titles
@@ -148,7 +148,8 @@ class Study:
         """Make the points farther away, the cheapest first, as far as the budget goes."""
         scene, more = self.scene, cost_design.wide(self.scene, self.integrators)
         if self.models and scene.flexible():
-            more += cost_design.models(scene, self.setting, _highest(scene, self.workplace))
+            bundles = scenes.bundles(scene, self.workplace, jobs=None).values()
+            more += cost_design.models(scene, self.setting, max(float(one["frequency"].max()) for one in bundles))
         there = {design.key for design in (*self.points, *self.undone)}
         more = [design for design in more if design.key not in there]
         self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
@@ -335,15 +336,10 @@ def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> No
         publish(page, markdown(tuple(sections), f"{page.as_posix()}{options}").encode())
 
 
-def _highest(scene: Scene, workplace: Workplace) -> float:
-    """The highest frequency in the bundles of a scene with flexible bodies [Hz]; they are made first."""
-    return max(float(bundle["frequency"].max()) for bundle in scenes.bundles(scene, workplace, jobs=None).values())
-
-
 def _listed(keys: Sequence[str]) -> str:
     """The first of many, and how many more there are."""
-    more = f" and {len(keys) - LISTED} more" if len(keys) > LISTED else ""
-    return "; ".join(keys[:LISTED]) + more
+    more = f" and {len(keys) - LISTED_RUNS} more" if len(keys) > LISTED_RUNS else ""
+    return "; ".join(keys[:LISTED_RUNS]) + more
 
 
 def _bundles(design: cost_design.Design) -> dict[str, Task]:

@@ -4,6 +4,7 @@ evidence."""
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +13,8 @@ from typing import TYPE_CHECKING, Any
 from flexclear.commands import export, scenes
 from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.coupling import lessened
 from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.variants import lessened
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.stages import effect_plan, watched_quantities
 from flexclear.stages.workplace import FailedTasksError, Made, Workplace, open_workplace, seconds
@@ -185,7 +186,7 @@ def bring(scene: Scene, workplace: Workplace) -> Planned:
 
 def of(scene: Scene, plan: xr.Dataset) -> Scene:
     """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities set."""
-    decided = effect_plan.from_dataset(plan)
+    decided = json.loads(plan.attrs["planned"])
     bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
     fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
@@ -239,8 +240,8 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
     print(as_markdown(verified(compared)))
     if planned.scene.accuracy is not None and planned.scene.accuracy.allow_missed:
         return []
-    found = [agreement_of(compared, k) for k in range(compared.sizes["quantity"])]
-    columns = zip(compared["quantity"].values, compared["unit"].values, found, strict=True)
+    verdicts = [agreement_of(compared, k) for k in range(compared.sizes["quantity"])]
+    columns = zip(compared["quantity"].values, compared["unit"].values, verdicts, strict=True)
     return [
         f"{planned.scene.name}: the plan misses {name}: {one.error:.3g} instead of {one.allowed:.3g} {unit}"
         for name, unit, one in columns
@@ -285,7 +286,7 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
         return time.monotonic() - begun + first[0] * members / MEMBERS[0] <= budget
 
     loose = planned.scene.contacts() or planned.scene.stop
-    found, members = until_decided(compared, MEMBERS if loose else MEMBERS[:1], affordable)
+    verdicts, members = until_decided(compared, MEMBERS if loose else MEMBERS[:1], affordable)
     for name in ("error", "chance", "allowed", "horizon"):
-        result[name] = (("quantity",), [getattr(one, name) for one in found])
+        result[name] = (("quantity",), [getattr(one, name) for one in verdicts])
     return result.assign_attrs(members=members if loose else 0)

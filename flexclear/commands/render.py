@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.commands import scenes
@@ -15,7 +14,7 @@ from flexclear.stages.rendering import FORMATS
 from flexclear.stages.workplace import check, open_workplace, relative
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.core.scene.schema import Scene
+    pass
 
 #: what is made where nothing is asked for
 USUAL = (("motion", "png"), ("motion", "mp4"), ("motion", "html"), ("modes", "html"))
@@ -98,10 +97,3 @@ def _mode_sets(graphs: list[Graph]) -> Task:
         inputs=bundles,
         folder=f"compare/{scenes.joined([graph.scene.name for graph in graphs])}",
     )
-
-
-def rendered(scene: Scene) -> Path:
-    """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
-    scenes.require_names(scene)
-    made = open_workplace().made(*Graph(scene).render.values(), jobs=1)
-    return made[0].folder

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from flexclear.stages.graph import Graph
 
 #: what a report shows of the motion, by the names of `Graph.render`
-SHOWN = ("motion mp4", "motion html", "modes html")
+SHOWN_MOTION = ("motion mp4", "motion html", "modes html")
 #: general figures, in this order: caption, and what a reader who does not see them reads
 FIGURES = {
     "motion.png": ("Motion", "Displacement, velocity and rotation of the bodies over time"),
@@ -58,7 +58,7 @@ FIGURES = {
     "watched.png": ("Watched quantities", "What the scene watches, over time"),
     "energy.png": ("Energy", "Energies over time, and the error of their balance"),
 }
-#: of a run's attributes, those that tell how it was made, and what they are called
+#: of a run's attributes, those that say how it was made, and what they are called
 COST = {
     "method": "integrator",
     "method_reason": "why this one",
@@ -149,7 +149,7 @@ def of_scene(
     if loose(scene) or scene.flexible():
         with in_file(scene.path):
             compared = compare.bring([scene], workplace, "both", answering.kernels() if answers else ())
-    drawn = [task for what, task in graph.render.items() if what in SHOWN]
+    drawn = [task for what, task in graph.render.items() if what in SHOWN_MOTION]
     members = [graph.ensemble, graph.post] if graph.ensemble else []
     outcome = workplace.bring([*drawn, graph.overview, *members])  # the film takes longest, so it begins first
     if any(failure.task not in [*drawn, *members] for failure in outcome.failures):

@@ -40,7 +40,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--planned", action="store_true", help="plan first, and run what the requested accuracy calls for"
     )
-    parser.add_argument("--verify", action="store_true", help="with --planned: run the full scene, tell the true error")
+    parser.add_argument(
+        "--verify", action="store_true", help="with --planned: run the full scene, report the true error"
+    )
 
 
 def command(options: argparse.Namespace) -> None:

@@ -8,16 +8,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.commands.export import as_json
-from flexclear.commands.scenes import as_in_its_file, check_target, graphs, scene_arguments
+from flexclear.commands.scenes import check_target, graphs, scene_arguments
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, open_workplace
+from flexclear.stages.workplace import open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.pipeline.core.scene.schema import Scene
 
 #: options and the keys of `[sections]` that they replace
 COUNTS = {"periods": "recorded periods", "transient": "periods before them that are not"}
@@ -38,7 +37,8 @@ def command(options: argparse.Namespace) -> None:
     if options.page is not None:
         check_target(options.page, "--page")
     workplace = open_workplace(options)
-    scenes = [with_sections(graph.scene, asked) for graph in graphs(options.scenes, options.set)]
+    changes = {f"sections.{key}": value for key, value in asked.items()}
+    scenes = [edited(graph.scene, changes) if asked else graph.scene for graph in graphs(options.scenes, options.set)]
     tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
     judged = dict(zip(tasks, workplace.made(*(graph.verdict for graph in tasks.values())), strict=True))
     verdicts = {name: made.dataset() for name, made in judged.items()}
@@ -46,12 +46,6 @@ def command(options: argparse.Namespace) -> None:
     if options.page is not None:
         sections = dict(zip(tasks, workplace.datasets(*(graph.sections for graph in tasks.values())), strict=True))
         write_page(verdicts, sections, {n: made.read("sections.png") for n, made in judged.items()}, options.page)
-
-
-def with_sections(scene: Scene, asked: Mapping[str, object]) -> Scene:
-    """The scene with some keys of `[sections]` replaced, whether it has that table or not."""
-    present = {} if scene.sections is None else scene.sections.model_dump(mode="json", exclude_none=True)
-    return edited(scene, {"sections": {**present, **asked}}) if asked else scene
 
 
 def write_page(
@@ -67,15 +61,6 @@ def write_page(
             publish(folder / f"{name.replace('/', '_')}.png", picture)
         publish(folder / "verdicts.csv", csv_text(verdicts).encode())
         publish(page, markdown(verdicts, sections, page.as_posix(), page.stem).encode())
-
-
-def judge(scene: Scene, workplace: Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:
-    """Sections (schema SECTIONS) and verdict (schema VERDICT) of a scene, brought up to date as `run` is."""
-    workplace = workplace or open_workplace()
-    graph = Graph(scene, shown=as_in_its_file(scene))
-    made = workplace.datasets(graph.sections, graph.verdict, jobs=1)
-    sections, judged = (data.assign_attrs(title=scene.title, scene=scene.name) for data in made)
-    return sections, judged
 
 
 def text(scene: str, verdict: xr.Dataset) -> str:

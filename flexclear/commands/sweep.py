@@ -122,7 +122,7 @@ class _Desk:
     def __post_init__(self) -> None:
         self.refused = sum(bool(point.refused) for point in self.done.values())
 
-    def take(self, finished: Sequence[tuple[Job, Point]], tell: Callable[[float, str], None]) -> None:
+    def take(self, finished: Sequence[tuple[Job, Point]], report: Callable[[float, str], None]) -> None:
         """Note finished points."""
         self.waiting += finished
         self.done |= {job.key: sweep_large.stripped(point) if self.large else point for job, point in finished}
@@ -133,7 +133,7 @@ class _Desk:
             self.store()
         text = f", {self.refused} refused" if self.refused else ""
         rate = self.fresh / since if since > 0.0 else 0.0
-        tell(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{text}, {rate:.3g}/s")
+        report(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{text}, {rate:.3g}/s")
 
     def store(self) -> None:
         """Put what waits into the cache, family by family."""

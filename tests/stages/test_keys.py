@@ -311,6 +311,7 @@ def test_words_do_not_count_and_code_does(edit: str):
     [
         ("pipeline/core/system/platforms.py", ('"""', '"""More words. ')),
         ("pipeline/core/scene/registry.py", ('"""', '"""More words. ')),
+        ("pipeline/core/scene/clearance.py", ("Young's modulus", "modulus of elasticity")),
         ("pipeline/core/scene/validation_errors.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
         ("pipeline/core/scene/citations.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
     ],

@@ -18,10 +18,10 @@ from flexclear.commands import plan
 from flexclear.commands.new import write
 from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.coupling import uncoupled
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.variants import uncoupled
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.linear.clearance_response import SQUARED_RANK, bounds, lever_of

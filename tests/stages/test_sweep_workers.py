@@ -108,7 +108,7 @@ class Mortal:
         self.renewed += 1
 
     def run(self, told: list[int]) -> None:
-        jobs = [sweep_engine.Job(str(n), "family", {"n": n}, Path(str(n))) for n in range(40)]
+        jobs = [sweep_engine.Job(str(n), "family", {"n": n}) for n in range(40)]
         engine = sweep_engine.Engine(self.submit, lambda: 2, renew=self.renew)
         engine.run(jobs, {"family": b""}, lambda found, _: told.extend(point.evaluations for _, point in found))
 
@@ -161,7 +161,7 @@ def test_two_workers_finish_together():
         future.set_result(([Point({}, {}, {}, 0) for _ in points], 0.036 * len(points)))
         return future
 
-    jobs = [sweep_engine.Job(str(n), "family", {}, Path(str(n))) for n in range(80)]
+    jobs = [sweep_engine.Job(str(n), "family", {}) for n in range(80)]
     sweep_engine.Engine(submit, lambda: 2).run(jobs, {"family": b""}, lambda *_: None)
     assert sum(sizes) == 80
     assert sum(busy) / max(busy) >= 1.9  # found 2.00; without the smaller ones at the end 1.86

@@ -16,7 +16,7 @@ from typing import Any, get_args
 from flexclear.pipeline.core.system.errors import InputError
 
 #: most names that a hint lists
-LISTED = 40
+LISTED_NAMES = 40
 #: longer names are compared with none
 LONGEST_NAME = 100
 
@@ -37,7 +37,7 @@ ELSEWHERE = (
     ),
     (("sine", "sin", "cosine", "sinusoidal"), "harmonic", ""),
     (("mu", "coefficient"), "dynamic", ""),
-    (("frames",), "mesh", "frames of a flexible body stand in its recipe"),
+    (("frames",), "mesh", "frames of a flexible body are in its recipe"),
     (("mass", "inertia", "com", "density"), "mesh", "of a flexible body they follow from its recipe"),
 )
 
@@ -93,5 +93,5 @@ def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
     if matches:
         return f"did you mean '{matches[0]}'?"
     names = sorted(known)
-    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-    return "known: " + ", ".join(names[:LISTED]) + more if names else "there are none"
+    more = f" and {len(names) - LISTED_NAMES} more" if len(names) > LISTED_NAMES else ""
+    return "known: " + ", ".join(names[:LISTED_NAMES]) + more if names else "there are none"

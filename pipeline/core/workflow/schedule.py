@@ -1,4 +1,4 @@
-"""Brings tasks up to date over the cores there are: fresh ones are found, stale ones run as soon as
+"""Brings tasks up to date over the cores there are: fresh ones are recognised, stale ones run as soon as
 their inputs are there."""
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ GRACE = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A task that could not be done: the exit code and what to tell the user."""
+    """A task that could not be done: the exit code and what the user reads."""
 
     task: Task
     exit_code: int
@@ -272,7 +272,7 @@ def _work(
 ) -> Record | Failure:
     """In a worker: the same as in `_alone`, with progress sent home."""
     root, source, memo = where
-    cores.tell(others_idle)
+    cores.set_idle(others_idle)
 
     def progress(fraction: float | None, text: str) -> None:
         reports.put((name, fraction, text))
@@ -300,11 +300,12 @@ def attempt(
 
 
 def _left(task: Task, stopped: StoppedError, store: Store) -> str:
-    """Message about a task that was stopped: what there is of it, and that it can continue."""
-    text = f"{stopped}; run it again, and it continues from there"
+    """Message about a task that was stopped, and what there is of it."""
     time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
-    if time is not None:  # else it is of a part of the work, such as a member of an ensemble, and no dataset
-        path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
-        if path is not None:
-            text += f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)"
-    return text
+    if time is None:  # it is of a part of the work, such as a member of an ensemble, and no dataset
+        return f"{stopped}; run it again, and what is finished of it is not computed again"
+    path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
+    there = (
+        f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)" if path is not None else ""
+    )
+    return f"{stopped}; run it again{there}"

@@ -18,12 +18,11 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts import effect_size
 from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
 from flexclear.pipeline.core.scene.quantity import KINDS, OF_CLEARANCE, Quantity, parse
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
+from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, lessened, uncoupled
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE, bounds

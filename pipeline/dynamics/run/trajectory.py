@@ -18,7 +18,7 @@ from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapping
-from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Moment, Piece, Selections, Tape, in_order, piece
+from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Moment, Selections, Tape, in_order
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, crawls, look
 from flexclear.pipeline.dynamics.run.refusals import refusal
 from flexclear.pipeline.dynamics.run.refusals.reach import require_shallow
@@ -117,34 +117,21 @@ def integrate(
 ) -> Trajectory:
     """The trajectory from a consistent start; SolverError when the stepper gives up.
 
-    stop: asked now and then with the rows recorded so far, whether they are enough; also of what an earlier attempt has
-        left.
+    stop: asked now and then with the rows recorded so far, whether they are enough.
     left: what another method left of this run; it is continued from there.
     outputs: times of output [s], the start first; the scene's where there are none.
     judge: whether another method continues; by default where this one is explicit and would take far too long.
     jumps: changes the state at events and breaks.
-    Where the task keeps a journal, what an earlier attempt left there is continued.  Raises StoppedError, with the
-    engine and the trajectory so far as `partial` if there is any, when the work is asked to stop.
+    Raises StoppedError, with the engine and the trajectory so far as `partial` if there is any, when the work is asked
+    to stop.
     """
     judge = judge or Judge(SLICE, crawls)
     if outputs is None:
         outputs = engine.output_times(engine.model.scene.output.interval)
-    mine = piece(engine, y, outputs, left)
-    why = stopping.requested()
-    if why and (mine is None or not mine.done):  # many short integrations never pause
-        if mine is not None:
-            mine.journal.write()
-        raise StoppedError(why, interrupted=why == stopping.INTERRUPTED)
+    stopping.check()  # many short integrations never pause
     with stopping.heeded():
-        if mine is None or mine.tape is None:
-            tape = _begun(engine, y, left, outputs)
-            _advance(engine, tape, progress, stop, left, mine, judge, jumps, resumed=False)
-        else:
-            tape = mine.tape
-            if not mine.done:
-                _advance(engine, tape, progress, stop, left, mine, judge, jumps, resumed=True)
-    if mine is not None:
-        mine.finish(tape)
+        tape = _begun(engine, y, left, outputs)
+        _advance(engine, tape, progress, stop, left, judge, jumps)
     return _collect(engine, tape)
 
 
@@ -165,31 +152,23 @@ def _advance(
     progress: Progress,
     stop: Stop,
     left: Handover | None,
-    mine: Piece | None,
     judge: Judge,
     jumps: Jumps | None,
-    *,
-    resumed: bool,
 ) -> None:
-    """From segment to segment to the end; resumed: the first of them has been begun in an earlier attempt."""
+    """From segment to segment to the end."""
     sample, control = _sampler(engine), engine.control
     settle(engine, progress)
-    if not resumed:
-        tape.looks.append(look(engine))
-    elif stop(_so_far(engine, tape)):
-        return
+    tape.looks.append(look(engine))
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[m.TIME]:
             continue
-        if not resumed:
-            if a > (engine.start if left is None else left.time):
-                engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
-                if jumps is not None:
-                    jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
-            engine.select_pieces_after(0.5 * (a + b))
-            control[m.END], engine.n[m.FRESH] = b, 1
-        resumed = False
-        if _segment(engine, tape, progress, stop, mine, judge, jumps):
+        if a > (engine.start if left is None else left.time):
+            engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
+            if jumps is not None:
+                jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
+        engine.select_pieces_after(0.5 * (a + b))
+        control[m.END], engine.n[m.FRESH] = b, 1
+        if _segment(engine, tape, progress, stop, judge, jumps):
             break
 
 
@@ -289,7 +268,6 @@ def _segment(
     tape: Tape,
     progress: Progress,
     stop: Stop,
-    mine: Piece | None,
     judge: Judge,
     jumps: Jumps | None = None,
 ) -> bool:
@@ -335,17 +313,13 @@ def _segment(
             _warn(engine, tape, progress)
             if stop(_so_far(engine, tape)):
                 return True
-            if mine is not None:
-                mine.keep(tape)
-            _stop_when_asked(engine, tape, mine)
+            _stop_when_asked(engine, tape)
 
 
-def _stop_when_asked(engine: Engine, tape: Tape, mine: Piece | None) -> None:
+def _stop_when_asked(engine: Engine, tape: Tape) -> None:
     """Leave what there is in good order, and go."""
     why = stopping.requested()
     if why:
-        if mine is not None:
-            mine.save(tape)
         raise StoppedError(why, (engine, _collect(engine, tape)), interrupted=why == stopping.INTERRUPTED)
 
 

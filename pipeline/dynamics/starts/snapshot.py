@@ -13,7 +13,7 @@ from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import JointStart, ModalStart, Start
-from flexclear.pipeline.core.scene.units import LARGEST
+from flexclear.pipeline.core.scene.units import LARGEST_NUMBER
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.initial import centre_of
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
@@ -80,7 +80,7 @@ def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dic
 
 def _given(values: np.ndarray) -> Any:
     """Computed values as a scene may give them: what rounding leaves below all numbers of scenes is zero."""
-    return np.where(np.abs(values) < 1.0 / LARGEST, 0.0, values).tolist()
+    return np.where(np.abs(values) < 1.0 / LARGEST_NUMBER, 0.0, values).tolist()
 
 
 def _begun(scene: Scene, modal: dict[str, ModalStart]) -> Start:

@@ -15,14 +15,14 @@ Positive = Field(gt=0.0)
 
 
 class Isotropic(Part):
-    """A linear elastic, isotropic material.
-
-    density: mass density.  youngs_modulus: Young's modulus.  poisson: Poisson's ratio.
-    """
+    """A linear elastic, isotropic material."""
 
     density: Annotated[Density, Positive]
+    """mass density"""
     youngs_modulus: Annotated[Pressure, Positive]
+    """Young's modulus"""
     poisson: Annotated[Number, Field(gt=-1.0, lt=0.5)]
+    """Poisson's ratio"""
 
     @property
     def shear_modulus(self) -> float:
@@ -31,13 +31,12 @@ class Isotropic(Part):
 
 
 class TurnedFrame(Part):
-    """A named frame with axes of its own, as of a pose (`axes`, or `axis` for z alone); default: the mesh's.
-
-    axes: as of a pose.  axis: as of a pose, the direction of z alone.
-    """
+    """A named frame with axes of its own, as of a pose (`axes`, or `axis` for z alone); default: the mesh's."""
 
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+    """as of a pose"""
     axis: Direction | None = None
+    """as of a pose, the direction of z alone"""
     default: ClassVar[np.ndarray] = np.eye(3)
 
     @model_validator(mode="after")
@@ -54,15 +53,14 @@ class TurnedFrame(Part):
 
 
 class BodyRecipe(Part):
-    """What recipes of all bodies say.
-
-    title: what the body is, in words.  frames: named frames.
-    interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
-    """
+    """What recipes of all bodies say."""
 
     title: str = ""
+    """what the body is, in words"""
     frames: Annotated[dict[str, Any], Field(min_length=1)]
+    """named frames"""
     interfaces: tuple[str, ...] = ()
+    """frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis"""
 
     @model_validator(mode="after")
     def _interfaces_are_frames(self) -> BodyRecipe:

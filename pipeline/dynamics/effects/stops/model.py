@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
+from flexclear.pipeline.core.scene.parts import Stop
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.stops import Stop
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.driving import coordinate_of, measured

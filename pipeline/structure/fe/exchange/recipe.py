@@ -15,16 +15,19 @@ class Matrices(Part):
 
     Either `file`, an npz as `exchange.files.write_npz` makes it, or `stiffness` and `mass` (MatrixMarket) and
     `unknowns` (CSV with the columns node, x, y, z, component, one line per row of the matrices).
-    units: the consistent system of all numbers in the files; a file does not say. Paths are relative to the recipe.
-    file: npz with everything.  stiffness, mass: MatrixMarket files.  unknowns: CSV table of the rows.
     """
 
     type: Literal["matrices"]
     units: Literal["m-kg-s", "mm-t-s", "mm-kg-ms"]
+    """the consistent system of all numbers in the files; a file does not say. Paths are relative to the recipe"""
     file: str | None = None
+    """npz with everything"""
     stiffness: str | None = None
+    """MatrixMarket files"""
     mass: str | None = None
+    """MatrixMarket files"""
     unknowns: str | None = None
+    """CSV table of the rows"""
 
     @model_validator(mode="after")
     def _one_way(self) -> Matrices:
@@ -35,13 +38,12 @@ class Matrices(Part):
 
 
 class NodeFrame(TurnedFrame):
-    """A named frame at a node with six unknowns, or following the mean motion of several nodes (RBE3, equal weights).
-
-    node, nodes: numbers from the table of unknowns.
-    """
+    """A named frame at a node with six unknowns, or following the mean motion of several (RBE3, equal weights)."""
 
     node: int | None = None
+    """number from the table of unknowns"""
     nodes: tuple[int, ...] = ()
+    """numbers from the table of unknowns"""
 
     @model_validator(mode="after")
     def _one_way(self) -> NodeFrame:
@@ -51,10 +53,9 @@ class NodeFrame(TurnedFrame):
 
 
 class MatricesRecipe(BodyRecipe):
-    """A body given by its matrices.
-
-    shape: files of the matrices.  frames: named frames and their nodes.
-    """
+    """A body given by its matrices."""
 
     shape: Matrices
+    """files of the matrices"""
     frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
+    """named frames and their nodes"""
