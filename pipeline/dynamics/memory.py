@@ -96,25 +96,18 @@ def _floats(stretch: int, declared: str) -> range:
     return range(len(names))
 
 
-def _fields(declared: str) -> dict[str, tuple[int, ...]]:
-    """Shapes of the fields of a row: "name", "name:length" or "name:rowsxcolumns"."""
+def layout(declared: str, number: type[np.number[Any]] = np.float64, kind: str = "Layout", **place: int) -> Any:
+    """Where the fields of a row begin, and its `size`, after its place in the header if it is of a table.
+
+    declared: "name", "name:length" or "name:rowsxcolumns" of each field.  number: what its entries are.
+    """
     parts = (field.partition(":") for field in declared.split())
-    return {name: tuple(int(k) for k in shape.split("x")) if shape else () for name, _, shape in parts}
-
-
-def _begins(fields: dict[str, tuple[int, ...]]) -> dict[str, int]:
-    """Where the fields of a row begin, and as `size` how long it is."""
-    ends = np.cumsum([0, *(prod(shape) for shape in fields.values())]).tolist()
-    return dict(zip([*fields, "size"], ends, strict=True))
-
-
-def layout(declared: str) -> Any:
-    """Where the fields of a row begin, and its `size`."""
-    fields = _fields(declared)
+    fields = {name: tuple(int(k) for k in shape.split("x")) if shape else () for name, _, shape in parts}
+    begins = np.cumsum([0, *(prod(shape) for shape in fields.values())]).tolist()
     make: Any = namedtuple
-    kind = make("Layout", [*fields, "size"])
-    _ROWS[kind] = np.dtype([(name, np.float64, shape) for name, shape in fields.items()])
-    return kind(**_begins(fields))
+    made = make(kind, [*place, *fields, "size"])
+    _ROWS[made] = np.dtype([(name, number, shape) for name, shape in fields.items()])
+    return made(*place.values(), *begins)
 
 
 def _table(array: str, declared: str, count: str = "") -> Any:
@@ -122,15 +115,10 @@ def _table(array: str, declared: str, count: str = "") -> Any:
 
     count: of rows of a table in w, as `LENGTHS` has it.
     """
-    (index,), fields = _places(1), _fields(declared)
-    make: Any = namedtuple
-    kind = make("Table", ["place", *fields, "size"])
-    table = kind(place=index, **_begins(fields))
+    table = layout(declared, np.int64 if array == "h" else np.float64, "Table", place=next(_place))
     TABLES[array].append(table)
     if count:
-        LENGTHS[index] = (table.size, count)
-    number = np.int64 if array == "h" else np.float64
-    _ROWS[kind] = np.dtype([(name, number, shape) for name, shape in fields.items()])
+        LENGTHS[table.place] = (table.size, count)
     return table
 
 
@@ -139,7 +127,7 @@ wiring, numbers, work = partial(_table, "h"), partial(_table, "f"), partial(_tab
 
 def named(rows: Any, entries: np.ndarray) -> np.ndarray:
     """Entries with named fields, a view; rows of a table or layout follow each other along the last axis."""
-    return entries.view(_ROWS[type(rows)])
+    return entries.view(row_type(rows))
 
 
 def row_type(rows: Any) -> np.dtype[Any]:
@@ -373,7 +361,6 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
     "rejected_step rejected_norm touched_step first tried norm awaited_time",
 )
 # fmt: on
-N_CONTROLS = AWAITED_TIME + 1
 
 # Integers in n -------------------------------------------------------------------------------------------------------
 # report of the last evaluation; where active pieces and modes start in n, and its state in w; whether it left only what
@@ -411,8 +398,7 @@ NAMED: dict[str, Any] = {
 #: where stretches of w, and tables, begin
 INDICES = {f"at_{name}": index for name, index in STRETCHES.items()}
 INDICES |= {f"at_{name}": table.place for name, table in NAMED.items()}
-_ARRAYS = {table.place: array for array, tables in TABLES.items() for table in tables}
-ARRAYS = {name: _ARRAYS[table.place] for name, table in NAMED.items()}
+ARRAYS = {name: array for name, table in NAMED.items() for array in TABLES if table in TABLES[array]}
 #: shapes of fields that are tuples, and how many numbers these have
 TUPLES: dict[tuple[int, ...], int] = {(3,): 3, (3, 3): 9}
 

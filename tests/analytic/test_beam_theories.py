@@ -8,7 +8,7 @@ import scipy.linalg
 
 from flexclear.pipeline.structure.closed_form import frequencies as closed_form
 from flexclear.pipeline.structure.closed_form.frequencies import Span
-from flexclear.pipeline.structure.fe.section import circle_shear_coefficient
+from flexclear.pipeline.structure.fe.section import tube_shear_coefficient
 from tests.analytic.beam_models import (
     BENDING,
     BENDING_Z,
@@ -25,7 +25,7 @@ from tests.analytic.beam_solutions import PAPER_ROD
 
 E, G, RHO = PAPER_ROD.youngs_modulus, PAPER_ROD.shear_modulus, PAPER_ROD.density
 A, I, L = PAPER_ROD.area, PAPER_ROD.second_moment, PAPER_ROD.length
-SHEAR = circle_shear_coefficient(PAPER_ROD.poisson) * G * A
+SHEAR = tube_shear_coefficient(PAPER_ROD.poisson, 0.0) * G * A
 SPANS = {
     "euler-bernoulli": Span(L, E * I, RHO * A),
     "rayleigh": Span(L, E * I, RHO * A, RHO * I),

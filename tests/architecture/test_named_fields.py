@@ -23,7 +23,7 @@ def arrays() -> tuple[np.ndarray, ...]:
         sizes[ARRAYS[name]] += ROWS * table.size
     for place in m.STRETCHES.values():
         h[place] = sizes["w"]
-        sizes["w"] += m.N_CONTROLS  # the most named floats that a stretch has
+        sizes["w"] += m.AWAITED_TIME + 1  # the most named floats that a stretch has
     for k, place in enumerate(m.SIZES.values()):
         h[place] = -1 - k
     wiring = np.arange(m.HEADER, sizes["h"]) * 10

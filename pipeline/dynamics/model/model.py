@@ -24,7 +24,6 @@ from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.gauges import Gauges
 from flexclear.pipeline.dynamics.model.loads import Load
 from flexclear.pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
-from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.numbering import Numbering, number
 
 if TYPE_CHECKING:
@@ -189,7 +188,7 @@ def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
     return {
         m.LINKS: _links(numbering, parts),
         m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
-        m.SITE_NUMBERS: [_pose_row(s.place) for s in numbering.sites],
+        m.SITE_NUMBERS: [np.concatenate([s.place.p, s.place.R.ravel()]) for s in numbering.sites],
         **flexible_bodies.fill(numbering, [book.loss for book in books]),
         **wiring.mass_entries(numbering, parts.articulated),
     }
@@ -219,10 +218,6 @@ def articulated(numbering: Numbering) -> bool:
         depths += [before[link.branch.parent] + k for k in range(1, len(own) + 1)]
         before[i] = before[link.branch.parent] + len(own)
     return bool(np.sqrt(np.mean(np.square(depths))) > DEEP_TREE)
-
-
-def _pose_row(placement: Placement) -> np.ndarray:
-    return np.concatenate([placement.p, placement.R.ravel()])
 
 
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
@@ -352,14 +347,10 @@ def _floors(
                 target[mine] = len(rows) - 1
     groups = [*q_group, *v_group]
     tail = [group for block in filling.blocks(mechanism, parts, energies, lengths).values() for group in block]
-    tail += [(1.0, 1, _part_of_sites(numbering, *sites)) for sites in gauges.owners]
+    acting = ([numbering.sites[site].link for site in sites if site >= 0] for sites in gauges.owners)  # -1: the world
+    tail += [(1.0, 1, mechanism.components.of(*links)) for links in acting]
     for floor, count, part in tail:
         rows.append((floor, part))
         groups += [len(rows) - 1] * count
     floors, owners = zip(*rows, strict=True)
     return np.array(groups, dtype=np.int64), np.array(floors), np.array(owners)
-
-
-def _part_of_sites(numbering: Numbering, *sites: int) -> int:
-    """The independent mechanism of what acts between sites; -1 is the world."""
-    return numbering.mechanism.components.of(*(numbering.sites[site].link for site in sites if site >= 0))

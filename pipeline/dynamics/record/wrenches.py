@@ -95,8 +95,8 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
     """Wrenches of the fixed joints inside each link, by Newton and Euler for the bodies beyond them."""
     model, rows, beyond, inside = motions.model, len(motions.seen.state), list[_Beyond](), dict[str, Wrench]()
     for link in model.links:
-        every = model.scene.joint.items()
-        inner = [n for n, j in every if n not in known and _is_inside(model, j.between, link.places)]
+        others = {name: _joined(model, name) for name in model.scene.joint if name not in known}
+        inner = [name for name, bodies in others.items() if link.places.keys() >= set(bodies)]
         # a second path between bodies that are joined already carries nothing here
         inside |= {name: (np.zeros((rows, 3)), np.zeros((rows, 3))) for name in inner}
         tree = _forest(model, inner, list(link.places))
@@ -118,10 +118,6 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
                 moment, force = moment - n, force - f
         inside[part.joint] = part.sign * moment, part.sign * force
     return inside
-
-
-def _is_inside(model: Model, between: tuple[str, str], places: Mapping[str, object]) -> bool:
-    return all(model.mechanism.frames[f].body in places for f in between)
 
 
 def _joined(model: Model, name: str) -> tuple[str, str]:

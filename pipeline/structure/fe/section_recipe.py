@@ -155,13 +155,11 @@ def shear_coefficient(start: Any, end: Any | None, s: Value, poisson: float) -> 
     """Kappa along y and z, None where nobody says it."""
     if start.shear_coefficient is not None or start.type == "general":
         return start.shear_coefficient
-    if start.type == "tube":
-        outer, inner = _dimensions(start, end, s)
-        kappa: Value = sections.tube_shear_coefficient(poisson, inner / outer)
-    elif start.type == "circle":
-        kappa = sections.circle_shear_coefficient(poisson)
+    if start.type == "rectangle":
+        kappa: Value = sections.rectangle_shear_coefficient(poisson)
     else:
-        kappa = sections.rectangle_shear_coefficient(poisson)
+        outer, *inner = _dimensions(start, end, s)
+        kappa = sections.tube_shear_coefficient(poisson, inner[0] / outer if inner else 0.0)
     return kappa, kappa
 
 
