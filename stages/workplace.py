@@ -43,7 +43,10 @@ OPTIONS: dict[str, tuple[tuple[str, ...], dict[str, Any]]] = {
     "jobs": (("--jobs",), {"type": int, "metavar": "N", "help": "processes at most; default: one for each core"}),
     "limit": (
         ("--limit",),
-        {"metavar": "TIME", "help": "stop in good order after, e.g., 2h (exit code 4); run again to continue"},
+        {
+            "metavar": "TIME",
+            "help": "stop in good order after, e.g., 2h (exit code 4); what is finished is not computed again",
+        },
     ),
     "budget": (("--budget",), {"metavar": "TIME", "help": "processor time for trial runs, such as 10s, 2min or 1h"}),
     "json": (("--json",), {"action": "store_true", "help": "print the results as JSON"}),
@@ -76,7 +79,7 @@ def add_options(parser: argparse.ArgumentParser, *names: str, **changed: Any) ->
 def seconds(given: str | float, option: str) -> float:
     """A time above zero [s], as a number or as ``10s`` or ``2min``; InputError for another value of an option."""
     try:
-        spaced = re.sub(r"(?<=[0-9.])(?=[a-z])", " ", given.strip()) if isinstance(given, str) else given
+        spaced = re.sub(r"(?<=[0-9.])(?=[a-z])", " ", given.strip()) if isinstance(given, str) else float(given)
         result = quantity(spaced, "time")
         if not result > 0.0:
             raise ValueError("it must be above zero")

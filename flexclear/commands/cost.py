@@ -12,7 +12,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import RootModel, Strict, ValidationError, model_validator
+from pydantic import Strict, ValidationError, model_validator
 
 from flexclear.commands import cost_design, scenes
 from flexclear.commands.export import as_json
@@ -377,10 +377,6 @@ class Peer(Part):
         return self
 
 
-class Peers(RootModel[dict[str, list[Peer]]]):
-    """By scene, as in a file."""
-
-
 def read_peers(path: Path) -> dict[str, list[Track]]:
     """What a file says of other programs, by scene.  InputErrors for one that cannot be read or says something else."""
     where = f"--peer {path}"
@@ -388,8 +384,19 @@ def read_peers(path: Path) -> dict[str, list[Track]]:
     try:
         if path.stat().st_size > LARGEST_PEERS:
             raise ValueError(f"it is larger than {LARGEST_PEERS >> 20} MB")
-        return Peers.model_validate(json.loads(path.read_bytes())).model_dump(mode="json", exclude_none=True)
-    except ValidationError as error:
-        raise input_errors(where, error, Peers) from None
+        scenes = json.loads(path.read_text("utf-8"))
+        if not isinstance(scenes, dict) or not all(isinstance(tracks, list) for tracks in scenes.values()):
+            raise ValueError("it must be a table of scenes, each with a list of tracks")
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(where, f"cannot be read: {error}", "docs/accuracy/exudyn.json is one") from None
+    return {
+        scene: [_track(f"{where} [{scene}], track {k + 1}", track) for k, track in enumerate(tracks)]
+        for scene, tracks in scenes.items()
+    }
+
+
+def _track(where: str, given: Any) -> Track:
+    try:
+        return Peer.model_validate(given).model_dump(mode="json", exclude_none=True)
+    except ValidationError as error:
+        raise input_errors(where, error, Peer) from None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
 
 from flexclear.commands import scenes
 from flexclear.commands.export import as_json
@@ -12,9 +11,6 @@ from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages.graph import Graph
 from flexclear.stages.rendering import FORMATS
 from flexclear.stages.workplace import check, open_workplace, relative
-
-if TYPE_CHECKING:
-    pass
 
 #: what is made where nothing is asked for
 USUAL = (("motion", "png"), ("motion", "mp4"), ("motion", "html"), ("modes", "html"))

@@ -113,7 +113,8 @@ def _pages(options: argparse.Namespace, workplace: Workplace) -> Iterator[tuple[
     if not options.scenes:
         yield "paper", of_paper(workplace, folder=options.folder)
         return
-    budget, answers = options.budget and seconds(options.budget, "--budget"), options.answers != "none"
+    budget = None if options.budget is None else seconds(options.budget, "--budget")
+    answers = options.answers != "none"
     for graph in graphs(options.scenes, options.set):
         yield graph.scene.name, of_scene(graph, workplace, folder=options.folder, budget=budget, answers=answers)
 

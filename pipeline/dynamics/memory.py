@@ -54,7 +54,8 @@ STRETCHES: dict[str, int] = {}
 #: single floats of w by the names that kernels use: the index of their stretch in the header, and their offset there
 FLOATS: dict[str, tuple[int, int]] = {}
 #: how much of w there is of stretches and tables, by their indices in the header: numbers in a row, and how many rows
-#: there are, as a sum of products of sizes, of what the method asks for (`Room`) and of the number of columns
+#: there are, as a sum of products of sizes (`?size`: 1, or 0 where it is 0), of what the method asks for (`Room`) and
+#: of the number of columns
 LENGTHS: dict[int, tuple[int, str]] = {}
 #: rows of tables and layouts as NumPy has them, by the class of what declares them
 _ROWS: dict[type, np.dtype[Any]] = {}
@@ -287,7 +288,9 @@ JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _stretches(
 #: per selected row its distance from those before it, at the end of the step, at its start, and the most that it has
 #: been, each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
 COLLOCATION_ROWS = 13
-INDEPENDENCE, COLLOCATION = _stretches(f"independence:3*n_closure_rows collocation:{COLLOCATION_ROWS}*ny")
+INDEPENDENCE, COLLOCATION = _stretches(
+    f"independence:3*n_closure_rows collocation:{COLLOCATION_ROWS}*ny*?n_closure_rows"
+)
 #: smallest pivot of J M^-1 J^T as fraction of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
 LAST_PIVOT, WANTED_PIVOT = _floats(PIVOT, "last_pivot wanted_pivot")

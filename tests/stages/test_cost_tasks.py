@@ -125,9 +125,9 @@ TRACK = {"name": "peer", "note": "", "seconds": [1.0, 2.0], "error": {"bob.posit
     "text, told",
     [
         ("{", "cannot be read"),
-        ("[]", "expected a table"),
-        ('{"a": 1}', "expected a list"),
-        ('{"a": [{"name": "x"}]}', "is missing"),
+        ("[]", "a table of scenes"),
+        ('{"a": 1}', "a list of tracks"),
+        ('{"a": [{"name": "x"}]}', r"\[a\], track 1 \[seconds\].*is missing"),
         ('{"a": [{"name": "x", "seconds": ["1"], "error": {}}]}', "expected a number"),
         ('{"a": [{"name": "x", "seconds": [1], "error": {"q": [1, 2]}}]}', "another number of errors"),
     ],

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import pkgutil
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -140,6 +142,42 @@ def test_killed_sections_go_on_to_the_same_bits(root: Path, tmp_path: Path, monk
     sections = {"transient": 2, "periods": 20, "exponent_periods": 20}
     scene = check(root, "driven_pendulum", sections=sections, **{"solver.rtol": 1e-10})
     require_same_bits(lambda: dynamics.sections(scene, {}, silent), tmp_path, monkeypatch, 300)
+
+
+@pytest.mark.parametrize(
+    "of, part, calls",
+    [
+        ("sections", "sections._Tape._motion", 9),
+        ("sections", "sections.conform", 1),
+        ("ensemble", "ensemble.conform", 1),
+    ],
+)
+def test_work_that_fails_between_its_parts_goes_on_to_the_same_bits(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, of: str, part: str, calls: int
+) -> None:
+    """Where a period is being added to the tape, and where all is there and the dataset is made."""
+    if of == "sections":
+        requested = {"transient": 2, "periods": 20, "exponent_periods": 20}
+        scene = check(root, "driven_pendulum", sections=requested, **{"solver.rtol": 1e-10})
+    else:
+        scene = check(root, "bounce", ensemble={"members": 4})
+    make, left = partial(getattr(dynamics, of), scene, {}, silent), [calls]
+    whole = make()
+    owner, _, name = f"flexclear.pipeline.dynamics.record.{part}".rpartition(".")
+    proper = pkgutil.resolve_name(f"{owner}.{name}")
+
+    def failing(*arguments: Any, **more: Any) -> Any:
+        left[0] -= 1
+        if left[0] == 0:
+            raise KeyboardInterrupt
+        return proper(*arguments, **more)
+
+    monkeypatch.setattr(f"{owner}.{name}", failing)
+    with pytest.raises(KeyboardInterrupt), journal.storage(tmp_path, "key"):
+        make()
+    assert list(tmp_path.glob("*.part"))
+    with journal.storage(tmp_path, "key"):
+        assert make().identical(whole)
 
 
 @pytest.mark.usefixtures("often")

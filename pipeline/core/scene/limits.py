@@ -31,7 +31,8 @@ class Limits(Part):
     """What the work may take at most; it is estimated first, and refused at once (exit code 4)."""
 
     time: Annotated[Time, Field(gt=0.0)] | None = None
-    """on the clock, of each run, ensemble or study of sections; what there is by then is left, and can continue"""
+    """on the clock, of each run, ensemble or study of sections; what there is by then is left;
+    ensembles and sections can continue from it"""
     memory: Bytes | None = None
     """default: four fifths of what is free"""
     disk: Bytes | None = None

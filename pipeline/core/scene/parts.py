@@ -86,7 +86,7 @@ class FileShape(Part):
     file: str
     """the file, searched for next to the scene"""
     unit: Annotated[Length, Positive] = 1.0
-    """length of one unit of the file, as "1 mm"."""
+    """length of one unit of the file, such as 1 mm"""
     pose: Pose = Pose()
     """of the file's axes in the body frame"""
 
@@ -109,7 +109,7 @@ class Seen(Part):
     geometry: tuple[Shape, ...] | None = None
     """shapes that pictures show, [] for none; default: bars and plates between the joints"""
     color: Color | None = None
-    """in pictures, as "#0072B2"."""
+    """in pictures, such as #0072B2"""
 
 
 class Ground(Seen):
@@ -167,7 +167,7 @@ class Modes(Part):
     """number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete basis; 0
     makes a rigid body with the recipe's mass and inertia"""
     up_to: Annotated[Frequency, Positive] | None = None
-    """highest frequency of the retained normal modes, e.g. "5000 Hz"."""
+    """highest frequency of the retained normal modes, such as 5000 Hz"""
     compliance: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
     """least fraction of the static compliance between the interfaces, in each of the six directions"""
     mass: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None

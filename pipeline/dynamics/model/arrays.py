@@ -136,8 +136,10 @@ def _work_lengths(h: np.ndarray, room: m.Room, columns: int) -> dict[int, int]:
     """Of the stretches and tables of w, by their indices in the header, in their order."""
     known = {name: int(h[index]) for name, index in m.SIZES.items()} | vars(room) | {"columns": columns}
 
+    def factor(text: str) -> int:
+        return int(text) if text.isdigit() else min(1, known[text[1:]]) if text[0] == "?" else known[text]
+
     def count(text: str) -> int:
-        terms = (term.split("*") for term in text.split("+"))
-        return sum(prod(int(one) if one.isdigit() else known[one] for one in factors) for factors in terms)
+        return sum(prod(map(factor, term.split("*"))) for term in text.split("+"))
 
     return {index: size * count(text) for index, (size, text) in sorted(m.LENGTHS.items())}

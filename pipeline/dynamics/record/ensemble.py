@@ -102,8 +102,9 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         return made
 
     members = side_by_side(member, requested.members, done, places.seats if places else 0)
-    reasons = [text for one in members if (text := str(one.pop("switched")))]
-    variables = {name: (ENSEMBLE[name].dims, np.stack([one[name] for one in members])) for name in members[0]}
+    reasons = [text for one in members if (text := str(one["switched"]))]
+    kept = [name for name in members[0] if name != "switched"]
+    variables = {name: (ENSEMBLE[name].dims, np.stack([one[name] for one in members])) for name in kept}
     time = engine.output_times(scene.output.interval)
     coordinates = {"member": np.arange(requested.members), "time": time, "body": names, **contact_names(engine.model)}
     made = xr.Dataset(variables, coords=coordinates)
@@ -124,10 +125,16 @@ def difference_of_starts(engine: Engine, start: np.ndarray) -> Ensemble:
     if model.scene.ensemble is not None:
         return model.scene.ensemble
     engine.attempt(start, engine.start)
-    least, depths = LEAST_OF_SIZE * model.length, -engine.table(m.TOUCH)["gap"]
+    least, depths = LEAST_OF_SIZE * model.length, -engine.table(m.TOUCH)["gap"] * arms(model)
     clearance = min((joint.clearance for joint in model.scene.contacts().values()), default=0.0)
     pressed = max(least, depths[depths > 0.0].min(initial=np.inf))
     return Ensemble(perturbation=min(max(least, FRACTION_OF_CLEARANCE * clearance), FRACTION_OF_CLEARANCE * pressed))
+
+
+def arms(model: Model) -> np.ndarray:
+    """By what a gap of each contact is multiplied to be a length: 1, or the size [m] of ends of turning coordinates."""
+    turning = [getattr(contact.joint, "coordinate", None) for contact in model.contacts]
+    return np.array([model.length if one is not None and one.turning else 1.0 for one in turning])
 
 
 def ball_offsets(model: Model, requested: Ensemble, members: int) -> Iterator[np.ndarray]:

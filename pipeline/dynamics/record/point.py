@@ -23,7 +23,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import EVENTS
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.record.dataset import chosen
-from flexclear.pipeline.dynamics.record.ensemble import ball_offsets, difference_of_starts
+from flexclear.pipeline.dynamics.record.ensemble import arms, ball_offsets, difference_of_starts
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
@@ -156,7 +156,8 @@ class Runner:
             return [start]
         jacobian = offset_jacobian(engine, start)
         offsets = ball_offsets(model, difference_of_starts(engine, start), self.members)
-        return [perturbed(engine, start, jacobian, moved) for moved in offsets]
+        per_length = np.ones(len(model.contacts)) if model.scene.ensemble else 1.0 / arms(model)
+        return [perturbed(engine, start, jacobian, moved * np.repeat(per_length, 3)) for moved in offsets]
 
 
 def _statistics(rows: Sequence[Values]) -> tuple[Values, Values]:

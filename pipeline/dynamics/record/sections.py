@@ -80,9 +80,9 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         if done.number + 1 == count:
             tape.orbit = tape.motion_at_waypoints(parts, done)
             break
-        if stored is not None:  # the tape is as it is until the next period
-            state = {**memory(engine), **done.after.packed()}
-            stored.store(name, lambda state=state: {**state, **tape.packed()})  # type: ignore[misc]
+        if stored is not None:  # packed now: the tape has changed in part where the next period fails or is stopped
+            state = {**memory(engine), **done.after.packed(), **tape.packed()}
+            stored.store(name, lambda state=state: state)  # type: ignore[misc]
     growth = np.array(tape.growth[: len(followed)])
     facts = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": tape.lost}
     variables = tape.variables(engine.model) | {"growth": (("followed",), growth)}

@@ -50,7 +50,7 @@ JOINT_FRICTION = Effect(
     stretches=(
         "bearing_slopes:n_bearings*n_bearings",
         "bearing_residuals:n_bearings",
-        "smooth_multiplier:n_closure_rows",
+        "smooth_multiplier:n_closure_rows*?n_bearings",
     ),
     compose={
         "evaluate": {
