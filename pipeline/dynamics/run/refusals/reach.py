@@ -34,9 +34,9 @@ REST_FRACTION, DYING = 0.1, 0.1
 FASTER = 40.0
 #: times ahead at which the least depth is searched for
 TIMES_AHEAD = 60
-#: a search proceeds in so many boxes of this half width, in fractions of the mechanism's size or in rad: coordinates
-#: of a box are those of the loops' tangents in its middle
-BOXES, HALF_WIDTH = 60, 0.1
+#: a search proceeds in so many boxes of one of these half widths, in fractions of the mechanism's size or in rad:
+#: coordinates of a box are those of the loops' tangents in its middle
+BOXES, HALF_WIDTHS = 60, (0.1, 0.05, 0.025, 0.0125)
 #: a depth is the least when another box takes off less than this fraction of it
 LEAST_GAIN = 1e-3
 #: of the search in a box, in which depths are fractions of that in its middle, so that no size of a mechanism matters
@@ -216,7 +216,7 @@ def _shallowest(engine: Engine, y: np.ndarray, contact: int, enough: float) -> t
 
 
 def _shallower(engine: Engine, y: np.ndarray, contact: int, depth: float) -> tuple[np.ndarray, float]:
-    """The same in the box about a state in which it is so deep."""
+    """The same in the box about a state in which it is so deep; a smaller one where other loops cannot follow."""
     from scipy.optimize import minimize  # slow to import, and few runs come here
 
     nq, scales = engine.model.nq, engine.model.speed_scales[: engine.model.nv]
@@ -230,9 +230,14 @@ def _shallower(engine: Engine, y: np.ndarray, contact: int, depth: float) -> tup
     def fraction(x: np.ndarray) -> float:
         return _depth(engine, there(x), contact) / depth
 
-    box = [(-HALF_WIDTH, HALF_WIDTH)] * len(scales)
-    least = minimize(fraction, np.zeros(len(scales)), method="L-BFGS-B", bounds=box, options=OPTIONS)
-    return there(least.x), float(least.fun) * depth
+    for width in HALF_WIDTHS:
+        box = [(-width, width)] * len(scales)
+        try:
+            least = minimize(fraction, np.zeros(len(scales)), method="L-BFGS-B", bounds=box, options=OPTIONS)
+        except SolverError:
+            continue
+        return there(least.x), float(least.fun) * depth
+    raise SolverError("other loops do not reach so far")
 
 
 def _depth(engine: Engine, y: np.ndarray, contact: int) -> float:
