@@ -22,6 +22,7 @@ from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import EVENTS
 from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.ensemble import ball_offsets
 from flexclear.pipeline.dynamics.record.motion import Motions
@@ -29,7 +30,6 @@ from flexclear.pipeline.dynamics.record.sections import section_period
 from flexclear.pipeline.dynamics.run.alike import engines_alike
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
-from flexclear.pipeline.dynamics.run.evaluation.specialised import side_by_side
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.horizon.periods import Cursor, periods, require_periodic, stretches
@@ -98,7 +98,7 @@ class Runner:
             self._engines(thinned(scene, self.recorded))
         except (SolverError, InputError):
             return False  # as each point reports by itself
-        return self.engine is not None and side_by_side(self.engine)
+        return self.engine is not None and self.engine.method.staged and not INTERPRETED
 
     def _values(self, scene: Scene, place: Place | None, alive: Progress) -> tuple[Values, Values, int]:
         if scene.event:

@@ -9,13 +9,28 @@ says, not those that the compiler likes.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 from llvmlite import ir
 
-from flexclear.pipeline.dynamics.specialise.tape import BIT, COMPARISONS, FLOAT, INTEGER, Branch, Symbol
+from flexclear.pipeline.dynamics.specialise.tape import (
+    BIT,
+    COMPARISONS,
+    FLOAT,
+    INTEGER,
+    Branch,
+    Loop,
+    Symbol,
+    UnsuitedError,
+    everything,
+    operands,
+)
+
+if TYPE_CHECKING:
+    from flexclear.pipeline.dynamics.specialise.parts import Parts
 
 #: as of all kernels (`dynamics.kernels`)
 FLAGS = ("contract", "reassoc", "nsz")
@@ -31,6 +46,8 @@ INTRINSICS = {
 }
 #: operations of a way that several states compute even where none of them goes it; for how many a call counts
 SHORT_WAY, CALL = 12, 40
+#: operations of a part of a program that is cut
+PART = 1_000
 _NUMBER = ir.IntType(32)
 LIBRARY = {"sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "tanh": "tanh"}
 LIBRARY |= {"arctan2": "atan2", "pow": "pow"}
@@ -46,14 +63,8 @@ class Program:
 
 def loads(program: Program) -> list[tuple[str, Any]]:
     """Array and index of all that is loaded."""
-    entries, blocks = list[tuple[str, Any]](), [program.block]
-    while blocks:
-        for item in blocks.pop():
-            if isinstance(item, Branch):
-                blocks += item.blocks
-            elif item.operation == "load":
-                entries.append(item.arguments)
-    return entries
+    operations = (item for item in everything(program.block) if isinstance(item, Symbol))
+    return [operation.arguments for operation in operations if operation.operation == "load"]
 
 
 def uses(program: Program) -> Counter[Symbol]:
@@ -74,15 +85,18 @@ def _use(block: list[Any], counts: Counter[Symbol]) -> None:
                     counts[item.condition] += 1
             for inner in item.blocks:
                 _use(inner, counts)
+        elif isinstance(item, Loop):
+            counts.update(operands(item))
+            _use(item.blocks[0], counts)
         elif counts[item]:
-            counts.update(a for a in item.arguments if isinstance(a, Symbol))
+            counts.update(operands(item))
 
 
 def size(block: list[Any], counts: Counter[Symbol]) -> int:
     """How many operations a block has, each call for as many as it takes as long as."""
     total = 0
     for item in block:
-        if isinstance(item, Branch):
+        if not isinstance(item, Symbol):
             total += 1 + sum(size(inner, counts) for inner in item.blocks)
         elif counts[item]:
             total += CALL if item.operation in LIBRARY else 1
@@ -93,7 +107,7 @@ def fused(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbo
     """By sum: the product in it that nothing else uses, of the same block, and what is added to it."""
     pairs, products = dict[Symbol, tuple[Symbol, Any]](), set[Symbol]()
     for item in block:
-        if isinstance(item, Branch):
+        if not isinstance(item, Symbol):
             for inner in item.blocks:
                 pairs |= fused(inner, counts)
         elif item.operation == "mul" and counts[item] == 1 and divisor(item, counts) is None:
@@ -115,12 +129,26 @@ def divisor(product: Symbol, counts: Counter[Symbol]) -> Symbol | None:
     return None
 
 
+def stretches(block: list[Any], counts: Counter[Symbol]) -> Iterator[list[Any]]:
+    """Consecutive items that are together no longer than a part; a longer one alone."""
+    items, total = list[Any](), 0
+    for item in block:
+        more = size([item], counts)
+        if items and total + more > PART:
+            yield items
+            items, total = [], 0
+        items.append(item)
+        total += more
+    yield items
+
+
 class Emitter:
     """Writes a program into a function under construction.
 
     where: address of an array's element: where(array, index as a number or a value of the code, lane) -> pointer.
     lanes: states at once.  exact: every operation is rounded as it is.
     number: of several states, what is at an index of f, of all of them.
+    parts: the functions into which a long program of one state is cut.
     """
 
     def __init__(
@@ -132,6 +160,7 @@ class Emitter:
         *,
         exact: bool = False,
         number: Callable[[int], Any] | None = None,
+        parts: Parts | None = None,
     ):
         self.builder, self.program, self.where, self.lanes, self.number = builder, program, where, lanes, number
         self.uses = uses(program)
@@ -140,22 +169,34 @@ class Emitter:
         self.inside_sums = {product for product, _ in self.fused.values()}
         self.types = {kind: one if lanes == 1 else ir.VectorType(one, lanes) for kind, one in TYPES.items()}
         self.values: dict[Symbol, Any] = {}
+        self.parts = parts
 
     def emit(self) -> None:
         """Write everything."""
         self._block(self.program.block)
-        for array, index, value in self.program.stores:
+        stores, length = self.program.stores, PART if self.parts else len(self.program.stores)
+        for first in range(0, len(stores), length):
+            self._part(partial(self._store, stores[first : first + length]))
+        if self.parts:
+            self.parts.end()
+
+    def _store(self, stores: list[tuple[str, Any, Any]]) -> None:
+        for array, index, value in stores:
             operand = self._value(value, INTEGER if array in "hn" else FLOAT)
             for lane in range(self.lanes):
                 self.builder.store(self._of(operand, lane), self.where(array, self._place(index, lane), lane))
 
     def _value(self, value: Any, kind: str) -> Any:
         if isinstance(value, Symbol):
-            return self.values[value]
+            return self._known(value)
         return ir.Constant(self.types[kind], value if self.lanes == 1 else [value] * self.lanes)
 
+    def _known(self, symbol: Symbol) -> Any:
+        value = self.values[symbol]
+        return self.parts.value(self.builder, symbol, value) if self.parts else value
+
     def _place(self, index: Any, lane: int) -> Any:
-        return self._of(self.values[index], lane) if isinstance(index, Symbol) else index
+        return self._of(self._known(index), lane) if isinstance(index, Symbol) else index
 
     # Lanes -------------------------------------------------------------------------------------------------------
 
@@ -174,10 +215,33 @@ class Emitter:
 
     # Blocks ------------------------------------------------------------------------------------------------------
 
+    def _part(self, write: Callable[[], None]) -> None:
+        """Write into a function of its own, where the program is cut."""
+        if not self.parts:
+            return write()
+        outside = self.builder, self.where
+        self.builder, self.where = self.parts.begin()
+        write()
+        self.builder, self.where = outside
+
     def _block(self, block: list[Any]) -> None:
+        if not self.parts or self.builder is not self.parts.outer:
+            return self._items(block)
+        for items in stretches(block, self.uses):
+            if isinstance(items[0], Branch) and size(items, self.uses) > PART:
+                self._branch(items[0])
+                for joined, *_ in items[0].joins:
+                    if joined in self.values:
+                        self.parts.keep(joined, self.values[joined])
+            else:
+                self._part(partial(self._items, items))
+
+    def _items(self, block: list[Any]) -> None:
         for item in block:
             if isinstance(item, Branch):
                 self._branch(item)
+            elif isinstance(item, Loop):
+                self._loop(item)
             elif self.uses[item] and item not in self.inside_sums:
                 self.values[item] = self._operation(item)
 
@@ -193,7 +257,7 @@ class Emitter:
             self._joined(branch, joins, *([self._value(join[way], join[0].kind) for join in joins] for way in (1, 2)))
 
     def _joined(self, branch: Branch, joins: list[Any], first: list[Any], second: list[Any]) -> None:
-        condition = self.values[branch.condition]
+        condition = self._known(branch.condition)
         for (joined, _, _), a, b in zip(joins, first, second, strict=True):
             self.values[joined] = self.builder.select(condition, a, b)
 
@@ -201,19 +265,18 @@ class Emitter:
         builder = self.builder
         starts = [builder.append_basic_block() for _ in range(2)]
         after = builder.append_basic_block()
-        builder.cbranch(self.values[branch.condition], *starts)
+        builder.cbranch(self._known(branch.condition), *starts)
         ends = []
-        for start, block in zip(starts, branch.blocks, strict=True):
+        for way, (start, block) in enumerate(zip(starts, branch.blocks, strict=True), start=1):
             builder.position_at_end(start)
             self._block(block)
-            ends.append(builder.block)
+            ends.append(([self._value(join[way], join[0].kind) for join in joins], builder.block))
             builder.branch(after)
         builder.position_at_end(after)
-        for joined, *values in joins:
-            phi = builder.phi(TYPES[joined.kind])
-            for value, end in zip(values, ends, strict=True):
-                phi.add_incoming(self._value(value, joined.kind), end)
-            self.values[joined] = phi
+        for k, (joined, _, _) in enumerate(joins):
+            self.values[joined] = phi = builder.phi(TYPES[joined.kind])
+            for left, end in ends:
+                phi.add_incoming(left[k], end)
 
     def _both_ways(self, branch: Branch, joins: list[Any]) -> None:
         """Each lane has what its own way gives; a way that no lane goes is skipped if it is long."""
@@ -232,7 +295,7 @@ class Emitter:
         start, after, before = builder.append_basic_block(), builder.append_basic_block(), builder.block
         none = word(0 if way == 1 else -1)
         builder.cbranch(
-            builder.icmp_unsigned("!=", builder.bitcast(self.values[branch.condition], word), none), start, after
+            builder.icmp_unsigned("!=", builder.bitcast(self._known(branch.condition), word), none), start, after
         )
         builder.position_at_end(start)
         self._block(branch.blocks[way - 1])
@@ -247,6 +310,23 @@ class Emitter:
             merged.append(phi)
         return merged
 
+    def _loop(self, loop: Loop) -> None:
+        if self.lanes > 1:
+            raise UnsuitedError("each of several states would repeat as often as another")
+        builder, before = self.builder, self.builder.block
+        firsts = [self._value(first, symbol.kind) for symbol, first, _ in loop.carried]
+        start, after = builder.append_basic_block(), builder.append_basic_block()
+        builder.branch(start)
+        builder.position_at_end(start)
+        for (symbol, _, _), first in zip(loop.carried, firsts, strict=True):
+            self.values[symbol] = builder.phi(TYPES[symbol.kind])
+            self.values[symbol].add_incoming(first, before)
+        self._block(loop.blocks[0])
+        for symbol, _, left in loop.carried:
+            self.values[symbol].add_incoming(self._value(left, symbol.kind), builder.block)
+        builder.cbranch(self._value(loop.condition, BIT), start, after)
+        builder.position_at_end(after)
+
     # Operations --------------------------------------------------------------------------------------------------
 
     def _operation(self, s: Symbol) -> Any:
@@ -255,7 +335,7 @@ class Emitter:
             return self._load(*s.arguments)
         if name == "select":
             condition, a, b = s.arguments
-            return builder.select(self.values[condition], self._value(a, s.kind), self._value(b, s.kind))
+            return builder.select(self._known(condition), self._value(a, s.kind), self._value(b, s.kind))
         if s in self.fused:
             return self._sum_with_product(s, *self.fused[s])
         kind = next(a.kind for a in s.arguments if isinstance(a, Symbol))

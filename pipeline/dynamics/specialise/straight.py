@@ -8,6 +8,7 @@ assembles it as it is, in a tenth of the time.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -15,13 +16,13 @@ from llvmlite import ir
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.specialise import wiring as wired
-from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
+from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads, size, uses
+from flexclear.pipeline.dynamics.specialise.parts import Parts
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, same
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
-#: operations beyond which straight code takes longer to make than kernels do, and is hardly faster: it no longer fits
-#: the processor's first caches; and those that are differentiated, which kernels cannot be
-LONGEST, LONGEST_DIFFERENTIATED = 50_000, 80_000
+#: operations beyond which a program is cut into functions that LLVM takes one by one
+UNCUT = 50_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
 #: integers of n that are left
@@ -32,14 +33,14 @@ NAME = "straight"
 
 
 def program(
-    kernel: Callable, wiring: wired.Wiring, *, whole: bool = False, describes: bool = False, longest: int = 0
+    kernel: Callable, wiring: wired.Wiring, *, whole: bool = False, describes: bool = False, longest: float = math.inf
 ) -> Program:
-    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is too long for that.
+    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is longer than `longest`.
 
     whole: whether it leaves all in w, or only what steps read.  describes: the kernel is describe(h, f, w, n), of what
-    has been evaluated; all is left.  longest: most operations; `LONGEST` when 0.
+    has been evaluated; all is left.
     """
-    h, trace = wired.header(wiring), Trace(longest or LONGEST)
+    h, trace = wired.header(wiring), Trace(longest)
     w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
     ground = wired.ground(h)
     w.values.update(ground)
@@ -90,7 +91,14 @@ def straight(
         address = builder.load(builder.gep(arrays[0], [_INTEGER(m.PRESCRIBE)]))
         laws = ir.FunctionType(_INTEGER, [*tables, _FLOAT]).as_pointer()
         builder.call(builder.inttoptr(address, laws), function.args[:5])
-    Emitter(builder, tape, places(builder, tape, [[*arrays, *given]]), exact=exact).emit()
+
+    def found(inside: ir.IRBuilder, arguments: list[Any]) -> Callable:
+        return places(inside, tape, [arguments])
+
+    mine = [*arrays, *given]
+    cut = not (whole or describes) and size(tape.block, uses(tape)) > UNCUT
+    parts = Parts(builder, mine, found) if cut else None
+    Emitter(builder, tape, found(builder, mine), exact=exact, parts=parts).emit()
     builder.ret(_INTEGER(0))
     return str(module)
 

@@ -39,6 +39,8 @@ JOINT_FRICTION = Effect(
     work={
         # unit: wrench of its friction on the joint's second body per normal force, about the kernels' origin; loss:
         # what it takes per normal force [m/s]
+        # the search for the loads: part of the friction that is there, turns, last change, whether in strides
+        "pursuit": "share turns change strides",
         "bearing": "load slip loss unit_moment:3 unit_force:3",
         # what bends its friction where it reverses: sliding velocity, force along the axis, moment about it and forces
         # at both ends as they press
@@ -49,19 +51,19 @@ JOINT_FRICTION = Effect(
     # of the bearings' loads: slopes of their equations, and residuals; of the closures: multipliers without friction
     stretches=("bearing_slopes", "bearing_residuals", "smooth_multiplier"),
     lengths={
+        "pursuit": lambda size: 1,
         **dict.fromkeys(("bearing", "bends", "bearing_residuals"), lambda size: size("n_bearings")),
         "reactions": lambda size: size("n_rubbing") * (1 + size("n_bearings")),
         "bearing_slopes": lambda size: size("n_bearings") ** 2,
         "smooth_multiplier": lambda size: size("n_closure_rows") if size("n_bearings") else 0,
     },
     compose={
-        "evaluate": {
+        "rates": {
             "friction": "(<equations.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "
             "<equations.load_drives>)"
         },
         "observe closures": {"friction": "<equations.take_off_closures>"},
     },
-    iterates=True,
     fill="model:fill",
     ledger="model:ledger",
     guards="model:guards",
