@@ -12,7 +12,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.dynamics import effects
 from flexclear.pipeline.dynamics.compile import functions
-from flexclear.pipeline.dynamics.compile.sources import kernels, modules, sources
+from flexclear.pipeline.dynamics.compile.sources import DESCRIBED, WHOLE, modules, sources, straight
 from flexclear.pipeline.dynamics.effects import Parts, Scheme
 
 BALL = {"type": "rigid", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "frames": {"F": {}}}
@@ -45,6 +45,11 @@ def test_what_a_family_lists_is_there(package: str, table: str, name: str) -> No
     assert hasattr(import_module(f"{package}.{module}"), made)
 
 
+def generated(parts: Parts, scheme: Scheme) -> list[str]:
+    """Files of a mechanism."""
+    return [*sources(parts, scheme).values(), *(straight(parts, (), name) for name in (WHOLE, DESCRIBED))]
+
+
 #: where a part of a family stands among the parts of the code
 CODE = {
     (effects.JOINTS, "NAMES"): lambda name: Parts((name,), closures=True),
@@ -65,7 +70,7 @@ COMPILED = [f for f in families() if f[:2] in CODE and f != (effects.LOADS, "NAM
 def test_what_a_part_compiles_reaches_its_module(package: str, table: str, name: str) -> None:
     """The digest of a compiled function changes with the sources of its parts."""
     parts = CODE[package, table](name)
-    texts = (sources(parts, Scheme("dop853")) | kernels(parts)).values()
+    texts = generated(parts, Scheme("dop853"))
     reached = {found for text in texts for found in functions.reached(text)}
     assert module_of(package, table, name) in reached
 
@@ -97,7 +102,7 @@ def test_the_key_of_a_run_holds_all_modules_that_its_code_can_reach(root: Path, 
     possible = {name, "free", *(() if len(part.COORDINATES) < 2 else {c.part for c in part.COORDINATES} | {"fixed"})}
     for scheme in effects.schemes(scene):
         parts = Parts(tuple(sorted(possible)), closures=True)
-        texts = (sources(parts, scheme) | kernels(parts)).values()
+        texts = generated(parts, scheme)
         assert {found for text in texts for found in functions.reached(text)} <= set(known)
 
 
@@ -136,7 +141,7 @@ def test_stops_and_gears_are_in_the_key_of_the_runs_that_have_them_and_of_no_oth
     tables, parts, module = BESIDE[family]
     if family == "stop":
         tables["stop"]["end"]["coordinate"] = "rotation"
-    texts = (sources(parts, Scheme("dop853")) | kernels(parts)).values()
+    texts = generated(parts, Scheme("dop853"))
     reached = {found for text in texts for found in functions.reached(text)}
     scene = scene_with({"type": "cylindrical"}, **tables)
     known = Sources(root).closure(["flexclear.stages.simulation", *modules(scene)]).keys()

@@ -47,7 +47,7 @@ INTRINSICS = {
 #: operations of a way that several states compute even where none of them goes it; for how many a call counts
 SHORT_WAY, CALL = 12, 40
 #: operations of a part of a program that is cut
-PART = 1_000
+PART = 500
 _NUMBER = ir.IntType(32)
 LIBRARY = {"sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "tanh": "tanh"}
 LIBRARY |= {"arctan2": "atan2", "pow": "pow"}
@@ -92,15 +92,22 @@ def _use(block: list[Any], counts: Counter[Symbol]) -> None:
             counts.update(operands(item))
 
 
-def size(block: list[Any], counts: Counter[Symbol]) -> int:
-    """How many operations a block has, each call for as many as it takes as long as."""
-    total = 0
-    for item in block:
-        if not isinstance(item, Symbol):
-            total += 1 + sum(size(inner, counts) for inner in item.blocks)
-        elif counts[item]:
-            total += CALL if item.operation in LIBRARY else 1
-    return total
+class Sizes:
+    """How many operations items of a block have, each call for as many as it takes as long as."""
+
+    def __init__(self, counts: Counter[Symbol]) -> None:
+        self.counts, self._known = counts, dict[int, int]()
+
+    def of(self, block: list[Any]) -> int:
+        """Of all items."""
+        return sum(map(self._size, block))
+
+    def _size(self, item: Any) -> int:
+        if isinstance(item, Symbol):
+            return (CALL if item.operation in LIBRARY else 1) if self.counts[item] else 0
+        if id(item) not in self._known:
+            self._known[id(item)] = 1 + sum(map(self.of, item.blocks))
+        return self._known[id(item)]
 
 
 def fused(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbol, Any]]:
@@ -129,17 +136,18 @@ def divisor(product: Symbol, counts: Counter[Symbol]) -> Symbol | None:
     return None
 
 
-def stretches(block: list[Any], counts: Counter[Symbol]) -> Iterator[list[Any]]:
+def stretches(block: list[Any], sizes: Sizes) -> Iterator[list[Any]]:
     """Consecutive items that are together no longer than a part; a longer one alone."""
     items, total = list[Any](), 0
     for item in block:
-        more = size([item], counts)
+        more = sizes.of([item])
         if items and total + more > PART:
             yield items
             items, total = [], 0
         items.append(item)
         total += more
-    yield items
+    if items:
+        yield items
 
 
 class Emitter:
@@ -164,6 +172,7 @@ class Emitter:
     ):
         self.builder, self.program, self.where, self.lanes, self.number = builder, program, where, lanes, number
         self.uses = uses(program)
+        self.sizes = Sizes(self.uses)
         self.exact, self.flags = exact, () if exact else FLAGS
         self.fused = fused(program.block, self.uses) if exact else {}
         self.inside_sums = {product for product, _ in self.fused.values()}
@@ -227,8 +236,8 @@ class Emitter:
     def _block(self, block: list[Any]) -> None:
         if not self.parts or self.builder is not self.parts.outer:
             return self._items(block)
-        for items in stretches(block, self.uses):
-            if isinstance(items[0], Branch) and size(items, self.uses) > PART:
+        for items in stretches(block, self.sizes):
+            if isinstance(items[0], Branch) and self.sizes.of(items) > PART:
                 self._branch(items[0])
                 for joined, *_ in items[0].joins:
                     if joined in self.values:
@@ -251,7 +260,7 @@ class Emitter:
             return
         if self.lanes > 1:
             self._both_ways(branch, joins)
-        elif any(size(block, self.uses) for block in branch.blocks):
+        elif any(map(self.sizes.of, branch.blocks)):
             self._one_way(branch, joins)
         else:
             self._joined(branch, joins, *([self._value(join[way], join[0].kind) for join in joins] for way in (1, 2)))
@@ -282,7 +291,7 @@ class Emitter:
         """Each lane has what its own way gives; a way that no lane goes is skipped if it is long."""
         ways = []
         for way, block in enumerate(branch.blocks, start=1):
-            if size(block, self.uses) <= SHORT_WAY:
+            if self.sizes.of(block) <= SHORT_WAY:
                 self._block(block)
                 ways.append([self._value(join[way], join[0].kind) for join in joins])
             else:

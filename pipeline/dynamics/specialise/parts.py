@@ -18,15 +18,17 @@ _INDEX, _FLOAT = ir.IntType(64), ir.DoubleType()
 class Parts:
     """The functions of a program, and where its values are.
 
-    outer: builder of the function that calls the others.  arguments: its own that they need.  places: given a builder
-    and such arguments, where the code finds an element of an array (`straight.places`).
+    outer: builder of the function that calls the others.  arguments: its own that they need.  places: where the
+    code finds an element of an array (`straight.places`).
     """
 
-    def __init__(self, outer: ir.IRBuilder, arguments: list[Any], places: Callable[[ir.IRBuilder, list[Any]], Any]):
+    def __init__(
+        self, outer: ir.IRBuilder, arguments: list[Any], places: Callable[[ir.IRBuilder, list[Any]], Callable]
+    ):
         self.outer, self.arguments, self.places = outer, arguments, places
         self._memory = outer.alloca(_FLOAT, _INDEX(1))
         self._slots = dict[Symbol, tuple[int, Any]]()
-        self._made = dict[Any, ir.IRBuilder]()
+        self._made, self._loaded = dict[Any, ir.IRBuilder](), dict[tuple[Any, Symbol], Any]()
 
     def begin(self) -> tuple[ir.IRBuilder, Any]:
         """Builder of another function, which is called here, and where its code finds elements."""
@@ -39,14 +41,20 @@ class Parts:
                 argument.add_attribute("noalias")
         self.outer.call(function, [*self.arguments, self._memory])
         builder = self._made[function] = ir.IRBuilder(function.append_basic_block())
-        return builder, self.places(builder, list(function.args[:-1]))
+        return builder, self.places(builder, [function.args[:-1]])
 
     def value(self, builder: ir.IRBuilder, symbol: Symbol, value: Any) -> Any:
         """A symbol's value where it is needed, by that where it was made."""
         if value.function is builder.function:
             return value
         self._slots.setdefault(symbol, (len(self._slots), value))
-        return builder.load(self._place(builder, symbol))
+        if builder is self.outer:
+            return builder.load(self._place(builder, symbol))
+        place = builder.function, symbol
+        if place not in self._loaded:
+            with builder.goto_entry_block():  # what needs it next may be in another block
+                self._loaded[place] = builder.load(self._place(builder, symbol))
+        return self._loaded[place]
 
     def keep(self, symbol: Symbol, value: Any) -> None:
         """Leave a value of the outer function to the others."""

@@ -146,6 +146,12 @@ class Trace:
                 for (memory, index), symbol in carried.items():
                     memory[index] = symbol
                 loop.condition = step(*arguments)
+            if not carried and not isinstance(loop.condition, Symbol):  # a number of the wiring, or all are numbers
+                self.tape.block += loop.blocks[0]
+                start = len(self.journal)
+                if loop.condition:
+                    continue
+                return
             left = {(memory, index): value for memory, index, _, value in self.journal[start:]}
             if left.keys() == carried.keys():
                 break
