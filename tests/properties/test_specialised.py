@@ -27,7 +27,7 @@ from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.dynamics.specialise import straight as tracing
+from flexclear.pipeline.dynamics.specialise import code
 from flexclear.pipeline.dynamics.specialise.code import Emitter
 from flexclear.pipeline.dynamics.specialise.straight import program
 from flexclear.pipeline.dynamics.specialise.trace import Trace
@@ -136,22 +136,22 @@ def engine(integrator: str = "dop853") -> Engine:
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "exponential"])  # that reads more of some evaluations than the rates
-def test_long_code_in_parts_runs_as_that_of_one_part_does(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_code_of_many_blocks_runs_as_that_of_few_does(integrator: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A stroke with impacts, as exactly as its own tolerance tells, with equal events."""
     whole = engine(integrator)
     runs = [integrate(whole, consistent_start(whole), silent)]
     with monkeypatch.context() as patch, TemporaryDirectory() as folder:
         patch.setenv("FLEXCLEAR_KERNELS", folder)
-        patch.setattr(tracing, "UNCUT", 10)
-        patch.setattr(compiler_process, "requested", lambda: False)  # it would not cut
+        patch.setattr(code, "BLOCK", 50)
+        patch.setattr(compiler_process, "requested", lambda: False)  # it would not divide
         patch.setattr(straight_code, "_known", {})
         patch.setattr(files, "loaded", {})
         patch.setattr(functions, "loaded", files.loaded)
-        cut = engine(integrator)
-        runs.append(integrate(cut, consistent_start(cut), silent))
-        assert whole.h[m.RATES] != cut.h[m.RATES] != cut.h[m.EVALUATE]
+        divided = engine(integrator)
+        runs.append(integrate(divided, consistent_start(divided), silent))
+        assert whole.h[m.RATES] != divided.h[m.RATES] != divided.h[m.EVALUATE]
         k, rates = len(runs[0].rows) // 2, []
-        for one, address in ((whole, m.EVALUATE), (whole, m.RATES), (cut, m.RATES)):
+        for one, address in ((whole, m.EVALUATE), (whole, m.RATES), (divided, m.RATES)):
             one.select_pieces_after(runs[0].time[k])
             one.h[m.EVALUATE], before_it = one.h[address], one.h[m.EVALUATE]
             rates.append(closure_rows.evaluate(one, runs[0].state[k], runs[0].time[k]))

@@ -36,7 +36,7 @@ def along(rates: Callable, wiring: wired.Wiring) -> Any:
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Any) -> Any:
             plain = program(kernel, wiring, longest=LONGEST_DIFFERENTIATED)
             tape = tangent(plain, LONGEST_DIFFERENTIATED)
-            Emitter(builder, tape, places(tape)(builder, [values])).emit()
+            Emitter(builder, tape, places(builder, tape, [values])).emit()
             return context.get_dummy_value()
 
         return types.void(h, f, w, n, y, dy, f0, w0, change, rates), generate
@@ -84,7 +84,7 @@ def abreast(rates: Callable, wiring: wired.Wiring, lanes: int) -> tuple[Any, Any
                 loaded.align = 8
                 return loaded
 
-            Emitter(builder, tape, places(tape)(builder, given), lanes, exact=True, number=number).emit()
+            Emitter(builder, tape, places(builder, tape, given), lanes, exact=True, number=number).emit()
             return context.get_dummy_value()
 
         return types.void(addresses, numbers), generate

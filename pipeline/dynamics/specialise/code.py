@@ -9,10 +9,9 @@ says, not those that the compiler likes.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from llvmlite import ir
 
@@ -29,9 +28,6 @@ from flexclear.pipeline.dynamics.specialise.tape import (
     operands,
 )
 
-if TYPE_CHECKING:
-    from flexclear.pipeline.dynamics.specialise.parts import Parts
-
 #: as of all kernels (`dynamics.kernels`)
 FLAGS = ("contract", "reassoc", "nsz")
 TYPES = {FLOAT: ir.DoubleType(), INTEGER: ir.IntType(64), BIT: ir.IntType(1)}
@@ -46,8 +42,8 @@ INTRINSICS = {
 }
 #: operations of a way that several states compute even where none of them goes it; for how many a call counts
 SHORT_WAY, CALL = 12, 40
-#: operations of a part of a program that is cut
-PART = 500
+#: operations after which another block begins: LLVM's time grows faster than the length of a block
+BLOCK = 3_000
 _NUMBER = ir.IntType(32)
 LIBRARY = {"sin": "sin", "cos": "cos", "tan": "tan", "exp": "exp", "log": "log", "tanh": "tanh"}
 LIBRARY |= {"arctan2": "atan2", "pow": "pow"}
@@ -92,22 +88,15 @@ def _use(block: list[Any], counts: Counter[Symbol]) -> None:
             counts.update(operands(item))
 
 
-class Sizes:
-    """How many operations items of a block have, each call for as many as it takes as long as."""
-
-    def __init__(self, counts: Counter[Symbol]) -> None:
-        self.counts, self._known = counts, dict[int, int]()
-
-    def of(self, block: list[Any]) -> int:
-        """Of all items."""
-        return sum(map(self._size, block))
-
-    def _size(self, item: Any) -> int:
-        if isinstance(item, Symbol):
-            return (CALL if item.operation in LIBRARY else 1) if self.counts[item] else 0
-        if id(item) not in self._known:
-            self._known[id(item)] = 1 + sum(map(self.of, item.blocks))
-        return self._known[id(item)]
+def size(block: list[Any], counts: Counter[Symbol]) -> int:
+    """How many operations a block has, each call for as many as it takes as long as."""
+    total = 0
+    for item in block:
+        if not isinstance(item, Symbol):
+            total += 1 + sum(size(inner, counts) for inner in item.blocks)
+        elif counts[item]:
+            total += CALL if item.operation in LIBRARY else 1
+    return total
 
 
 def fused(block: list[Any], counts: Counter[Symbol]) -> dict[Symbol, tuple[Symbol, Any]]:
@@ -136,27 +125,13 @@ def divisor(product: Symbol, counts: Counter[Symbol]) -> Symbol | None:
     return None
 
 
-def stretches(block: list[Any], sizes: Sizes) -> Iterator[list[Any]]:
-    """Consecutive items that are together no longer than a part; a longer one alone."""
-    items, total = list[Any](), 0
-    for item in block:
-        more = sizes.of([item])
-        if items and total + more > PART:
-            yield items
-            items, total = [], 0
-        items.append(item)
-        total += more
-    if items:
-        yield items
-
-
 class Emitter:
     """Writes a program into a function under construction.
 
     where: address of an array's element: where(array, index as a number or a value of the code, lane) -> pointer.
     lanes: states at once.  exact: every operation is rounded as it is.
     number: of several states, what is at an index of f, of all of them.
-    parts: the functions into which a long program of one state is cut.
+    divide: begins another of LLVM's blocks, after each `BLOCK` operations.
     """
 
     def __init__(
@@ -168,44 +143,32 @@ class Emitter:
         *,
         exact: bool = False,
         number: Callable[[int], Any] | None = None,
-        parts: Parts | None = None,
+        divide: Callable[[], None] | None = None,
     ):
         self.builder, self.program, self.where, self.lanes, self.number = builder, program, where, lanes, number
         self.uses = uses(program)
-        self.sizes = Sizes(self.uses)
         self.exact, self.flags = exact, () if exact else FLAGS
         self.fused = fused(program.block, self.uses) if exact else {}
         self.inside_sums = {product for product, _ in self.fused.values()}
         self.types = {kind: one if lanes == 1 else ir.VectorType(one, lanes) for kind, one in TYPES.items()}
         self.values: dict[Symbol, Any] = {}
-        self.parts = parts
+        self.divide, self.written = divide, 0
 
     def emit(self) -> None:
         """Write everything."""
         self._block(self.program.block)
-        stores, length = self.program.stores, PART if self.parts else len(self.program.stores)
-        for first in range(0, len(stores), length):
-            self._part(partial(self._store, stores[first : first + length]))
-        if self.parts:
-            self.parts.end()
-
-    def _store(self, stores: list[tuple[str, Any, Any]]) -> None:
-        for array, index, value in stores:
+        for array, index, value in self.program.stores:
             operand = self._value(value, INTEGER if array in "hn" else FLOAT)
             for lane in range(self.lanes):
                 self.builder.store(self._of(operand, lane), self.where(array, self._place(index, lane), lane))
 
     def _value(self, value: Any, kind: str) -> Any:
         if isinstance(value, Symbol):
-            return self._known(value)
+            return self.values[value]
         return ir.Constant(self.types[kind], value if self.lanes == 1 else [value] * self.lanes)
 
-    def _known(self, symbol: Symbol) -> Any:
-        value = self.values[symbol]
-        return self.parts.value(self.builder, symbol, value) if self.parts else value
-
     def _place(self, index: Any, lane: int) -> Any:
-        return self._of(self._known(index), lane) if isinstance(index, Symbol) else index
+        return self._of(self.values[index], lane) if isinstance(index, Symbol) else index
 
     # Lanes -------------------------------------------------------------------------------------------------------
 
@@ -224,28 +187,7 @@ class Emitter:
 
     # Blocks ------------------------------------------------------------------------------------------------------
 
-    def _part(self, write: Callable[[], None]) -> None:
-        """Write into a function of its own, where the program is cut."""
-        if not self.parts:
-            return write()
-        outside = self.builder, self.where
-        self.builder, self.where = self.parts.begin()
-        write()
-        self.builder, self.where = outside
-
     def _block(self, block: list[Any]) -> None:
-        if not self.parts or self.builder is not self.parts.outer:
-            return self._items(block)
-        for items in stretches(block, self.sizes):
-            if isinstance(items[0], Branch) and self.sizes.of(items) > PART:
-                self._branch(items[0])
-                for joined, *_ in items[0].joins:
-                    if joined in self.values:
-                        self.parts.keep(joined, self.values[joined])
-            else:
-                self._part(partial(self._items, items))
-
-    def _items(self, block: list[Any]) -> None:
         for item in block:
             if isinstance(item, Branch):
                 self._branch(item)
@@ -253,6 +195,9 @@ class Emitter:
                 self._loop(item)
             elif self.uses[item] and item not in self.inside_sums:
                 self.values[item] = self._operation(item)
+                self.written += 1
+                if self.divide and self.written % BLOCK == 0:
+                    self.divide()
 
     def _branch(self, branch: Branch) -> None:
         joins = [join for join in branch.joins if self.uses[join[0]]]
@@ -260,13 +205,13 @@ class Emitter:
             return
         if self.lanes > 1:
             self._both_ways(branch, joins)
-        elif any(map(self.sizes.of, branch.blocks)):
+        elif any(size(block, self.uses) for block in branch.blocks):
             self._one_way(branch, joins)
         else:
             self._joined(branch, joins, *([self._value(join[way], join[0].kind) for join in joins] for way in (1, 2)))
 
     def _joined(self, branch: Branch, joins: list[Any], first: list[Any], second: list[Any]) -> None:
-        condition = self._known(branch.condition)
+        condition = self.values[branch.condition]
         for (joined, _, _), a, b in zip(joins, first, second, strict=True):
             self.values[joined] = self.builder.select(condition, a, b)
 
@@ -274,24 +219,25 @@ class Emitter:
         builder = self.builder
         starts = [builder.append_basic_block() for _ in range(2)]
         after = builder.append_basic_block()
-        builder.cbranch(self._known(branch.condition), *starts)
+        builder.cbranch(self.values[branch.condition], *starts)
         ends = []
-        for way, (start, block) in enumerate(zip(starts, branch.blocks, strict=True), start=1):
+        for start, block in zip(starts, branch.blocks, strict=True):
             builder.position_at_end(start)
             self._block(block)
-            ends.append(([self._value(join[way], join[0].kind) for join in joins], builder.block))
+            ends.append(builder.block)
             builder.branch(after)
         builder.position_at_end(after)
-        for k, (joined, _, _) in enumerate(joins):
-            self.values[joined] = phi = builder.phi(TYPES[joined.kind])
-            for left, end in ends:
-                phi.add_incoming(left[k], end)
+        for joined, *values in joins:
+            phi = builder.phi(TYPES[joined.kind])
+            for value, end in zip(values, ends, strict=True):
+                phi.add_incoming(self._value(value, joined.kind), end)
+            self.values[joined] = phi
 
     def _both_ways(self, branch: Branch, joins: list[Any]) -> None:
         """Each lane has what its own way gives; a way that no lane goes is skipped if it is long."""
         ways = []
         for way, block in enumerate(branch.blocks, start=1):
-            if self.sizes.of(block) <= SHORT_WAY:
+            if size(block, self.uses) <= SHORT_WAY:
                 self._block(block)
                 ways.append([self._value(join[way], join[0].kind) for join in joins])
             else:
@@ -304,7 +250,7 @@ class Emitter:
         start, after, before = builder.append_basic_block(), builder.append_basic_block(), builder.block
         none = word(0 if way == 1 else -1)
         builder.cbranch(
-            builder.icmp_unsigned("!=", builder.bitcast(self._known(branch.condition), word), none), start, after
+            builder.icmp_unsigned("!=", builder.bitcast(self.values[branch.condition], word), none), start, after
         )
         builder.position_at_end(start)
         self._block(branch.blocks[way - 1])
@@ -344,7 +290,7 @@ class Emitter:
             return self._load(*s.arguments)
         if name == "select":
             condition, a, b = s.arguments
-            return builder.select(self._known(condition), self._value(a, s.kind), self._value(b, s.kind))
+            return builder.select(self.values[condition], self._value(a, s.kind), self._value(b, s.kind))
         if s in self.fused:
             return self._sum_with_product(s, *self.fused[s])
         kind = next(a.kind for a in s.arguments if isinstance(a, Symbol))

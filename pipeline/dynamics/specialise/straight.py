@@ -10,20 +10,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 from llvmlite import ir
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.specialise import wiring as wired
-from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, Sizes, loads, uses
-from flexclear.pipeline.dynamics.specialise.parts import Parts
+from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
 from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, same
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
-#: operations beyond which a program is cut into functions that LLVM takes one by one
-UNCUT = 50_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
 KEPT |= {m.NAMED[watched].place for watched in ("bends", "bearing")}
@@ -93,29 +89,31 @@ def straight(
         address = builder.load(builder.gep(arrays[0], [_INTEGER(m.PRESCRIBE)]))
         laws = ir.FunctionType(_INTEGER, [*tables, _FLOAT]).as_pointer()
         builder.call(builder.inttoptr(address, laws), function.args[:5])
-    found = places(tape)
-    mine = [*arrays, *given]
-    cut = not (whole or describes) and Sizes(uses(tape)).of(tape.block) > UNCUT
-    parts = Parts(builder, mine, found) if cut else None
-    Emitter(builder, tape, found(builder, [mine]), exact=exact, parts=parts).emit()
-    builder.ret(_INTEGER(0))
+    # another way out of each block, which is never taken: LLVM makes one block of two that only follow each other
+    size, never = builder.load(builder.gep(arrays[0], [_INTEGER(m.NV)])), function.append_basic_block()
+    always = builder.icmp_signed(">=", size, _INTEGER(0))
+
+    def divide() -> None:
+        following = builder.append_basic_block()
+        builder.cbranch(always, following, never)
+        builder.position_at_end(following)
+
+    Emitter(builder, tape, places(builder, tape, [[*arrays, *given]]), exact=exact, divide=divide).emit()
+    for end in (builder.block, never):
+        builder.position_at_end(end)
+        builder.ret(_INTEGER(0))
     return str(module)
 
 
-def places(tape: Program) -> Callable[[ir.IRBuilder, list[Any]], Callable]:
-    """places(builder, given): where the code finds an element of an array in a lane: in a stretch whose begin it has
-    looked up first.
+def places(builder: ir.IRBuilder, tape: Program, given: list[Any]) -> Callable:
+    """Where the code finds an element of an array in a lane: in a stretch whose begin it has looked up first.
 
     given: h, f, w, n, y and dy of each lane; of a tangent also where its changes are, see `abreast.along`; of what only
     describes no more than the arrays.
     """
-    indices = [(array, index) for array, index, _ in tape.stores] + loads(tape)
-    stretches = sorted({(array, wired.split(index)[0]) for array, index in indices if isinstance(index, int)})
-    return partial(_places, stretches)
-
-
-def _places(stretches: list[tuple[str, int]], builder: ir.IRBuilder, given: list[Any]) -> Callable:
     begins, arrays = dict[Any, Any](), list[dict[str, Any]]()
+    places = [(array, index) for array, index, _ in tape.stores] + loads(tape)
+    stretches = sorted({(array, wired.split(index)[0]) for array, index in places if isinstance(index, int)})
     for lane, (h, f, w, n, *states) in enumerate(given):
         arrays.append({"h": h, "f": f, "w": w, "n": n})
         reported, changes = {-1: _INTEGER(0)}, states[2:]
