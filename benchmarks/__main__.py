@@ -9,10 +9,9 @@ import sys
 import time
 from dataclasses import replace
 from fnmatch import fnmatch
-from importlib.util import find_spec
 from pathlib import Path
 
-from benchmarks import families, log, page, system
+from benchmarks import families, log, page, processes
 from benchmarks.family import WRONG, Case, Family, Record
 from flexclear.commands.__main__ import INTERRUPTED
 from flexclear.pipeline.core.scene.registry import suggestion
@@ -67,11 +66,11 @@ def _listed(chosen: dict[str, Family]) -> str:
 def _run(name: str, family: Family, options: argparse.Namespace) -> bool:
     """Measure a family, print and log what was found; whether a case went wrong."""
     settings = _settings(name, family, options)
-    if family.needs is not None and not _installed(family.needs[0]):
+    if family.needs is not None and not processes.installed(family.needs[0]):
         library, extra = family.needs
         print(f"{name}: {library} is not installed; .venv/bin/python -m pip install -e '.[{extra}]' brings it")
         return False
-    if family.children and (why := system.lacking()):
+    if family.children and (why := processes.lacking()):
         print(f"{name}: {why}")
         return False
     every = family.cases(**settings)
@@ -119,13 +118,6 @@ def _settings(name: str, family: Family, options: argparse.Namespace) -> dict[st
     if found != family.settings and options.into is None and not options.dry:
         raise InputError("--set", "would put other cases in the place of those of this project", "say --into FOLDER")
     return found
-
-
-def _installed(library: str) -> bool:
-    try:
-        return find_spec(library) is not None
-    except ValueError:  # its import is blocked
-        return False
 
 
 def _logs(options: argparse.Namespace) -> Path:

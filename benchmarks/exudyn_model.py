@@ -20,21 +20,14 @@ import xarray as xr
 from numpy.polynomial.polynomial import polyder
 
 from benchmarks.errors import Samples
-from benchmarks.mechanisms import Mechanism, joint_laws
+from benchmarks.mechanisms import Mechanism
 from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
+from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.contact.surfaces import BallInSocket
-from flexclear.pipeline.dynamics.drives.pieces import Pieces
+from flexclear.pipeline.dynamics.contact.surfaces import clearance_spherical
+from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
+from flexclear.pipeline.dynamics.model import merge as grouping
 from flexclear.pipeline.dynamics.model.contacts import LEAST_RATE
-from flexclear.pipeline.dynamics.model.merge import (
-    Frame,
-    Group,
-    Placement,
-    frames_of,
-    merge,
-    rigid_inertia,
-    start_places,
-)
 
 EPSILON = np.array([[[(i - j) * (j - k) * (k - i) / 2.0 for k in range(3)] for j in range(3)] for i in range(3)])
 #: axes with x along the old z: Exudyn's prismatic joint slides along x
@@ -57,10 +50,10 @@ class Model:
 
     system: Any
     parts: Any
-    frames: dict[str, Frame]
-    groups: list[Group]
+    frames: dict[str, grouping.Frame]
+    groups: list[grouping.Group]
     group_of: dict[str, int]
-    starts: list[Placement]
+    starts: list[grouping.Placement]
     bundles: Mapping[str, xr.Dataset]
     bodies: list[Any] = field(default_factory=list)
     centres: list[np.ndarray] = field(default_factory=list)
@@ -88,10 +81,10 @@ def build(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> Model:
     """The model of a scene, not yet assembled, so that sensors can be added."""
     container, parts = load().SystemContainer(), import_module("exudyn.itemInterface")
     _check(scene)
-    frames = frames_of(scene, bundles)
+    frames = grouping.frames_of(scene, bundles)
     scene = _held_legs_merged(scene, frames)
-    groups, group_of = merge(scene, frames)
-    starts = start_places(scene, groups, group_of, frames)
+    groups, group_of = grouping.merge(scene, frames)
+    starts = grouping.start_places(scene, groups, group_of, frames)
     model = Model(container.AddSystem(), parts, frames, groups, group_of, starts, bundles)
     model.system.variables["container"] = container  # kept alive with its system
     _bodies(model, scene)
@@ -105,7 +98,7 @@ def _check(scene: Scene) -> None:
         raise ValueError("the Exudyn model has no loads, and starts at rest at t = 0")
 
 
-def _held_legs_merged(scene: Scene, frames: Mapping[str, Frame]) -> Scene:
+def _held_legs_merged(scene: Scene, frames: Mapping[str, grouping.Frame]) -> Scene:
     """Joints between rigid bodies whose drive keeps them at zero become fixed ones."""
     flexible = scene.flexible()
     held = {
@@ -128,22 +121,22 @@ def _bodies(model: Model, scene: Scene) -> None:
         (_flexible_body if group.flexible else _rigid_body)(model, scene, i)
 
 
-def _node(model: Model, place: Placement) -> Any:
+def _node(model: Model, place: grouping.Placement) -> Any:
     from exudyn.utilities import RotationMatrix2EulerParameters
 
     turned = list(RotationMatrix2EulerParameters(place.R))
     return model.system.AddNode(model.parts.NodeRigidBodyEP(referenceCoordinates=[*place.p, *turned]))
 
 
-def _add_rigid(model: Model, place: Placement, mass: float, J: np.ndarray) -> Any:
+def _add_rigid(model: Model, place: grouping.Placement, mass: float, J: np.ndarray) -> Any:
     inertia = [J[0, 0], J[1, 1], J[2, 2], J[1, 2], J[0, 2], J[0, 1]]
     body = model.parts.ObjectRigidBody(mass=mass, inertia=inertia, nodeNumber=_node(model, place))
     return model.system.AddObject(body)
 
 
 def _rigid_body(model: Model, scene: Scene, i: int) -> None:
-    mass, com, J = rigid_inertia(scene, model.groups[i].places)
-    model.bodies.append(_add_rigid(model, model.starts[i].of(Placement(com)), mass, J))
+    mass, com, J = grouping.rigid_inertia(scene, model.groups[i].places)
+    model.bodies.append(_add_rigid(model, model.starts[i].of(grouping.Placement(com)), mass, J))
     model.centres.append(com)
 
 
@@ -259,6 +252,16 @@ def _joints(model: Model, scene: Scene) -> None:
             add(parts.ObjectJointPrismaticX(markerNumbers=ends))
 
 
+def joint_laws(scene: Scene) -> dict[str, Pieces]:
+    """The law of every driven joint's coordinate; ValueError for drives that prescribe something else."""
+    found, dimension = {}, {"prismatic": "length", "revolute": "angle"}
+    for name, drive in scene.drive.items():
+        if not isinstance(drive, JointDrive):
+            raise ValueError(f"[drive.{name}] does not prescribe a joint's coordinate")
+        found[drive.joint] = pieces_of(drive.law, dimension[scene.joint[drive.joint].type])
+    return found
+
+
 def _driven(model: Model, a: str, b: str, law: Pieces) -> None:
     """Prismatic joint with a prescribed coordinate; on a flexible rod by way of a slide of next to no mass."""
     add, parts = model.system.AddObject, model.parts
@@ -331,7 +334,7 @@ def _contact(model: Model, joint: ClearanceSpherical, socket: Any, ball: Any) ->
             spheresRadii=[joint.ball_radius, joint.ball_radius + joint.clearance],
             isHollowSphere1=True,
             impactModel=1,
-            contactStiffness=BallInSocket.stiffness(joint, exponent),
+            contactStiffness=clearance_spherical.stiffness(joint, exponent),
             contactStiffnessExponent=exponent,
             restitutionCoefficient=1.0 - 0.5 * (1.0 - restitution**2),
             minimumImpactVelocity=joint.floor or LEAST_RATE,

@@ -51,7 +51,7 @@ class Family:
     modules: what decides about a case. With it, a result is valid until a source that they import changes; without
     it, a case is measured again whenever that is asked for.
     needs: an optional library, and the extra of this project that brings it.
-    children: it measures or limits child processes, which not every system can (`benchmarks.system`).
+    children: it measures or limits child processes, which not every system can (`benchmarks.processes`).
     """
 
     what: str

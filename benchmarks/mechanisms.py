@@ -1,4 +1,4 @@
-"""Scenes with their bundles and compiled engines, their drives' laws, and the states at which they are evaluated."""
+"""Scenes with their bundles and compiled engines, and the states at which they are evaluated."""
 
 from __future__ import annotations
 
@@ -12,14 +12,13 @@ import xarray as xr
 from benchmarks.timing import once
 from flexclear.commands.scenes import bundles, find_scene
 from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
-from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
-from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised, straight_code
+from flexclear.pipeline.dynamics.integrate import recording
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows, specialised
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
@@ -27,9 +26,6 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
 
 #: the scenes of the paper, from the least to the fullest
 SCENES = ("ideal", "far_free", "far_fixed", "far_cb", "csj", "far_csj_free", "far_csj_fixed", "far_csj_cb")
-
-#: of what a drive prescribes
-DIMENSION = {"prismatic": "length", "revolute": "angle"}
 
 
 @dataclass(frozen=True)
@@ -43,14 +39,6 @@ class Mechanism:
     def engine(self) -> Engine:
         """Its compiled engine."""
         return engine_of(self.scene, self.bundles, silent)
-
-    def general_engine(self) -> Engine:
-        """Its engine that evaluates with the kernels for all wirings, as what is too long for straight code does."""
-        proper, straight_code.suited = straight_code.suited, lambda model: False
-        try:
-            return self.engine()
-        finally:
-            straight_code.suited = proper
 
     def with_scene(self, name: str, scene: Scene) -> Mechanism:
         """The same bundles under an edited scene."""
@@ -94,16 +82,6 @@ def damped(scene: Scene, ratio: float) -> Scene:
     return edited(scene, {f"body.{name}.damping": ratio for name in scene.flexible()})
 
 
-def joint_laws(scene: Scene) -> dict[str, Pieces]:
-    """The law of every driven joint's coordinate; ValueError for drives that prescribe something else."""
-    found = {}
-    for name, drive in scene.drive.items():
-        if not isinstance(drive, JointDrive):
-            raise ValueError(f"[drive.{name}] does not prescribe a joint's coordinate")
-        found[drive.joint] = pieces_of(drive.law, DIMENSION[scene.joint[drive.joint].type])
-    return found
-
-
 def trajectory(engine: Engine) -> Trajectory:
     """A whole run of an engine, from its consistent start."""
     return integrate(engine, consistent_start(engine), silent)
@@ -111,7 +89,7 @@ def trajectory(engine: Engine) -> Trajectory:
 
 def states(engine: Engine, run: Trajectory) -> dict[str, State]:
     """A state of the run without contact ("free") and, where all contacts press at a time, one of those."""
-    record = m.record(run.rows, run.contacts)
+    record = recording.record(run.rows, run.contacts)
     found = {"free": np.flatnonzero(~np.any(record.modes == 1.0, axis=1))}
     if run.contacts:
         forces = observed(engine, run).touch["normal_force"]

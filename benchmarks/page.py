@@ -31,8 +31,7 @@ NOTHING = "Not measured."
 
 def named(name: str) -> Family:
     """The family of a name; InputError, with those there are, for any other."""
-    found: Family = lookup(families.__name__, name, where="python -m benchmarks")
-    return found
+    return lookup(families.__name__, name, where="python -m benchmarks")
 
 
 def of_page(page: str) -> dict[str, Family]:

@@ -9,9 +9,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from benchmarks import system
+from benchmarks import processes
 
 T = TypeVar("T")
+K = TypeVar("K")
 #: of times in the log, per second
 UNITS = {"s": 1.0, "us": 1e6}
 
@@ -51,19 +52,19 @@ def once(task: Callable[[], object]) -> float:
 
 def of_children(task: Callable[[], object]) -> float:
     """Processor time of the processes that one call starts and waits for, with those that they start [s]."""
-    before = system.seconds_of_children()
+    before = processes.seconds_of_children()
     task()
-    return system.seconds_of_children() - before
+    return processes.seconds_of_children() - before
 
 
-def interleaved(tasks: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, Times]:
+def interleaved(tasks: Mapping[K, Callable[[], float]], rounds: int) -> dict[K, Times]:
     """Each task, which returns its own time [s], once per round, one after the other; a first round does not count."""
     return {name: Times(seconds) for name, seconds in in_turn(tasks, rounds).items()}
 
 
-def in_turn(tasks: Mapping[str, Callable[[], T]], rounds: int) -> dict[str, tuple[T, ...]]:
+def in_turn(tasks: Mapping[K, Callable[[], T]], rounds: int) -> dict[K, tuple[T, ...]]:
     """What each task returns, once per round, one after the other; a first round, which compiles, does not count."""
-    results: dict[str, list[T]] = {name: [] for name in tasks}
+    results: dict[K, list[T]] = {name: [] for name in tasks}
     for number in range(rounds + 1):
         for name, task in tasks.items():
             made = task()

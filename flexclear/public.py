@@ -115,9 +115,8 @@ def cost(scene: Scene | str | Path, budget: str | float | None = None, *, models
     In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     from flexclear.commands import cost as cost_command
-    from flexclear.stages.workplace import open_workplace
 
-    return cost_command.dataset(_loaded(scene), open_workplace(), budget, models)
+    return cost_command.dataset(_loaded(scene), budget, models)
 
 
 def stability(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
@@ -127,10 +126,9 @@ def stability(scene: Scene | str | Path, budget: str | float | None = None) -> x
     singular poses, predictability.  budget: as of `cost`; by default three times the run's own cost.  In a notebook
     the dataset shows the answer first.  Raises FlexclearError.
     """
-    from flexclear.commands import answers as answers_command
-    from flexclear.stages.workplace import open_workplace
+    from flexclear.commands import answers
 
-    return answers_command.dataset("stability", _loaded(scene), open_workplace(), budget)
+    return answers.dataset("stability", _loaded(scene), budget)
 
 
 def sweep(
@@ -153,8 +151,8 @@ def sweep(
     >>> import flexclear as fc
     >>> where = {"load.gravity.acceleration.1": [-9.81, -1.62]}  # on the earth, and on the moon
     >>> kept, short = ["bob.velocity.largest"], {"time.end": "0.2 s"}
-    >>> found = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
-    >>> found["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
+    >>> result = fc.sweep("scenes/checks/pendulum.toml", where, kept, set=short, workers=1)
+    >>> result["bob.velocity.largest"].values.round(3).tolist()  # [m/s]
     [1.954, 0.324]
     """
     from flexclear.commands import sweep as sweep_command
@@ -175,9 +173,15 @@ def sections(scene: Scene | str | Path) -> tuple[xr.Dataset, xr.Dataset]:
     The verdict (schema VERDICT) says in its attributes whether the motion is periodic, quasi-periodic or chaotic, and
     why.  How many periods: the scene's `[sections]`.  Raises FlexclearError: InputError where the laws do not repeat.
     """
-    from flexclear.commands import sections as sections_command
+    from flexclear.commands import scenes
+    from flexclear.stages.graph import Graph
+    from flexclear.stages.workplace import open_workplace
 
-    return sections_command.judge(_loaded(scene))
+    one = _loaded(scene)
+    graph = Graph(one, shown=scenes.as_in_its_file(one))
+    made = open_workplace().datasets(graph.sections, graph.verdict, jobs=1)
+    recorded, verdict = (data.assign_attrs(title=one.title, scene=one.name) for data in made)
+    return recorded, verdict
 
 
 def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str]) -> xr.Dataset:
@@ -191,13 +195,16 @@ def sensitivities(scene: Scene | str | Path, of: Sequence[str], to: Sequence[str
 
     >>> import flexclear as fc
     >>> short = fc.load_scene("scenes/checks/pendulum.toml", override={"time.end": "0.2 s"})
-    >>> found = fc.sensitivities(short, ["bob.velocity.final"], ["load.gravity.acceleration.1"])
-    >>> found["bob.velocity.final"].sel(parameter="load.gravity.acceleration.1").values.shape
+    >>> result = fc.sensitivities(short, ["bob.velocity.final"], ["load.gravity.acceleration.1"])
+    >>> result["bob.velocity.final"].sel(parameter="load.gravity.acceleration.1").values.shape
     (3,)
     """
     from flexclear.commands import scenes
+    from flexclear.stages.graph import Graph
+    from flexclear.stages.workplace import open_workplace
 
-    return scenes.sensitivities(_loaded(scene), of, to)
+    scenes.examine(one := _loaded(scene))
+    return open_workplace().datasets(Graph(one, shown=False).sensitivities(of, to), jobs=1)[0]
 
 
 def quantity(run: xr.Dataset, name: str) -> xr.DataArray:
@@ -252,8 +259,8 @@ def frequencies(
     vibrations about steady motion at each of them (schema CAMPBELL).  drive: its name, where several drives move.
 
     >>> import flexclear as fc
-    >>> found = fc.frequencies("scenes/checks/oscillator.toml")
-    >>> round(found["frequency"].item(), 4), round(found["damping_ratio"].item(), 6)  # [Hz], [-]
+    >>> result = fc.frequencies("scenes/checks/oscillator.toml")
+    >>> round(result["frequency"].item(), 4), round(result["damping_ratio"].item(), 6)  # [Hz], [-]
     (1.5836, 0.1)
     """
     from flexclear.commands import scenes
@@ -275,8 +282,7 @@ def compare(
     from flexclear.stages.workplace import open_workplace
 
     without = "both" if ideal is True else ideal or None
-    comparison = compare_command.bring([_loaded(scene) for scene in scenes], open_workplace(), without)
-    return comparison.dataset()
+    return compare_command.bring([_loaded(scene) for scene in scenes], open_workplace(), without).dataset()
 
 
 def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.Dataset:
@@ -287,13 +293,13 @@ def effects(scene: Scene | str | Path, budget: str | float | None = None) -> xr.
     important ones first, with as many members as decide the change (`pipeline.post.answers.matters`); a notebook shows
     the answer first.  Raises FlexclearError.
     """
-    from flexclear.commands import answers as answers_command
+    from flexclear.commands import answers
     from flexclear.commands import effects as effects_command
     from flexclear.stages.workplace import open_workplace
 
     if budget is not None:
-        return answers_command.dataset("matters", _loaded(scene), open_workplace(), budget)
-    return effects_command.dataset(_loaded(scene), open_workplace())
+        return answers.dataset("matters", _loaded(scene), budget)
+    return effects_command.bring(_loaded(scene), open_workplace()).dataset()
 
 
 def plan(
@@ -309,16 +315,18 @@ def plan(
     In a notebook the dataset shows the answer first.  Raises FlexclearError.
     """
     from flexclear.commands import plan as plan_command
-    from flexclear.stages.workplace import open_workplace
 
-    return plan_command.dataset(_loaded(scene), open_workplace(), accuracy, budget)
+    return plan_command.dataset(_loaded(scene), accuracy, budget)
 
 
 def render(scene: Scene | str | Path) -> Path:
     """The folder with the scene's pictures, film and mode shapes, brought up to date.  Raises FlexclearError."""
-    from flexclear.commands import render as render_command
+    from flexclear.commands import scenes
+    from flexclear.stages.graph import Graph
+    from flexclear.stages.workplace import open_workplace
 
-    return render_command.rendered(_loaded(scene))
+    scenes.require_names(one := _loaded(scene))
+    return open_workplace().made(*Graph(one).render.values(), jobs=1)[0].folder
 
 
 def show(scene: Scene | str | Path, folder: str | Path | None = None) -> Any:
@@ -344,13 +352,15 @@ def report(scene: Scene | str | Path, budget: str | float | None = None, *, answ
     budget: of what accuracy costs, whether the run is stable and which effects matter, as of `stability`; answers:
     whether these are there.  Raises FlexclearError.
     """
-    from flexclear.commands import answers as answers_command
-    from flexclear.commands import scene_report, scenes
-    from flexclear.stages.workplace import open_workplace
+    from flexclear.commands import report as report_command
+    from flexclear.commands import scenes
+    from flexclear.stages.graph import Graph
+    from flexclear.stages.workplace import open_workplace, seconds
 
-    seconds = answers_command.seconds(budget)
-    graph, where = scenes.graph(_loaded(scene)), open_workplace()
-    return scene_report.make(graph, where, seconds=seconds, answers=answers)
+    given = None if budget is None else seconds(budget, "budget")
+    scenes.examine(one := _loaded(scene))
+    graph = Graph(one, shown=one.path is None or scenes.as_in_its_file(one))
+    return report_command.of_scene(graph, open_workplace(), budget=given, answers=answers)
 
 
 def open(scene: Scene | str | Path) -> xr.DataTree:

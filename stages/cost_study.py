@@ -19,12 +19,12 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
     params: `points` (key, group, factors, name of the input), `quantities` (owner, kind), `title`, the `own`
     setting of the scene (own_integrator, own_rtol or own_step), what was left `undone` in words, whether the study is
-    `complete`, and `peers`, as of `flexclear.commands.cost_peers`.  The reference is the tightest run among the
+    `complete`, and `peers`, as of `flexclear.commands.cost.read_peers`.  The reference is the tightest run among the
     points, and a run by another method confirms it.
     """
     from flexclear.pipeline.core.scene.quantity import Quantity
-    from flexclear.pipeline.post.cost import answer, causes, price, statistics, work_precision
-    from flexclear.pipeline.post.cost.split import causes_of
+    from flexclear.pipeline.post.cost import answer, causes, statistics, work_precision
+    from flexclear.pipeline.post.cost.causes import causes_of
     from flexclear.pipeline.post.cost.study import Point, assemble, cost, with_reference
     from flexclear.pipeline.post.plotting.table import files
 
@@ -45,8 +45,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     said += (f"Not run within the budget: {params['undone']}.",) if params["undone"] else ()
     study = causes.with_causes(study, split)
     result: dict[str, Any] = {"nc": study}
-    result |= files("price", price.price_list(study, f"What accuracy costs: {title}", said))
-    result |= files("quantities", price.by_quantity(study, f"What each quantity costs: {title}"))
+    result |= files("price", answer.price_list(study, f"What accuracy costs: {title}", said))
+    result |= files("quantities", answer.by_quantity(study, f"What each quantity costs: {title}"))
     result |= files("causes", causes.table(split, f"Where the error comes from: {title}"))
     result |= answer.figure("accuracy", study, f"What accuracy costs: {title}")
     result |= causes.make("causes", split, f"Where the error comes from: {title}")
@@ -71,10 +71,10 @@ def _marks(points: list[Any], runs: Mapping[str, xr.Dataset], chosen: list[Any])
     from flexclear.pipeline.post.cost.study import believed, cost, relative_errors
     from flexclear.pipeline.post.cost.work_precision import Mark
 
-    reference, found = runs[next(p.key for p in points if p.group == "reference")], []
+    reference, marks = runs[next(p.key for p in points if p.group == "reference")], []
     for name, group in (("this scene", "sampling"), ("paper's choice", "paper")):
         run = next((runs[p.key] for p in points if p.group == group and "refused" not in runs[p.key].attrs), None)
         if run is not None:
             errors = relative_errors(run, reference, chosen, believed(points, runs))
-            found.append(Mark(name, cost(run, "cpu_seconds"), errors))
-    return tuple(found)
+            marks.append(Mark(name, cost(run, "cpu_seconds"), errors))
+    return tuple(marks)

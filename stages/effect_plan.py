@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -145,9 +144,3 @@ def less(inputs: Mapping[str, xr.Dataset]) -> list[dict[str, xr.Dataset]]:
 def _meshed(simulate: Mapping[str, Any], name: str) -> bool:
     """Whether a body that a recipe describes is rigid in the scene itself."""
     return bool(simulate["scene"]["body"][name.removeprefix(rigid_body.PREFIX)]["type"] == "rigid")
-
-
-def from_dataset(planned: xr.Dataset) -> dict[str, Any]:
-    """What of a plan makes its scene: names of effects that go, modes, integrator and tolerance."""
-    choice: dict[str, Any] = json.loads(planned.attrs["planned"])
-    return choice

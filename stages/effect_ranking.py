@@ -19,15 +19,16 @@ def task(
     scene: Scene,
     chosen: Sequence[Quantity],
     words: Mapping[str, str],
-    variants: Mapping[str, tuple[Scene, Mapping[int, Task]]],
+    variants: Mapping[str, Scene],
+    tasks: Mapping[tuple[str, int], Task],
     pairs: Mapping[str, int],
     undone: Sequence[str],
 ) -> Task:
     """The task of the answer.
 
-    words: of the effects.  variants: the scene without each effect, by its name (the full one by the empty name), and
-    its tasks by the number of members (`stages.watched_quantities`).  pairs: members with which each effect is
-    compared.
+    words: of the effects.  variants: the scene without each effect, by its name (the full one by the empty name).
+    tasks: of these by name and number of members (`stages.watched_quantities`).  pairs: members with which each effect
+    is compared.
     """
     used = {("", members) for members in pairs.values()} | set(pairs.items())
     return Task(
@@ -40,10 +41,10 @@ def task(
             "units": [q.unit for q in chosen],
             "words": dict(words),
             "pairs": dict(pairs),
-            "owners": {name: {k: list(v) for k, v in made.owners().items()} for name, (made, _) in variants.items()},
+            "owners": {name: {k: list(v) for k, v in made.owners().items()} for name, made in variants.items()},
             "undone": ", ".join(undone),
         },
-        inputs={f"{name}:{members}": variants[name][1][members] for name, members in sorted(used)},
+        inputs={f"{name}:{members}": tasks[name, members] for name, members in sorted(used)},
         folder=f"effects/{scene.name.replace('/', '_')}",
         names={"nc": "matters.nc"},
     )

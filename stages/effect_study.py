@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.variants import Effect
 from flexclear.pipeline.core.workflow.task import Task
 
@@ -19,17 +18,15 @@ if TYPE_CHECKING:
 Names = frozenset[str]
 
 
-def variants_of(effects: Sequence[Effect]) -> list[Names]:
-    """The variants that are needed, by the effects that they lack."""
-    from flexclear.pipeline.post.answers.effect_sizes import variants as needed
-
-    return needed(effects)
-
-
 def task(
-    scene: Scene, effects: Sequence[Effect], chosen: Sequence[Quantity], watched: Mapping[Names, Task], members: int
+    scene: Scene,
+    effects: Sequence[Effect],
+    chosen: Sequence[Quantity],
+    variants: Mapping[Names, Scene],
+    watched: Mapping[Names, Task],
+    members: int,
 ) -> Task:
-    """The task of all differences."""
+    """The task of all differences.  variants, watched: the scenes by the effects that they lack, and their tasks."""
     return Task(
         stage="effects",
         scene=scene.name,
@@ -41,17 +38,13 @@ def task(
             "quantities": [q.written() for q in chosen],
             "units": [q.unit for q in chosen],
             "variants": [sorted(gone) for gone in watched],
-            "owners": [{k: list(v) for k, v in _variant(scene, effects, gone).owners().items()} for gone in watched],
+            "owners": [{k: list(v) for k, v in variant.owners().items()} for variant in variants.values()],
             "members": members,
         },
         inputs={f"variant{k}": made for k, made in enumerate(watched.values())},
         folder=f"effects/{scene.name.replace('/', '_')}",
         names={"nc": "effects.nc"},
     )
-
-
-def _variant(scene: Scene, effects: Sequence[Effect], gone: Names) -> Scene:
-    return variants.without(scene, [effect for effect in effects if effect.name in gone])
 
 
 def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -78,8 +71,8 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
 
 def page(scene: Scene, words: str, picture: bytes) -> bytes:
     """The page of the table and the chart."""
-    from flexclear.pipeline.post.overview.page import Part, media
-    from flexclear.pipeline.post.overview.page import page as written
+    from flexclear.pipeline.post.pages import Part, media
+    from flexclear.pipeline.post.pages import page as written
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
     parts = [

@@ -13,12 +13,12 @@ if TYPE_CHECKING:
 
 def verdict(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """Verdict (schema VERDICT) and its figure; the input is ``sections``, and `params` names their scene."""
-    from flexclear.pipeline.post.sections import section_figure
+    from flexclear.pipeline.post.sections import verdict_page
     from flexclear.pipeline.post.sections.verdict import derive
 
     sections = inputs["sections"].assign_attrs(scene=params["scene"])
     judged = derive(sections)
-    return {"nc": judged, **section_figure.make(sections, judged)}
+    return {"nc": judged, **verdict_page.make(sections, judged)}
 
 
 def overview(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
@@ -37,8 +37,8 @@ def comparison(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], prog
     where there is one.
     """
     from flexclear.pipeline.core.scene.quantity import Quantity
+    from flexclear.pipeline.post.overview import comparison
     from flexclear.pipeline.post.overview import comparison as compared_runs
-    from flexclear.pipeline.post.overview import overlay
     from flexclear.pipeline.post.plotting.table import files
 
     runs = {label: inputs[f"run{k}"] for k, label in enumerate(params["labels"])}
@@ -49,4 +49,4 @@ def comparison(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], prog
     result: dict[str, Any] = {"nc": compared}
     result |= files("differences", compared_runs.table(compared)) | files("costs", compared_runs.costs(compared))
     progress(None, "figures")
-    return result | overlay.make("compare", runs, chosen)
+    return result | comparison.make("compare", runs, chosen)

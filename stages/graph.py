@@ -34,7 +34,7 @@ TIGHTER, FINER = 1e-2, 4
 #: the tightest tolerance that makes a difference: beyond, rounding does
 TIGHTEST = 1e-13
 #: a comparison run may take so many times the evaluations of the run that it is compared with, and at least so many
-MOST, LEAST = 4, 100_000
+TIGHTER_EVALUATIONS, FEWEST_EVALUATIONS = 4, 100_000
 
 
 @dataclass(frozen=True)
@@ -225,9 +225,9 @@ class Graph:
         return self._tighter(self.scene.solver.integrator, self.scene.solver.rtol, {"accuracy": None})
 
     def tighter(self, run: Mapping[str, Any]) -> Task:
-        """`tight` for a run, given by the attributes of its dataset, that may take MOST times its evaluations."""
+        """`tight` for a run, given by the attributes of its dataset, with a limit of some times its evaluations."""
         solver = self.scene.solver
-        most = min(max(MOST * int(run["evaluations"]), LEAST), solver.evaluations)
+        most = min(max(TIGHTER_EVALUATIONS * int(run["evaluations"]), FEWEST_EVALUATIONS), solver.evaluations)
         change = {"solver.evaluations": most, "accuracy": None}
         return self._tighter(*of_run(solver, self.scene.by_need(), run), change)
 
@@ -257,7 +257,7 @@ class Graph:
 
     @cached_property
     def fine_modes(self) -> dict[str, Task]:
-        """The modes on a finer mesh, to tell the error of `modes` by; by flexible body."""
+        """The modes on a finer mesh, which gives the error of `modes`; by flexible body."""
         return Graph(self.scene, shown=False, recipe={**self.recipe, "elements": FINER}).modes
 
     def bodies(self) -> dict[str, Task]:

@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.scene import provenance
-from flexclear.pipeline.core.scene.file_kinds import RECIPE, require_kind
 from flexclear.pipeline.core.scene.limits import Limits, check_cells
-from flexclear.pipeline.core.scene.load import is_file, read_toml
+from flexclear.pipeline.core.scene.load import RECIPE, is_file, read_toml, require_kind
 from flexclear.pipeline.core.scene.registry import module_of
 from flexclear.pipeline.core.system.errors import InputError
 

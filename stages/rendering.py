@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.pipeline.core.scene.appearance import UNSEEN
 from flexclear.pipeline.core.scene.load import is_file
+from flexclear.pipeline.core.scene.parts import UNSEEN
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.stages.simulation import bundles
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene import provenance
-from flexclear.pipeline.core.scene.appearance import UNSEEN
+from flexclear.pipeline.core.scene.parts import UNSEEN
 from flexclear.pipeline.core.system import machine
 from flexclear.pipeline.core.system.errors import ResourceError
 from flexclear.pipeline.core.workflow import stopping
@@ -33,7 +33,7 @@ JUDGED = {"rows": sys.maxsize, "members": sys.maxsize}
 #: bytes of a row of a run, fitted to runs of 1 to 24 bodies: always, of a body, joint, contact, load, coordinate
 ALWAYS, BODY, JOINT, CONTACT, LOAD, MODE = 200, 160, 100, 350, 100, 24
 #: a run is in memory so many times at its end, measured 3.5 to 4.4; and on disk, in the cache and shown
-HELD, KEPT = 4.5, 2.0
+TIMES_IN_MEMORY, TIMES_ON_DISK = 4.5, 2.0
 #: of a member of an ensemble only some bodies' motion is recorded, at most as often as this
 MEMBER_ROWS = 2000
 SPEND = "choose a longer output.interval, or say more in [limits]"
@@ -93,13 +93,15 @@ def check_run(scene: Scene, results: Path) -> None:
     rows = (scene.time.end - scene.time.start) / scene.output.interval + 1.0
     need = rows * row(scene)
     what = f"a run of {rows:.3g} rows"
-    machine.require_memory(HELD * need, what, SPEND, scene.limits.memory)
-    machine.require_disk(KEPT * need, what, results, SPEND, scene.limits.disk)
+    machine.require_memory(TIMES_IN_MEMORY * need, what, SPEND, scene.limits.memory)
+    machine.require_disk(TIMES_ON_DISK * need, what, results, SPEND, scene.limits.disk)
     if scene.ensemble is not None:
         n_bodies = len(scene.ensemble.bodies or scene.contacts() or scene.body)
         need = scene.ensemble.members * min(rows, MEMBER_ROWS) * n_bodies * BODY
         what = f"an ensemble of {scene.ensemble.members} members"
-        machine.require_memory(HELD * need, what, "ask for fewer members, or say more in [limits]", scene.limits.memory)
+        machine.require_memory(
+            TIMES_IN_MEMORY * need, what, "ask for fewer members, or say more in [limits]", scene.limits.memory
+        )
     for name, body in scene.flexible().items():
         if isinstance(body.modes.count, int) and body.modes.count > scene.limits.modes:
             raise ResourceError(
@@ -155,24 +157,27 @@ def sensitivities(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], p
 
     inputs: ``bundle/<body>``, and ``run`` of a scene with contacts, which has the horizon.
     """
-    from flexclear.pipeline import dynamics
+    from flexclear.pipeline.dynamics import require_without_events
+    from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities as derivatives
 
     scene = rebuild(params, inputs)
+    require_without_events(scene, "derivatives")
     horizon = float(inputs["run"]["horizon"]) if "run" in inputs else math.inf
     with _in_time(scene):
         names = params["of"], params["to"]
-        return {"nc": dynamics.sensitivities(scene, bundles(inputs), progress, *names, horizon)}
+        return {"nc": derivatives(scene, bundles(inputs), progress, *names, horizon)}
 
 
 def linear(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:
     """The equilibrium in a `pose` (schema EQUILIBRIUM), or with its vibrations (schema LINEAR); over the speeds of a
     drive these alone (schema CAMPBELL).  Inputs are ``bundle/<body>``."""
     from flexclear.pipeline import dynamics
+    from flexclear.pipeline.dynamics.linear.campbell import campbell
 
     pose, scene, reduced = params["pose"], rebuild(params, inputs), bundles(inputs)
     where = pose["time"], pose["drives"]
     if "speeds" in params:
-        return {"nc": dynamics.campbell(scene, reduced, progress, params["speeds"], params["drive"], *where)}
+        return {"nc": campbell(scene, reduced, progress, params["speeds"], params["drive"], *where)}
     solve = dynamics.frequencies if pose["vibrations"] else dynamics.equilibrium
     return {"nc": solve(scene, reduced, progress, *where, pose["moving"])}
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import time
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
@@ -15,7 +16,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.paths import TREE, results_root
-from flexclear.pipeline.core.artifacts.store import Store
+from flexclear.pipeline.core.artifacts.store import Record, Store
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.system.log import set_level
 from flexclear.pipeline.core.workflow import stopping
@@ -23,7 +25,6 @@ from flexclear.pipeline.core.workflow.fingerprint import Sources, sources_of
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.schedule import Failure, Outcome, bring
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import limit
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,9 +73,47 @@ def add_options(parser: argparse.ArgumentParser, *names: str, **changed: Any) ->
             parser.add_argument(*flags, *also, **keys | more | {"help": text})
 
 
+def seconds(given: str | float, option: str) -> float:
+    """A time above zero [s], as a number or as ``10s`` or ``2min``; InputError for another value of an option."""
+    try:
+        spaced = re.sub(r"(?<=[0-9.])(?=[a-z])", " ", given.strip()) if isinstance(given, str) else given
+        result = quantity(spaced, "time")
+        if not result > 0.0:
+            raise ValueError("it must be above zero")
+    except ValueError as error:
+        raise InputError(f"{option} {given}", f"is no time: {error}", f"write {option} 2h, or '90 min'") from None
+    return result
+
+
 def relative(path: Path) -> str:
     """A path as seen from the current folder, where it lies below it."""
     return str(path.relative_to(Path.cwd())) if path.is_relative_to(Path.cwd()) else str(path)
+
+
+@dataclass(frozen=True)
+class Made:
+    """An artifact that is up to date: the task that made it, its record, and the store that holds its files."""
+
+    task: Task
+    record: Record
+    store: Store
+
+    @property
+    def folder(self) -> Path:
+        """Where its files are shown."""
+        return self.store.root / self.task.folder
+
+    def dataset(self) -> xr.Dataset:
+        """Its main file."""
+        return self.store.load(self.record)
+
+    def read(self, name: str) -> bytes:
+        """One of its files, from the store."""
+        return self.store.path(self.task.stage, self.record.key, name).read_bytes()
+
+    def text(self, name: str) -> str:
+        """One of its files that are text."""
+        return self.read(name).decode()
 
 
 @dataclass(frozen=True)
@@ -95,11 +134,20 @@ class Workplace:
         with self.limited():
             return bring(tasks, self.store, self.sources, self.monitor, jobs or self.jobs)
 
-    def datasets(self, *tasks: Task, jobs: int | None = None) -> list[xr.Dataset]:
-        """What tasks make, brought up to date; FailedTasksError where one of them, or of their inputs, fails."""
+    def artifacts(self, outcome: Outcome) -> dict[Task, Made]:
+        """What `bring` made, and what was up to date."""
+        return {task: Made(task, record, self.store) for task, record in outcome.records.items()}
+
+    def made(self, *tasks: Task, jobs: int | None = None) -> list[Made]:
+        """Artifacts of tasks, brought up to date; FailedTasksError where one of them, or of their inputs, fails."""
         outcome = self.bring(list(tasks), jobs)
         check(outcome)
-        return [self.store.load(outcome.records[id(task)]) for task in tasks]
+        there = self.artifacts(outcome)
+        return [there[task] for task in tasks]
+
+    def datasets(self, *tasks: Task, jobs: int | None = None) -> list[xr.Dataset]:
+        """Main files of what `made` gives."""
+        return [one.dataset() for one in self.made(*tasks, jobs=jobs)]
 
     def limited(self) -> AbstractContextManager[None]:
         """Meanwhile work is to stop when the time is over that the command was given."""
@@ -122,13 +170,14 @@ def open_workplace(options: argparse.Namespace | None = None) -> Workplace:
     """
     if options is not None:
         set_level(quiet=getattr(options, "quiet", False), verbose=getattr(options, "verbose", False))
-    monitor = Monitor()
-    jobs = getattr(options, "jobs", None)
+    monitor, root = Monitor(), results_root()
+    jobs, limit = getattr(options, "jobs", None), getattr(options, "limit", None)
     if jobs is not None and jobs < 1:
         raise InputError("--jobs", f"must be at least 1 (got {jobs})", "leave it out to use every core")
-    root, (seconds, why) = results_root(), limit.deadline(options)
+    end = math.inf if limit is None else time.monotonic() + seconds(limit, "--limit")
     sources = sources_of(TREE, root / "cache" / "imports.json")
-    return Workplace(Store(root, say=monitor.say), sources, monitor, jobs, (time.monotonic() + seconds, why))
+    why = f"the time that --limit {limit} gives is over"
+    return Workplace(Store(root, say=monitor.say), sources, monitor, jobs, (end, why))
 
 
 def check(outcome: Outcome) -> None:

@@ -1,7 +1,5 @@
 """A headless Chromium for tests of pages, driven by chromedriver over the WebDriver protocol (W3C, 2018)."""
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil

@@ -1,7 +1,5 @@
 """What tests of all kinds share: reproducible Hypothesis, results kept out of the project."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -2,10 +2,10 @@
 
 KIND = "benchmark"
 NAMES = {
-    "evaluation": "evaluation:FAMILY",
+    "evaluation": "runs:EVALUATION",
     "runs": "runs:FAMILY",
     "commands": "commands:FAMILY",
-    "cold": "cold:FAMILY",
+    "cold": "runs:COLD",
     "growth": "growth:FAMILY",
     "ensembles": "ensembles:FAMILY",
     "peers": "peers:FAMILY",

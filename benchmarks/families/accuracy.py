@@ -17,7 +17,7 @@ from flexclear.commands import cost
 from flexclear.commands.scenes import find_scene, open_workplace
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.post.cost.page import Studied, sections
+from flexclear.pipeline.post.cost.answer import Studied, sections
 from flexclear.pipeline.post.plotting.table import Table, as_markdown, from_markdown
 
 #: processor time of a study [s]
@@ -32,13 +32,13 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     peers = exudyn.points([r for s in log.latest(log.FOLDER / "exudyn.jsonl") for r in s.records])
     for case in cases:
         scene = load_scene(find_scene(case.name))
-        study, folder = cost.bring(scene, place, peers.get(case.name, ()), seconds=STUDY, models=True)
-        said, pictures = cost.figures_and_tables(case.name, study, folder, "accuracy")
+        study = cost.bring(scene, place, peers.get(case.name, ()), budget=STUDY, models=True)
+        said, pictures = cost.figures_and_tables(case.name, study, "accuracy")
         records: list[Record] = [{"advice": said.advice}]
         for title, path in said.pictures.items():
             file = pictures[path]
-            digest = hashlib.sha256(file.read_bytes()).hexdigest()
-            records.append({"picture": title, "path": path, "file": file.name, "sha256": digest})
+            digest = hashlib.sha256(study.read(file)).hexdigest()
+            records.append({"picture": title, "path": path, "file": file, "sha256": digest})
         yield case, records + [{"table": asdict(from_markdown(text))} for text in said.tables]
 
 

@@ -2,12 +2,310 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.load import scene_of
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
+
+if TYPE_CHECKING:
+    import xarray as xr
+
 import time
 
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Record, each
 from benchmarks.page import Columns, table
-from benchmarks.stability.classes import CASES
 from flexclear.pipeline.core.system.errors import FlexclearError
+
+Table = dict[str, Any]
+#: stiffness of a shaft's end [N/m, N/rad, N m/rad], and its disc [kg, kg m^2, m]
+SIDE, MIXED, SLOPE = 164163.04446739165, 20520.380558423956, 3420.0634264039927
+MASS, ACROSS, ALONG, ARM = 3.0, 0.02, 0.036, 0.25
+#: axes along none of the world's
+OBLIQUE = {"z": [2.0, 6.0, 3.0], "x": [-3.0, 1.0, 0.0]}
+UPRIGHT = {"z": [0.0, 0.0, 1.0], "x": [1.0, 0.0, 0.0]}
+
+
+@dataclass(frozen=True)
+class HardCase:
+    """A scene of a class, and what is examined.
+
+    compared: what with what.  examine: largest relative deviation of a run or of its frequencies.  limit: of that
+    deviation; 0 where the scene must be refused.  refused: words of the refusal.
+    """
+
+    scene: Callable[[], Scene]
+    compared: str
+    examine: Callable[[Scene], float]
+    limit: float = 0.0
+    refused: str = ""
+
+
+def run(scene: Scene) -> xr.Dataset:
+    """The run of a scene without flexible bodies."""
+    return dynamics.simulate(scene, {}, silent)
+
+
+def _scene(end: float, **parts: Any) -> Scene:
+    return scene_of({"title": "hard case", "time": {"end": end}, "output": {"interval": end / 100}, **parts})
+
+
+def _body(frames: Table, mass: float = 1.0, inertia: float = 0.01, **more: Any) -> Table:
+    return {"type": "rigid", "mass": mass, "inertia": [inertia] * 3, "pose": {}, "frames": frames, **more}
+
+
+def _ground(**frames: Any) -> Table:
+    return {"type": "ground", "frames": frames}
+
+
+# Rotors -------------------------------------------------------------------------------------------------------------
+
+
+def rotor(speed: float, unbalance: float, axes: Mapping[str, list[float]] = UPRIGHT) -> Scene:
+    """A disc at the end of a massless shaft on a driven hub; unbalance of its centre of mass along x [m]."""
+    K = np.diag([SIDE, SIDE, 1e8, SLOPE, SLOPE, 1e5])
+    K[0, 4] = K[4, 0] = -MIXED
+    K[1, 3] = K[3, 1] = MIXED
+    z = np.array(axes["z"]) / np.linalg.norm(axes["z"])
+    hub = _body({"o": {}, "s": {"position": [0.0, 0.0, ARM]}}, pose={"axes": axes})
+    disc = _body({"o": {}}, MASS, com=[unbalance, 0.0, 0.0], pose={"position": (ARM * z).tolist(), "axes": axes})
+    return _scene(
+        0.01,
+        body={"ground": _ground(o={"axes": axes}), "hub": hub, "disc": disc | {"inertia": [ACROSS, ACROSS, ALONG]}},
+        joint={
+            "axle": {"type": "revolute", "between": ["ground.o", "hub.o"]},
+            "float": {"type": "free", "between": ["hub.s", "disc.o"]},
+        },
+        load={"shaft": {"type": "bushing", "between": ["hub.s", "disc.o"], "stiffness": K.tolist()}},
+        drive={"motor": {"joint": "axle", "law": {"type": "polynomial", "coefficients": [0.0, speed]}}},
+    )
+
+
+def _steady(scene: Scene) -> xr.Dataset:
+    found = dynamics.frequencies(scene, {}, silent, moving=True)
+    if found.attrs["growth"]:
+        raise ArithmeticError(f"small motions grow: {found.attrs['growth']}")
+    return found
+
+
+def _deflection(scene: Scene) -> float:
+    """Of the shaft's end from (K - w^2 diag(m, I_t - I_p)) (x, p) = (m w^2 e, 0); Genta (2005), sec. 2.6."""
+    unbalance, speed = 1e-5, 150.0
+    K = np.array([[SIDE, -MIXED], [-MIXED, SLOPE]])
+    x = np.linalg.solve(K - speed**2 * np.diag([MASS, ACROSS - ALONG]), [MASS * speed**2 * unbalance, 0.0])[0]
+    return abs(float(_steady(scene).frame_position.sel(frame="disc.o", axis="x")) / float(x) - 1.0)
+
+
+def _as_upright(scene: Scene) -> float:
+    known = _steady(rotor(150.0, 0.0)).frequency.values
+    return float(np.abs(_steady(scene).frequency.values / known - 1.0).max())
+
+
+# Contacts and stops -------------------------------------------------------------------------------------------------
+
+
+def driven_into_a_stop() -> Scene:
+    """A slide whose drive moves it 10 mm into a stop: nothing is free."""
+    return _scene(
+        0.9,
+        body={"ground": _ground(o={}), "slide": _body({"o": {}})},
+        joint={"rail": {"type": "prismatic", "between": ["ground.o", "slide.o"]}},
+        drive={"motor": {"joint": "rail", "law": {"type": "harmonic", "amplitude": [0.1], "frequency": [20.0]}}},
+        stop={"end": {"joint": "rail", "upper": 0.09, "normal": {"law": "hertz", "stiffness": 1e6}}},
+    )
+
+
+def _peak(scene: Scene) -> float:
+    """That of k d^1.5 = 1000 N at each of the three peaks."""
+    found = run(scene)
+    peaks = found.event_peak_force.values[found.event_kind.values == "closing"]
+    return float(np.abs(peaks / 1e3 - 1.0).max()) if len(peaks) == 3 else float("nan")
+
+
+def bounce(**solver: Any) -> Scene:
+    """A ball that falls 0.2 m onto a stiff plane."""
+    normal = {"law": "hertz", "stiffness": 1e8}
+    plane = {"type": "ball-on-plane", "between": ["ground.f", "ball.c"], "ball_radius": 0.1, "normal": normal}
+    return _scene(
+        1.0,
+        body={"ground": _ground(f={}), "ball": _body({"c": {}}, pose={"position": [0.0, 0.0, 0.3]})},
+        joint={"floor": plane},
+        load={"weight": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
+        solver=solver,
+    )
+
+
+def graze(depth: float, rtol: float) -> Scene:
+    """A mass on a spring, 10 rad/s and 0.1 m, that meets a plane before its lowest point [m]."""
+    normal = {"law": "hertz", "stiffness": 1e8}
+    plane = {"type": "ball-on-plane", "between": ["ground.f", "ball.c"], "ball_radius": 0.02, "normal": normal}
+    floor = {"position": [0.0, 0.0, -0.12 + depth]}
+    return _scene(
+        3.0,
+        body={"ground": _ground(o={}, f=floor), "ball": _body({"o": {}, "c": {}}, pose={"position": [0, 0, 0.1]})},
+        joint={"rail": {"type": "prismatic", "between": ["ground.o", "ball.o"]}, "floor": plane},
+        load={"spring": {"type": "joint-spring", "joint": "rail", "stiffness": 100.0}},
+        solver={"rtol": rtol},
+    )
+
+
+def _graze_speed(depth: float) -> Callable[[Scene], float]:
+    def examined(scene: Scene) -> float:
+        """Speed of each of the five closings, sqrt(2 w^2 A d - w^2 d^2); a negative one is off by more than 1."""
+        found = run(scene)
+        speeds = found.event_approach_speed.values[found.event_kind.values == "closing"]
+        known = 10.0 * np.sqrt(0.2 * depth - depth**2)
+        return float(np.abs(speeds / known - 1.0).max()) if len(speeds) == 5 else float("nan")
+
+    return examined
+
+
+def small_bounce(unit: float) -> Scene:
+    """A lossy ball on a spring that meets a plane; all lengths are so many times as large, forces per mass too."""
+    normal = {"law": "lankarani-nikravesh", "restitution": 0.6, "stiffness": 1e6 * unit**-0.5}
+    plane = {"type": "ball-on-plane", "between": ["ground.f", "ball.c"], "ball_radius": 0.02 * unit, "normal": normal}
+    floor = {"position": [0.0, 0.0, -0.09 * unit]}
+    place = {"position": [0.0, 0.0, 0.1 * unit]}
+    return _scene(
+        3.0,
+        body={"ground": _ground(o={}, f=floor), "ball": _body({"o": {}, "c": {}}, 1.0, 0.01 * unit**2, pose=place)},
+        joint={"rail": {"type": "prismatic", "between": ["ground.o", "ball.o"]}, "floor": plane},
+        load={"spring": {"type": "joint-spring", "joint": "rail", "stiffness": 100.0}},
+        solver={"rtol": 1e-10},
+    )
+
+
+def _as_in_metres(unit: float) -> Callable[[Scene], float]:
+    def examined(scene: Scene) -> float:
+        speeds = []
+        for one, size in ((small_bounce(1.0), 1.0), (scene, unit)):
+            found = run(one)
+            speeds.append(found.event_approach_speed.values[found.event_kind.values == "closing"] / size)
+        if len(speeds[0]) != len(speeds[1]) or len(speeds[0]) < 5:
+            return float("nan")
+        return float(np.abs(speeds[1] / speeds[0] - 1.0).max())
+
+    return examined
+
+
+# Sizes, turns, controllers, frames ----------------------------------------------------------------------------------
+
+
+def stage_next_to_a_crane() -> Scene:
+    """A stage that vibrates by 1 nm next to a swinging jib of 100 m, which nothing connects with it."""
+    jib = _body({"o": {}}, 1e5, 1e6, com=[100.0, 0.0, 0.0])
+    stage = _body({"o": {}}, pose={"position": [1.0, 0.0, 1e-9]})
+    return _scene(
+        2.0,
+        body={"ground": _ground(o={}, q={"position": [1.0, 0.0, 0.0]}), "stage": stage, "jib": jib},
+        joint={
+            "rail": {"type": "prismatic", "between": ["ground.q", "stage.o"]},
+            "hinge": {"type": "revolute", "between": ["ground.o", "jib.o"]},
+        },
+        load={
+            "weight": {"type": "gravity", "acceleration": [0.0, -9.81, 0.0]},
+            "spring": {"type": "joint-spring", "joint": "rail", "stiffness": 400.0},
+        },
+        solver={"rtol": 1e-10},
+    )
+
+
+def _vibration(scene: Scene) -> float:
+    found = run(scene)
+    z = found.position.sel(body="stage", axis="z").values
+    return float(np.abs(z / 1e-9 - np.cos(20.0 * found.time.values)).max())
+
+
+def wound_bushing() -> Scene:
+    """A free body on an isotropic bushing that turns by 3.54 rad to either side."""
+    spinning = _body({"o": {}}, angular_velocity=[0.0, 0.0, 50.0])
+    stiffness = [1000.0, 1000.0, 1000.0, 2.0, 2.0, 2.0]
+    load = {"type": "bushing", "between": ["ground.o", "body.o"], "stiffness": stiffness}
+    return _scene(1.0, body={"ground": _ground(o={}), "body": spinning}, load={"bushing": load})
+
+
+def _spin(scene: Scene) -> float:
+    """50 cos(w t) rad/s, w^2 = 2/0.01 1/s^2."""
+    found = run(scene)
+    spin = found.angular_velocity.sel(body="body", axis="z").values
+    return float(np.abs(spin / 50.0 - np.cos(np.sqrt(200.0) * found.time.values)).max())
+
+
+def fast_sampler() -> Scene:
+    """A controller whose period is too long for its gain."""
+    control = {"type": "sampled-pid", "joint": "rail", "reference": 0.1, "proportional": 5e3, "period": 0.1}
+    return _scene(
+        6.0,
+        body={"ground": _ground(o={}), "slide": _body({"o": {}})},
+        joint={"rail": {"type": "prismatic", "between": ["ground.o", "slide.o"]}},
+        load={"control": control},
+    )
+
+
+def meshed_loop() -> Scene:
+    """A turning planar four-bar whose coupler's frames, as of a mesh, are off by up to 2.4e-7 m in all directions."""
+    off = [[1.1e-7, -1.9e-7, 9e-8], [-2e-7, 6e-8, -1.2e-7]]
+    corners = np.array([[0.0, 0.0, 0.0], [0.0, 0.05, 0.0], [0.2, 0.15, 0.0], [0.2, 0.0, 0.0]])
+    bodies: Table = {"ground": _ground(o0={}, o3={"position": [0.2, 0.0, 0.0]})}
+    for k, name in enumerate(("crank", "coupler", "rocker")):
+        ends = np.array([np.zeros(3), corners[k + 1] - corners[k]]) + (np.array(off) if k == 1 else 0.0)
+        frames = {end: {"position": p.tolist()} for end, p in zip("ab", ends, strict=True)}
+        bodies[name] = _body(frames, pose={"position": corners[k].tolist()})
+    bodies["coupler"]["frame_tolerance"] = 5e-7
+    pins = (("o0", "ground.o0", "crank.a"), ("A", "crank.b", "coupler.a"), ("B", "coupler.b", "rocker.a"))
+    joint = {n: {"type": "revolute", "between": [a, b]} for n, a, b in (*pins, ("o3", "ground.o3", "rocker.b"))}
+    law = {"type": "polynomial", "coefficients": [0.0, 10.0]}
+    return _scene(1.0, body=bodies, joint=joint, drive={"motor": {"joint": "o0", "law": law}})
+
+
+def _ledger(scene: Scene) -> float:
+    found = run(scene)
+    return float(np.abs(found.energy_error).max() / np.abs(found.kinetic).max())
+
+
+def _opening(scene: Scene) -> float:
+    return float(run(scene).constraint_error.max()) / 0.2
+
+
+#: the cases by name
+CASES = {
+    "unbalanced rotor above its critical speed": HardCase(
+        lambda: rotor(150.0, 1e-5), "deflection, closed form", _deflection, 1e-3
+    ),
+    "oblique rotor": HardCase(lambda: rotor(150.0, 0.0, OBLIQUE), "frequencies, upright rotor", _as_upright, 1e-7),
+    "driven into a stop": HardCase(driven_into_a_stop, "peak forces, closed form", _peak, 1e-6),
+    "multistep across impacts": HardCase(
+        lambda: bounce(integrator="adams-bashforth-moulton", step=1e-3, events="at step ends"),
+        "refusal",
+        _ledger,
+        refused="the energy balance does not close",
+    ),
+    "steps longer than an impact": HardCase(
+        lambda: bounce(integrator="rk4", step=0.05, events="located"),
+        "refusal",
+        _ledger,
+        refused="the energy balance does not close",
+    ),
+    "1 nm next to 100 m": HardCase(stage_next_to_a_crane, "vibration, closed form", _vibration, 1e-8),
+    "bushing beyond half a turn": HardCase(wound_bushing, "spin, closed form", _spin, 1e-7),
+    "graze, 1e-7 of the amplitude": HardCase(
+        lambda: graze(1e-8, 1e-10), "speeds of closings, closed form", _graze_speed(1e-8), 1e-2
+    ),
+    "graze at rtol 1e-4": HardCase(
+        lambda: graze(1e-3, 1e-4), "speeds of closings, closed form", _graze_speed(1e-3), 1e-2
+    ),
+    "diverging sampled controller": HardCase(fast_sampler, "refusal", _ledger, refused="the motion diverges"),
+    "impacts of 0.1 um": HardCase(
+        lambda: small_bounce(1e-6), "speeds of closings, the same in metres", _as_in_metres(1e-6), 1e-6
+    ),
+    "loop of a meshed body": HardCase(meshed_loop, "loops, per length", _opening, 1e-10),
+}
+
 
 COLUMNS: Columns = {
     "case": lambda r: r["case"],
@@ -42,7 +340,7 @@ def show(records: list[Record]) -> str:
 def modules(case: Case) -> set[str]:
     """What decides about a case: its scene and the dynamics."""
     del case
-    return {"benchmarks.stability.classes", "flexclear.pipeline.dynamics"}
+    return {__name__, "flexclear.pipeline.dynamics"}
 
 
 FAMILY = Family(

@@ -14,6 +14,7 @@ import numpy as np
 from benchmarks.family import Case, Family, Record, each
 from benchmarks.page import Columns, table
 from benchmarks.timing import interleaved, once
+from flexclear.commands import effects, scenes
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
@@ -21,6 +22,7 @@ from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engines, follow
 from flexclear.pipeline.post.answers.effect_sizes import written
+from flexclear.stages.workplace import open_workplace
 
 SCENE, RIGID = "sps4/far_csj_cb", "sps4/csj"
 #: what is asked for
@@ -58,38 +60,23 @@ def _measured(case: Case) -> list[Record]:
 
 
 def _influences() -> list[Record]:
-    from flexclear.commands import effects, scenes
-    from flexclear.stages.workplace import open_workplace
-
     scene = edited(load_scene(scenes.find_scene(SCENE)), {"view": {"watch": list(WATCHED)}})
-    found = effects.dataset(scene, open_workplace())
+    found = effects.bring(scene, open_workplace()).dataset()
     records = []
     for quantity in WATCHED:
         part = found.sel(quantity=quantity)
         record: Record = {"quantity": quantity, "unit": str(part["unit"].values)}
-        for name, effect in (("rod", ROD), ("play", PLAY)):
-            other = PLAY if effect == ROD else ROD
-            for kind in ("dropped", "added"):
-                for fraction in ("", "_uncertainty"):
-                    record[f"{name}_{kind}{fraction}"] = float(
-                        part[f"{kind}{fraction}"].sel(effect=effect, other=effect)
-                    )
-            for fraction in ("", "_uncertainty"):
-                record[f"{name}_interaction{fraction}"] = float(
-                    part[f"interaction{fraction}"].sel(effect=effect, other=other)
-                )
-        # JSON has no infinity: events that are not the same
-        records.append({key: None if _endless(value) else value for key, value in record.items()})
+        for name, effect, other in (("rod", ROD, PLAY), ("play", PLAY, ROD)):
+            for kind, beside in (("dropped", effect), ("added", effect), ("interaction", other)):
+                for part_of in ("", "_uncertainty"):
+                    value = float(part[f"{kind}{part_of}"].sel(effect=effect, other=beside))
+                    # JSON has no infinity: events that are not the same
+                    record[f"{name}_{kind}{part_of}"] = value if np.isfinite(value) else None
+        records.append(record)
     return records
 
 
-def _endless(value: Any) -> bool:
-    return isinstance(value, float) and not np.isfinite(value)
-
-
 def _started(name: str, **changes: Any) -> tuple[Any, Any, np.ndarray]:
-    from flexclear.commands import scenes
-
     scene = edited(load_scene(scenes.find_scene(name)), {"ensemble": None, **changes})
     reduced = scenes.bundles(scene) if scene.flexible() else {}
     engine, other = engines(scene, reduced, silent)

@@ -19,11 +19,12 @@ from scipy.interpolate import CubicHermiteSpline
 
 from benchmarks import errors
 from benchmarks.errors import Error, Reference, Rung, Samples
-from benchmarks.exudyn_apart import Peer
-from benchmarks.exudyn_model import METHODS, Outcome
+from benchmarks.exudyn_model import METHODS, Outcome, solve
 from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, damped, mechanism, without_friction
 from benchmarks.page import short
+from benchmarks.processes import LostError, Worker
+from benchmarks.timing import interleaved
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.post.plotting.table import pipe_table
 
@@ -44,6 +45,10 @@ RECORDED = 1e-6
 TRIED = 4
 #: a run is left out when another, no worse in either error, takes less than this share of its time
 CLEARLY = 0.9
+
+
+#: processor time after which a run counts as one that hangs [s]; the dearest takes a fifth of it
+LIMIT = 120
 
 
 @dataclass(frozen=True)
@@ -105,6 +110,49 @@ COMPARISONS = {
         note="; without friction; errors up to 30 ms",
     ),
 }
+
+
+class Peer:
+    """Exudyn's runs of one mechanism in a process of its own, timed there around the integration alone.
+
+    A process serves one run after the other, so that no time holds its start, and all but its first run are warm.
+    After a run that failed the next one is given a fresh process.
+    """
+
+    def __init__(self, here: Mechanism, body: str) -> None:
+        self.here, self.body = here, body
+        self.worker: Worker | None = None
+
+    def run(self, method: str, step: float, sampling: float) -> Outcome:
+        """A run at a fixed step, sampled every so many seconds; arguments of `exudyn_model.solve`."""
+        used = self.worker is not None
+        try:
+            found = self._asked((self.here, self.body, method, step, sampling))
+        except LostError as lost:
+            self.close()
+            if used and not lost.seconds:  # what earlier runs left may have killed it
+                return self.run(method, step, sampling)
+            return Outcome(0.0, None, str(lost))
+        if found.samples is None:
+            self.close()
+        return found
+
+    def _asked(self, parameters: tuple[Any, ...]) -> Outcome:
+        self.worker = self.worker or Worker(work, LIMIT)
+        self.worker.give(parameters)
+        return self.worker.take()
+
+    def close(self) -> None:
+        """End its process."""
+        if self.worker is not None:
+            self.worker.dismiss()
+        self.worker = None
+
+
+def work(parameters: tuple[Any, ...], begin: Callable[[], None]) -> Outcome:
+    """What its process does."""
+    begin()
+    return solve(*parameters)
 
 
 def edited(case: Case) -> Mechanism:
@@ -201,16 +249,34 @@ def _candidates(done: list[Run], level: float) -> list[Run]:
 
 
 def _compared(run: Run, levels: list[float], peer: Peer, sampling: float, ours: list[Rung]) -> Record:
-    """One of their runs, and next to it, in turns, ours that is no worse and ours that reach some levels."""
+    """One of their runs, and next to it, in turns, ours that is no worse and ours that reach some levels.
+
+    Times of ours: the whole run and its parts.
+    """
     assert run.error is not None
     requested = {"equal": errors.cheapest(ours, partial(_no_worse, run.error))}
     requested |= {str(level): errors.cheapest(ours, partial(_reaches, level)) for level in levels}
-    timers: dict[str, dict[str, Callable[[], float]]] = {}
+    tasks: dict[tuple[str, str], Callable[[], float]] = {}
     for name, rung in requested.items():
         if rung is not None:
-            timers.setdefault(_name(rung), {}).update(_timers(rung, whole=name == "equal"))
-    theirs, times = _side_by_side(partial(peer.run, run.method, run.step, sampling), run.outcome, timers)
-    matches = {name: _match(rung, theirs, times[_name(rung)]) for name, rung in requested.items() if rung}
+            tasks[_name(rung), "s"] = rung.time
+            if name != "equal":
+                tasks |= {(_name(rung), "bare_s"): rung.bare, (_name(rung), "alike_s"): rung.alike}
+    if run.outcome.seconds < LONG:
+        tasks["theirs", "s"] = lambda: peer.run(run.method, run.step, sampling).seconds
+    times = {task: found.median for task, found in interleaved(tasks, REPEATS).items()}
+    theirs = times.pop(("theirs", "s"), run.outcome.seconds)
+    matches = {
+        name: {
+            "run": _name(rung),
+            "position_um": 1e6 * rung.error.position,
+            **{part: seconds for (which, part), seconds in times.items() if which == _name(rung)},
+            "alike_relative": rung.alike_error.relative,
+            "ratio": theirs / times[_name(rung), "s"],
+        }
+        for name, rung in requested.items()
+        if rung
+    }
     return {"s": theirs, **_numbers(run.error), "ours": matches}
 
 
@@ -229,33 +295,6 @@ def _reaches(level: float, error: Error) -> bool:
 
 def _name(rung: Rung) -> str:
     return f"{rung.integrator} {rung.rtol:g}"
-
-
-def _timers(rung: Rung, *, whole: bool) -> dict[str, Callable[[], float]]:
-    """What times a run of ours, by its name in the log; next to the whole run, in parts and by straight code."""
-    parts = {"s": rung.time, "bare_s": rung.bare, "alike_s": rung.alike}
-    return {"s": rung.time} if whole else parts | ({"straight_s": rung.straight} if rung.straight else {})
-
-
-def _match(rung: Rung, theirs: float, times: Mapping[str, float]) -> dict[str, Any]:
-    found = {"run": _name(rung), "position_um": 1e6 * rung.error.position, **times}
-    return found | {"alike_relative": rung.alike_error.relative, "ratio": theirs / times["s"]}
-
-
-def _side_by_side(
-    again: Callable[[], Outcome], first: Outcome, timers: Mapping[str, Mapping[str, Callable[[], float]]]
-) -> tuple[float, dict[str, dict[str, float]]]:
-    """Median times [s], in turns: of theirs, and of ours by their names and what is timed."""
-    theirs = [first.seconds]
-    ours: dict[str, dict[str, list[float]]] = {name: {part: [] for part in mine} for name, mine in timers.items()}
-    for number in range(REPEATS):
-        if number and first.seconds < LONG:
-            theirs.append(again().seconds)
-        for name, mine in timers.items():
-            for part, timer in mine.items():
-                ours[name][part].append(timer())
-    medians = {name: {part: float(np.median(t)) for part, t in mine.items()} for name, mine in ours.items()}
-    return float(np.median(theirs)), medians
 
 
 def show(records: list[Record]) -> str:
@@ -277,7 +316,6 @@ def show(records: list[Record]) -> str:
         "the same recorded",
         "its error",
         "integration alone",
-        "straight code",
     )
     columns = ("method, step", "position [um]", "velocity [mm/s]", "Exudyn [s]", "ours", "ours, no worse [s]", "ratio")
     texts = [pipe_table(head, levels)]
@@ -320,18 +358,16 @@ def _level_row(case: str, level: float, runs: list[Record]) -> list[str]:
     done = [r for r in runs if str(level) in r.get("ours", ())]
     reaching = [r for r in done if r["relative"] <= level]
     if not done:
-        return [name, *[""] * 11]
+        return [name, *[""] * 10]
     best = min(reaching, key=lambda r: r["s"]) if reaching else max(done, key=lambda r: r["s"])
     mark, ours = "" if reaching else "> ", best["ours"][str(level)]  # their finest run may not get there
     seconds, ratio = f"{mark}{best['s']:.3g}", f"{mark}{ours['ratio']:.3g}"
     theirs = [seconds, _called(best), short(best["position_um"])]
     # records from before these were measured say nothing about them
-    alike, bare, straight = (
-        f"{mark}{best['s'] / ours[part]:.3g}" if part in ours else "" for part in ("alike_s", "bare_s", "straight_s")
-    )
+    alike, bare = (f"{mark}{best['s'] / ours[part]:.3g}" if part in ours else "" for part in ("alike_s", "bare_s"))
     error = f"{100 * ours['alike_relative']:.2g} %" if "alike_relative" in ours else ""
     mine = [f"{ours['s']:.3g}", ours["run"], short(ours["position_um"])]
-    return [name, *theirs, *mine, ratio, alike, error, bare, straight]
+    return [name, *theirs, *mine, ratio, alike, error, bare]
 
 
 def _called(run: Record) -> str:

@@ -24,13 +24,13 @@ from typing import Any
 
 import psutil
 
-from benchmarks import system
+from benchmarks import processes
 from benchmarks.family import FINISHED, WRONG, Case, Family, Measured, Record
 from benchmarks.page import Columns, table
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import read_checked
 from flexclear.pipeline.core.artifacts.store import Store, read_record
-from flexclear.pipeline.core.workflow.journal import Journal, State
+from flexclear.pipeline.core.workflow.journal import Journal
 from flexclear.pipeline.dynamics.compile.files import CODE, compiled
 
 SCENE = "checks/pendulum"
@@ -108,16 +108,40 @@ def cases(seed: int, flips: int, cuts: int, kills: int) -> list[Case]:
     return made
 
 
+@dataclass(frozen=True)
+class Place:
+    """Folder of the campaign; the results of each fault are in folders below it."""
+
+    folder: Path
+
+    def store(self, results: str = "results") -> Store:
+        """What commands left there."""
+        return Store(self.folder / results)
+
+    def start(self, words: Sequence[str], results: str = "results", **more: Any) -> subprocess.Popen[bytes]:
+        """A command on results in a folder below this one."""
+        here = {"FLEXCLEAR_RESULTS": str(self.folder / results), "FLEXCLEAR_KERNELS": str(self.folder / "kernels")}
+        silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        command = [sys.executable, "-m", "flexclear", *(word.format(folder=self.folder) for word in words)]
+        return subprocess.Popen(command, env={**os.environ, **here}, **{**silent, **more})
+
+    def whole(self, words: Sequence[str], results: str) -> tuple[float, dict[tuple[str, str], str]]:
+        """How long a command takes on empty results that nobody disturbs [s], and what it makes."""
+        begun = time.monotonic()
+        code = self.start(words, results).wait()
+        assert code == 0, f"{words[0]} ends with {code}"
+        return time.monotonic() - begun, _artifacts(self.store(results))
+
+
 def measure(todo: Sequence[Case], jobs: int) -> Measured:
     """A record for each kind of fault, in folders of its own."""
     with tempfile.TemporaryDirectory(prefix="faults_") as name:
-        folder = Path(name)
-        (folder / "sweep.toml").write_text(SWEEP, encoding="utf-8", newline="\n")
-        environment = {**os.environ, "FLEXCLEAR_RESULTS": f"{folder}/results", "FLEXCLEAR_KERNELS": f"{folder}/kernels"}
+        place = Place(Path(name))
+        (place.folder / "sweep.toml").write_text(SWEEP, encoding="utf-8", newline="\n")
         if any("killed" not in case.name for case in todo):
-            _run(environment)
+            place.whole(["run", SCENE], "results")
         for case in todo:
-            yield case, [_recorded(_counted(case, folder, environment))]
+            yield case, [_recorded(_counted(case, place))]
 
 
 def _recorded(count: Counter[str]) -> Record:
@@ -125,37 +149,30 @@ def _recorded(count: Counter[str]) -> Record:
     return {"verdict": WRONG if count["used"] else FINISHED, "faults": sum(count.values()), **kinds}
 
 
-def _counted(case: Case, folder: Path, environment: dict[str, str]) -> Counter[str]:
+def _counted(case: Case, place: Place) -> Counter[str]:
     """Bring about the faults of a case, and count what became of them."""
     of, rng = case.of, random.Random(f"{case.of.seed} {case.name}")
     if case.name in DAMAGED:
-        return _damage(rng, _damaged(folder)[case.name], of.flips, of.cuts)
+        return _damage(rng, _damaged(place)[case.name], of.flips, of.cuts)
     for kind, bring_about in ((FOLDERS, _folders), (FILES, _files), (FULL_DISKS, _full), (AT_ONCE, _concurrent)):
         if case.name == kind:
-            return bring_about(folder, environment)
+            return bring_about(place)
     which, verb, _ = case.name.split("`")
     kill = partial(_helpers, idle="idle" in which) if which else _kills
-    return kill(folder, verb, COMMANDS[verb][1], environment, rng, of.kills)
+    return kill(place, verb, rng, of.kills)
 
 
-def _run(environment: dict[str, str]) -> float:
-    """Bring the scene up to date; how long that took [s]."""
-    begun = time.monotonic()
-    subprocess.run([sys.executable, "-m", "flexclear", "run", SCENE], env=environment, check=True, capture_output=True)
-    return time.monotonic() - begun
-
-
-def _damaged(folder: Path) -> dict[str, list[tuple[Path, Judge]]]:
+def _damaged(place: Place) -> dict[str, list[tuple[Path, Judge]]]:
     """Each kind of file, and for each what says whether damage to it is detected."""
-    store = Store(folder / "results")
+    store, folder = place.store(), place.folder
     records = sorted((store.root / "cache").glob("*/*.json"))
     kernels = sorted((folder / "kernels").glob("*/flexclear_*.py"))
     shown = sorted((store.root / "runs").rglob("*.nc"))
     return {
         "artifacts": [(path.with_suffix(".nc"), _artifact(store, path)) for path in records],
-        "records": [(path, _record(path)) for path in records],
+        "records": [(path, _same(read_record, path)) for path in records],
         "shown files": [(path, partial(_shown, store)) for path in shown],
-        "memo of imports": [(path, _table(path)) for path in [store.root / "cache" / "imports.json"]],
+        "memo of imports": [(path, _same(read_checked, path)) for path in [store.root / "cache" / "imports.json"]],
         "generated sources": [(path, _kernel(path)) for path in kernels],
         "digests of kernels": [(path.with_suffix(".sum"), _kernel(path)) for path in kernels],
         "compiled code": [(path.with_suffix(CODE), _kernel(path)) for path in kernels],
@@ -172,9 +189,9 @@ def _shown(store: Store) -> str:
     return "detected" if upkeep.shown_faults(store, store.root / "runs") else "used"
 
 
-def _folders(folder: Path, environment: dict[str, str]) -> Counter[str]:
+def _folders(place: Place) -> Counter[str]:
     """A folder instead of each file of a run in turn: it is renamed, and the same result is shown."""
-    store, count = Store(folder / "results"), Counter[str]()
+    store, count = place.store(), Counter[str]()
     before = _artifacts(store)
     cached = [
         path for suffix in ("nc", "json", "names") for path in sorted((store.root / "cache").glob(f"*/*.{suffix}"))
@@ -184,24 +201,24 @@ def _folders(folder: Path, environment: dict[str, str]) -> Counter[str]:
         path.unlink(missing_ok=True)
         path.mkdir()
         (path / "mine").write_text("stays", encoding="utf-8", newline="\n")
-        code = _start(["run", SCENE], environment).wait()
+        code = place.start(["run", SCENE]).wait()
         lost = not any(left.read_text(encoding="utf-8") == "stays" for left in path.parent.glob(f"{path.name}*/mine"))
         sound = code == 0 and not lost and _artifacts(store) == before and _shown(store) == "used"
         count["detected" if sound else "used"] += 1
     return count
 
 
-def _files(folder: Path, environment: dict[str, str]) -> Counter[str]:
+def _files(place: Place) -> Counter[str]:
     """A file instead of each folder of a run in turn: it is renamed, or named in a sentence, and stays."""
-    store, count = Store(folder / "results"), Counter[str]()
+    store, count = place.store(), Counter[str]()
     before = _artifacts(store)
     for path in [
         store.root / "runs" / SCENE,
         *sorted(path for path in (store.root / "cache").iterdir() if path.is_dir()),
     ]:
-        away = path.rename(folder / "away")
+        away = path.rename(place.folder / "away")
         path.write_text("stays", encoding="utf-8", newline="\n")
-        process = _start(["run", SCENE], environment, stderr=subprocess.PIPE)
+        process = place.start(["run", SCENE], stderr=subprocess.PIPE)
         said = process.communicate()[1].decode(errors="replace")
         left = [one for one in path.parent.glob(f"{path.name}*") if one.is_file()]
         sound = process.returncode in (0, 2, 4) and "Traceback" not in said
@@ -211,7 +228,7 @@ def _files(folder: Path, environment: dict[str, str]) -> Counter[str]:
             away.rename(path)
         else:
             shutil.rmtree(away)
-    code = _start(["run", SCENE], environment).wait()
+    code = place.start(["run", SCENE]).wait()
     count["used"] += code != 0 or _artifacts(store) != before
     return count
 
@@ -221,9 +238,8 @@ def _unfinished(folder: Path) -> list[Path]:
     import numpy as np
 
     journal = Journal(folder / "parts", "key")
-    journal.write(
-        "piece", State({"w": np.random.default_rng(1).normal(size=2000)}, {"done": False}, np.ones((500, 20)))
-    )
+    journal.store("piece", lambda: {"w": np.random.default_rng(1).normal(size=2000), "rows": np.ones((500, 20))})
+    journal.write()
     return sorted((folder / "parts").iterdir())
 
 
@@ -255,14 +271,6 @@ def _same(read: Callable[[Path], object], path: Path) -> Judge:
     return lambda: "detected" if (now := read(path)) is None else "harmless" if now == whole else "used"
 
 
-def _record(path: Path) -> Judge:
-    return _same(read_record, path)
-
-
-def _table(path: Path) -> Judge:
-    return _same(read_checked, path)
-
-
 def _kernel(path: Path) -> Judge:
     whole = read_checked(path.with_suffix(".sum"))
     return lambda: (
@@ -270,70 +278,42 @@ def _kernel(path: Path) -> Judge:
     )
 
 
-def _start(words: list[str], environment: dict[str, str], **more: Any) -> subprocess.Popen[bytes]:
-    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    return subprocess.Popen([sys.executable, "-m", "flexclear", *words], env=environment, **{**silent, **more})
-
-
-def _kills(
-    folder: Path, verb: str, words: list[str], environment: dict[str, str], rng: random.Random, count: int
-) -> Counter[str]:
+def _kills(place: Place, verb: str, rng: random.Random, count: int) -> Counter[str]:
     """A command killed repeatedly on the same results.
 
     What it leaves is complete each time. The last command, which nobody kills, makes the same results as one without
     kills, and cleans up.
     """
-    words, counts = [word.format(folder=folder) for word in words], Counter[str]()
-    seconds, whole = _whole(folder, verb, words, environment)
-    here = {**environment, "FLEXCLEAR_RESULTS": f"{folder}/killed_{verb}"}
-    store = Store(Path(here["FLEXCLEAR_RESULTS"]))
+    words, counts, results = COMMANDS[verb][1], Counter[str](), f"killed_{verb}"
+    (seconds, whole), store = place.whole(words, f"whole_{verb}"), place.store(results)
     for _ in range(count):
-        process = _start(words, here)
+        process = place.start(words, results)
         time.sleep(min(LATEST, seconds) * rng.random())
         process.kill()
         process.wait()
         counts["used" if upkeep.inventory(store, whole=True).damaged else "detected"] += 1
-    ended = _start(words, here).wait()
+    ended = place.start(words, results).wait()
     left = [path for path in store.root.rglob("*") if path.suffix in (".tmp", ".lock", ".part")]
-    if ended or left or _artifacts(store) != _artifacts(whole):
+    if ended or left or _artifacts(store) != whole:
         counts["used"] += 1
     return counts
 
 
-def _whole(folder: Path, verb: str, words: list[str], environment: dict[str, str]) -> tuple[float, Store]:
-    """How long the command takes on empty results that nobody disturbs [s], and what it makes."""
-    results, begun = folder / f"whole_{verb}", time.monotonic()
-    code = _start(words, {**environment, "FLEXCLEAR_RESULTS": str(results)}).wait()
-    assert code == 0, f"{verb} ends with {code}"
-    return time.monotonic() - begun, Store(results)
-
-
-def _helpers(
-    folder: Path,
-    verb: str,
-    words: list[str],
-    environment: dict[str, str],
-    rng: random.Random,
-    count: int,
-    *,
-    idle: bool = False,
-) -> Counter[str]:
+def _helpers(place: Place, verb: str, rng: random.Random, count: int, *, idle: bool = False) -> Counter[str]:
     """One of the processes that a command has started is killed, as the system does where memory is full.
 
     idle: one that does nothing then, where there is one.  The command does without it, or ends with exit code 4 and a
     sentence; the next one makes the same results.
     """
-    words, counts = [word.format(folder=folder) for word in words], Counter[str]()
-    label = f"{verb}_{'idle' if idle else 'helped'}"
-    seconds, whole = _whole(folder, label, words, environment)
+    words, counts, label = COMMANDS[verb][1], Counter[str](), f"{verb}_{'idle' if idle else 'helped'}"
+    seconds, whole = place.whole(words, f"whole_{label}")
     for k in range(count):
-        here = {**environment, "FLEXCLEAR_RESULTS": f"{folder}/helpless_{label}_{k}"}
-        store = Store(Path(here["FLEXCLEAR_RESULTS"]))
-        process = _start(words, here, stderr=subprocess.PIPE)
+        results = f"helpless_{label}_{k}"
+        store, process = place.store(results), place.start(words, results, stderr=subprocess.PIPE)
         end = time.monotonic() + min(LATEST, seconds) * rng.random()
-        while process.poll() is None and (time.monotonic() < end or not system.children(process.pid)):
+        while process.poll() is None and (time.monotonic() < end or not processes.children(process.pid)):
             time.sleep(0.01)
-        children = system.children(process.pid)
+        children = processes.children(process.pid)
         waiting = _idle(process.pid, children) if idle else children
         if not waiting:  # nothing was brought about
             process.communicate()
@@ -344,18 +324,18 @@ def _helpers(
         sound = (
             process.returncode in SAID and "Traceback" not in said and not upkeep.inventory(store, whole=True).damaged
         )
-        again = _start(words, here).wait() == 0 and _artifacts(store) == _artifacts(whole)
+        again = place.start(words, results).wait() == 0 and _artifacts(store) == whole
         if not (sound and again):
             print(f"{verb}: {process.returncode}, then {again}: {said[-500:]}", file=sys.stderr)
         counts["used" if not (sound and again) else "detected" if process.returncode else "harmless"] += 1
     return counts
 
 
-def _idle(parent: int, processes: Sequence[psutil.Process]) -> list[psutil.Process]:
+def _idle(parent: int, running: Sequence[psutil.Process]) -> list[psutil.Process]:
     """Those of a process's children that take no processor time for a moment."""
-    before = {process: system.seconds_of(process) for process in processes}
+    before = {child: processes.seconds_of(child) for child in running}
     time.sleep(LOOK)
-    return [p for p in system.children(parent) if p in before and system.seconds_of(p) - before[p] < IDLE]
+    return [p for p in processes.children(parent) if p in before and processes.seconds_of(p) - before[p] < IDLE]
 
 
 def _artifacts(store: Store) -> dict[tuple[str, str], str]:
@@ -364,25 +344,22 @@ def _artifacts(store: Store) -> dict[tuple[str, str], str]:
     return {(r.stage, r.key): r.digest for r in records if r is not None and r.stage in COMPUTED}
 
 
-def _full(folder: Path, environment: dict[str, str]) -> Counter[str]:
+def _full(place: Place) -> Counter[str]:
     """No file may be longer than so many bytes: the command says so with exit code 4, and no partial file remains."""
     counts = Counter[str]()
     for k, size in enumerate(FULL):
-        here = {**environment, "FLEXCLEAR_RESULTS": f"{folder}/full{k}"}
-        code = _start(["run", SCENE], here, preexec_fn=system.limit_files(size)).wait()
-        store = Store(Path(here["FLEXCLEAR_RESULTS"]))
+        code = place.start(["run", SCENE], f"full{k}", preexec_fn=processes.limit_files(size)).wait()
+        store = place.store(f"full{k}")
         damaged = upkeep.inventory(store, whole=True).damaged if store.root.is_dir() else ()
         counts["used" if damaged or code not in (0, 4) else "detected" if code else "harmless"] += 1
     return counts
 
 
-def _concurrent(folder: Path, environment: dict[str, str]) -> Counter[str]:
+def _concurrent(place: Place) -> Counter[str]:
     """Equal commands at once, on empty results: each ends well, and together they make one complete result."""
-    here = {**environment, "FLEXCLEAR_RESULTS": f"{folder}/together"}
-    codes = [process.wait() for process in [_start(["run", SCENE], here) for _ in range(CONCURRENT)]]
-    store = Store(Path(here["FLEXCLEAR_RESULTS"]))
-    same = _artifacts(store) == _artifacts(Store(folder / "results"))
-    sound = same and not upkeep.inventory(store, whole=True).damaged
+    codes = [process.wait() for process in [place.start(["run", SCENE], "together") for _ in range(CONCURRENT)]]
+    store = place.store("together")
+    sound = _artifacts(store) == _artifacts(place.store()) and not upkeep.inventory(store, whole=True).damaged
     return Counter("detected" if code == 0 and sound else "used" for code in codes)
 
 

@@ -247,11 +247,6 @@ def _controllers(run: xr.Dataset, scene: Scene) -> str:
     return f"The hardest push is {float(push.max()):.3g} N, by '{push.idxmax().item()}'."
 
 
-def _pendulum(run: xr.Dataset, scene: Scene) -> str:
-    turns = run["joint_position"][:, 0]
-    return f"It turns over: {abs(float(turns[-1])) / (2 * np.pi):.1f} turns in {scene.time.end:.3g} s."
-
-
 def _paper(run: xr.Dataset, scene: Scene) -> str:
     post = derive(run)
     return (

@@ -1,20 +1,30 @@
-"""Which layouts of the mechanism have the sensitivities of the paper's Table 8, and what they predict besides."""
+"""Which layouts of the mechanism have the sensitivities of the paper's Table 8, and what they predict besides.
+
+Runs with rigid rods over what the paper leaves open, and ensembles with flexible ones.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
 import numpy as np
+import xarray as xr
 
-from benchmarks.family import Case, Family, Record, each
-from benchmarks.geometry import identify, predict
-from benchmarks.geometry.identify import DANGLE, DZ, Member
-from benchmarks.geometry.kinematics import answer
-from benchmarks.geometry.predict import FLEXIBLE, MEMBERS, RESTITUTION, STARTS, Open
+from benchmarks import layouts
+from benchmarks.family import REFUSED, Case, Family, Record, each
+from benchmarks.layouts import DANGLE, DZ, Layout, Member, answer
 from benchmarks.page import Columns, table
+from flexclear.commands import scenes as stages
+from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
+from flexclear.papers.wang_wang_2019.models import JOINT, PLATFORM
 from flexclear.papers.wang_wang_2019.published import TABLE8, TABLE9
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.system.errors import SolverError
+from flexclear.pipeline.core.system.progress import silent
+from flexclear.stages.workplace import open_workplace
 
 #: layouts of the family whose runs are made: every so manieth of a coarser grid
 COARSE, SHOWN = 0.02, 5
@@ -22,37 +32,37 @@ COARSE, SHOWN = 0.02, 5
 
 def members_rows() -> Iterator[Record]:
     """The family on its grid: one record with its extent, and one for the layout that is taken."""
-    found = identify.family()
-    record: Record = {"members": len(found), "on_the_plate": sum(identify.on_the_plate(m.layout) for m in found)}
+    found = layouts.family()
+    record: Record = {"members": len(found), "on_the_plate": sum(layouts.on_the_plate(m.layout) for m in found)}
     for name in ("ax", "ay", "bx", "by", "height", "leg"):
         values = [getattr(m.layout, name) for m in found]
         record |= {f"{name}_least": float(min(values)), f"{name}_most": float(max(values))}
     yield record
-    yield _member(identify.chosen(found))
+    yield _member(layouts.chosen(found))
 
 
 def velocity_rows() -> Iterator[Record]:
     """Runs with clearance of some of the family, the other choices as in the scenes; and of the first layout."""
-    for member in sorted(identify.family(COARSE), key=lambda m: m.answer.condition)[::SHOWN]:
-        yield _member(member) | predict.rigid(member.layout, Open())
-    first = Member(identify.FIRST, answer(identify.FIRST))
-    yield _member(first) | predict.rigid(first.layout, Open()) | {"first": True}
+    for member in sorted(layouts.family(COARSE), key=lambda m: m.answer.condition)[::SHOWN]:
+        yield _member(member) | rigid(member.layout, Open())
+    first = Member(layouts.FIRST, answer(layouts.FIRST))
+    yield _member(first) | rigid(first.layout, Open()) | {"first": True}
 
 
 def open_rows() -> Iterator[Record]:
     """The layout that is taken, over what else the paper leaves open."""
-    layout = identify.chosen(identify.family()).layout
+    layout = layouts.chosen(layouts.family()).layout
     for restitution, gravity, start in product(RESTITUTION, (False, True), STARTS):
         choice = Open(restitution, gravity, start)
         record = {"restitution": restitution, "gravity": gravity, "start": start}
-        yield record | predict.rigid(layout, choice)
+        yield record | rigid(layout, choice)
 
 
 def flexible_rows() -> Iterator[Record]:
     """The layout that is taken, with a flexible rod and clearance."""
-    layout = identify.chosen(identify.family()).layout
+    layout = layouts.chosen(layouts.family()).layout
     for name in FLEXIBLE:
-        yield {"set": name, "count": MEMBERS} | predict.flexible(layout, name)
+        yield {"set": name, "count": MEMBERS} | flexible(layout, name)
 
 
 def _member(member: Member) -> Record:
@@ -106,7 +116,7 @@ def _members(rows: list[Record]) -> str:
         f"Table 8 asks for dz/dL1 = {DZ:.4f} and dangle/dL1 = {DANGLE:.4f} rad/m. Hence ax = "
         f"{1e3 * taken['ax']:.1f} mm "
         f"and height / leg = {upright:.4f}, legs {np.degrees(np.arccos(upright)):.1f} degrees from the "
-        f"vertical.\n\n{extent['members']} layouts on a grid of {1e3 * identify.STEP:g} mm are left: {spans}. "
+        f"vertical.\n\n{extent['members']} layouts on a grid of {1e3 * layouts.STEP:g} mm are left: {spans}. "
         f"{extent['on_the_plate'] or 'None'} of them has all four joint centres over the plate, whatever way that is "
         f"turned.\n\nTaken, as the least condition number over the stroke:\n\n"
         + table(
@@ -183,6 +193,72 @@ def _printed(row: Record, name: str, factor: float) -> str:
 
 
 TABLES = {"members": _members, "velocity": _velocity, "open": _open, "flexible": _flexible}
+
+
+#: coefficients of restitution, none of which the paper prints
+RESTITUTION = (0.5, 0.7, 0.9)
+#: the ball starts in the middle of its socket, or so far off it [m]: nearly at rest at the bottom
+STARTS = {"concentric": 0.0, "at the bottom": 0.45e-3}
+GRAVITY = {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}
+#: of each ensemble
+MEMBERS = 4
+FLEXIBLE = {"free-free": "far_csj_free", "fixed-fixed": "far_csj_fixed", "Craig-Bampton": "far_csj_cb"}
+
+
+@dataclass(frozen=True)
+class Open:
+    """A choice of what the paper leaves open besides the layout."""
+
+    restitution: float = 0.9
+    gravity: bool = False
+    start: str = "concentric"
+
+    def edits(self) -> dict[str, Any]:
+        """As edits of a scene with clearance."""
+        found: dict[str, Any] = {"joint.A1.normal.restitution": self.restitution}
+        return found | ({"load": {"gravity": GRAVITY}} if self.gravity else {})
+
+
+def rigid(layout: Layout, choice: Open) -> Record:
+    """Largest deviations from the ideal mechanism, largest force and acceleration of a run with clearance."""
+    load = {"load": {"gravity": GRAVITY}} if choice.gravity else {}
+    try:
+        ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout, load), {}, silent)
+        requested = layouts.scene("sps4/csj", layout, choice.edits(), aside=STARTS[choice.start])
+        run = dynamics.simulate(requested, {}, silent)
+    except SolverError as error:
+        return {"verdict": REFUSED, "reason": str(error)}
+    return _told(max_deviation(run, ideal, PLATFORM)) | _peaks(run, ideal)
+
+
+def flexible(layout: Layout, name: str) -> Record:
+    """Means over an ensemble of each member's largest deviations from the ideal mechanism, and their spread."""
+    requested = layouts.scene(f"sps4/{FLEXIBLE[name]}", layout, {"ensemble.members": MEMBERS})
+    ideal = dynamics.simulate(layouts.scene("sps4/ideal", layout), {}, silent)
+    members = dynamics.ensemble(requested, stages.bundles(requested, open_workplace(), jobs=None), silent)
+    each = [_told(deviation) for deviation in ensemble_deviations(members, ideal, PLATFORM)]
+    found = {name: [one[name] for one in each] for name in each[0]}
+    found["peak_force"] = members.peak_force.sel(contact=JOINT).values.tolist()
+    found["peak_acceleration"] = members.peak_acceleration.sel(body=PLATFORM, axis="z").values.tolist()
+    means = {name: float(np.mean(values)) for name, values in found.items()}
+    return means | {f"{name}_std": float(np.std(values, ddof=1)) for name, values in found.items()}
+
+
+def _told(deviation: Deviation) -> Record:
+    return {"angle": deviation.angle, "displacement": deviation.displacement, "velocity": deviation.velocity}
+
+
+def _peaks(run: xr.Dataset, ideal: xr.Dataset) -> Record:
+    def largest(one: xr.Dataset) -> float:
+        return float(np.abs(one.acceleration.sel(body=PLATFORM, axis="z")).max())
+
+    return {
+        "peak_force": float(run.event_peak_force.max()),
+        "peak_acceleration": largest(run),
+        "ideal_acceleration": largest(ideal),
+        "ideal_reaction": float(np.linalg.norm(ideal.joint_force.sel(joint=JOINT), axis=-1).max()),
+    }
+
 
 FAMILY = Family(
     what="layouts of the paper's mechanism that have the sensitivities of Table 8, and what they predict",

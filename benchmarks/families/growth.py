@@ -7,13 +7,13 @@ own axes, which leaves the planar motion as it is and every closure independent.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from benchmarks.family import REFUSED, Case, Family, Measured, Record
+from benchmarks.family import Case, Family, Measured, Record
 from benchmarks.mechanisms import Mechanism, evaluation_time, mechanism, states, trajectory, without_clearance
 from benchmarks.page import Columns, percent, short, spread, table
 from benchmarks.timing import interleaved, once, slope
@@ -21,7 +21,6 @@ from flexclear.commands.scenes import bundles
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.system.errors import FlexclearError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
@@ -29,8 +28,6 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 LOOPS = (5, 10, 20, 40, 80)
 #: of the flexible rod, of whose Craig-Bampton modes six are static; none cuts a pair of equal frequencies
 MODES, FLEXIBLE = (6, 13, 24, 48), "far_cb"
-#: what else there are numbers of
-PARTS = ("contacts", "flexible rods", "outputs")
 #: of its run from which a state is taken [s]
 MOMENT = 1e-3
 #: joints of the scene with one contact that get its clearance, one after the other; rods that become flexible
@@ -49,14 +46,7 @@ EVALUATIONS = 4000
 
 def cases() -> list[Case]:
     """Absent effects, then numbers of loops, modes, contacts, flexible rods and outputs."""
-    ranges = {
-        "loops": LOOPS,
-        "modes": MODES,
-        "contacts": range(1, len(LOOSE) + 1),
-        "flexible rods": range(1, len(RODS) + 1),
-        "outputs": OUTPUTS,
-    }
-    grown = [Case(f"{n} {what}", n) for what, numbers in ranges.items() for n in numbers]
+    grown = [Case(f"{n} {what}", n) for what, (numbers, _) in KINDS.items() for n in numbers]
     return [Case(effect) for effect in ABSENT] + grown
 
 
@@ -65,16 +55,13 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
     for case in cases:
         if case.name in ABSENT:
             yield case, [_absent(case.name)]
-    yield from _loops([case for case in cases if case.name.endswith("loops")])
-    yield from _modes([case for case in cases if case.name.endswith("modes")])
-    yield from _parts(with_contacts, "contacts", cases)
-    yield from _parts(with_flexible_rods, "flexible rods", cases)
-    yield from _outputs([case for case in cases if case.name.endswith("outputs")])
+    for what, (_, made) in KINDS.items():
+        yield from _grown(what, {case: made(case.of) for case in cases if case.name.endswith(what)})
 
 
 def _absent(effect: str) -> Record:
     full, without = mechanism("far_csj_cb"), mechanism(ABSENT[effect])
-    engines = {"stripped": stripped(full, effect).general_engine(), "without": without.general_engine()}
+    engines = {"stripped": stripped(full, effect).engine(), "without": without.engine()}
     times = interleaved({label: _evaluation(engine, EVALUATIONS) for label, engine in engines.items()}, ROUNDS)
     return {
         "scene": without.name,
@@ -99,71 +86,42 @@ def stripped(full: Mechanism, effect: str) -> Mechanism:
     return full.with_scene(effect, without_clearance(scene) if "clearance" in effect else scene)
 
 
-def _loops(cases: Sequence[Case]) -> Measured:
-    tasks = {}
-    for case in cases:
-        try:
-            engine = Mechanism(case.name, four_bars(case.of), {}).general_engine()
-            tasks[case.name] = _evaluation(engine, max(EVALUATIONS // case.of, 10))
-        except FlexclearError as error:
-            yield case, [{"loops": case.of, "verdict": REFUSED, "reason": str(error)}]
-    times = interleaved(tasks, ROUNDS)
-    for case in cases:
-        if case.name in times:
-            yield case, [{"loops": case.of, **times[case.name].record("us")}]
+def _grown(what: str, grown: Mapping[Case, Mechanism]) -> Measured:
+    """Evaluations in free flight; of outputs whole runs."""
+    tasks, more = dict[str, Callable[[], float]](), dict[str, Record]()
+    for case, here in grown.items():
+        if what == "outputs":
+            tasks[case.name] = partial(once, partial(dynamics.simulate, here.scene, here.bundles, silent))
+            continue
+        engine = here.engine()
+        tasks[case.name] = _evaluation(engine, max(EVALUATIONS // (case.of if what == "loops" else 4), 10))
+        if what == "modes":
+            arrays = engine.model.arrays
+            held, products = int(arrays.table(m.FLEXES)["n_held"][0]), len(arrays.table(m.MOMENTS))
+            more[case.name] = {"held": held, "products": products}
+    times = interleaved(tasks, RUNS if what == "outputs" else ROUNDS)
+    for case in grown:
+        found = times[case.name]
+        # by this name older records have no other time
+        time = found.record("s") if what == "outputs" else {"straight": found.record("us")}
+        yield case, [{what: case.of, **more.get(case.name, {}), **time}]
 
 
-def _modes(cases: Sequence[Case]) -> Measured:
-    """Evaluations by the kernels and, where there is such, by straight code."""
-    known, grown, full = dict[str, Record](), dict[str, Mechanism](), mechanism(FLEXIBLE)
-    for case in cases:
-        grown[case.name] = with_modes(full, case.of)
-        arrays = grown[case.name].engine().model.arrays
-        known[case.name] = {
-            "modes": case.of,
-            "held": int(arrays.table(m.FLEXES)["n_held"][0]),
-            "products": len(arrays.table(m.MOMENTS)),
-        }
-    for case, measured in _both_ways(cases, grown):
-        yield case, [known[case.name] | measured]
+def _evaluation(engine: Engine, repeat: int) -> Callable[[], float]:
+    state = states(engine, trajectory(engine))["free"]
+    return lambda: evaluation_time(engine, state, repeat)
 
 
-def _parts(made: Callable[[int], Mechanism], what: str, cases: Sequence[Case]) -> Measured:
-    """Evaluations with so many parts of a kind, in free flight."""
-    mine = [case for case in cases if case.name.endswith(what)]
-    for case, measured in _both_ways(mine, {case.name: made(case.of) for case in mine}):
-        yield case, [{what: case.of, **measured}]
+def with_outputs(count: int) -> Mechanism:
+    """The mechanism with clearance with so many outputs, and nothing else changed."""
+    full = mechanism(CLEARANCE)
+    time = full.scene.time
+    return full.with_scene(f"{count} outputs", edited(full.scene, {"output.interval": (time.end - time.start) / count}))
 
 
-def _both_ways(cases: Sequence[Case], grown: Mapping[str, Mechanism]) -> Iterator[tuple[Case, Record]]:
-    """Times of evaluations by the kernels and, where there is such, by straight code."""
-    tasks = dict[str, Callable[[], float]]()
-    for name, here in grown.items():
-        general, engine = here.general_engine(), here.engine()
-        state = states(engine, trajectory(engine))["free"]
-        tasks[name] = partial(evaluation_time, general, state, EVALUATIONS // 4)
-        if engine.has_straight_code:
-            tasks[f"{name}, straight"] = partial(evaluation_time, engine, state, EVALUATIONS // 4)
-    times = interleaved(tasks, ROUNDS)
-    for case in cases:
-        straight = times.get(f"{case.name}, straight")
-        yield case, times[case.name].record("us") | ({"straight": straight.record("us")} if straight else {})
-
-
-def _outputs(cases: Sequence[Case]) -> Measured:
-    """Whole runs from scene to dataset that differ in the number of outputs alone."""
-    full, tasks = mechanism(CLEARANCE), dict[str, Callable[[], float]]()
-    for case in cases:
-        end = full.scene.time.end - full.scene.time.start
-        here = full.with_scene(case.name, edited(full.scene, {"output.interval": end / case.of}))
-        tasks[case.name] = partial(once, partial(dynamics.simulate, here.scene, here.bundles, silent))
-    times = interleaved(tasks, RUNS)
-    for case in cases:
-        yield case, [{"outputs": case.of, **times[case.name].record("s")}]
-
-
-def with_modes(full: Mechanism, count: int) -> Mechanism:
-    """The mechanism with so many modes of its flexible body."""
+def with_modes(count: int) -> Mechanism:
+    """The mechanism with so many modes of its flexible body, for a moment."""
+    full = mechanism(FLEXIBLE)
     (body,) = full.scene.flexible()
     scene = edited(full.scene, {f"body.{body}.modes.count": count, "time.end": MOMENT})
     return Mechanism(f"{count} modes", scene, bundles(scene))
@@ -192,11 +150,6 @@ def with_flexible_rods(count: int) -> Mechanism:
     return Mechanism(f"{count} flexible rods", scene, bundles(scene))
 
 
-def _evaluation(engine: Engine, repeat: int) -> Callable[[], float]:
-    state = states(engine, trajectory(engine))["free"]
-    return lambda: evaluation_time(engine, state, repeat)
-
-
 def four_bars(loops: int, lean: float = 0.0) -> Scene:
     """N-four-bar with rods of 1 m and 1 kg under gravity along -z, its motion in the plane of x and z.
 
@@ -204,79 +157,88 @@ def four_bars(loops: int, lean: float = 0.0) -> Scene:
 
     Data: IFToMM benchmark problem A02 (links of 1 m and 1 kg, first top at 1 m/s); joints as said above.
     """
-    thin = [1.0 / 12.0, 1.0 / 12.0, 1e-4]  # a rod of 1 kg and 1 m along z; the last only keeps the spin regular
+    s, c = float(np.sin(lean)), float(np.cos(lean))
+    upright, lying = {"z": [s, 0.0, c], "x": [c, 0.0, -s]}, {"z": [1.0, 0.0, 0.0], "x": [0.0, 0.0, -1.0]}
     body: dict[str, Any] = {"ground": {"type": "ground", "frames": {}}}
     joint: dict[str, Any] = {}
-    across = {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}
-    s, c = float(np.sin(lean)), float(np.cos(lean))
     for k in range(loops + 1):
-        body["ground"]["frames"][f"P{k}"] = {"position": [float(k), 0.0, 0.0], "axes": across}
-        body[f"upright{k}"] = {
-            "type": "rigid",
-            "mass": 1.0,
-            "inertia": thin,
-            "pose": {"position": [k + 0.5 * s, 0.0, 0.5 * c], "axes": {"z": [s, 0.0, c], "x": [c, 0.0, -s]}},
-            "velocity": [0.5 * c, 0.0, -0.5 * s],
-            "angular_velocity": [0.0, 1.0, 0.0],
-            "frames": {"foot": {"position": [0.0, 0.0, -0.5], "axes": across}, "top": {"position": [0.0, 0.0, 0.5]}},
-        }
+        body["ground"]["frames"][f"P{k}"] = {"position": [float(k), 0.0, 0.0], "axes": ACROSS}
+        body[f"upright{k}"] = _rod(
+            [k + 0.5 * s, 0.0, 0.5 * c],
+            "z",
+            ("foot", "top"),
+            ("foot",),
+            axes=upright,
+            velocity=[0.5 * c, 0.0, -0.5 * s],
+        ) | {"angular_velocity": [0.0, 1.0, 0.0]}
         joint[f"P{k}"] = {"type": "revolute", "between": [f"ground.P{k}", f"upright{k}.foot"]}
     for k in range(loops):
-        body[f"bar{k}"] = {
-            "type": "rigid",
-            "mass": 1.0,
-            "inertia": thin,
-            "pose": {"position": [k + 0.5 + s, 0.0, c], "axes": {"z": [1.0, 0.0, 0.0], "x": [0.0, 0.0, -1.0]}},
-            "velocity": [c, 0.0, -s],
-            "frames": {"left": {"position": [0.0, 0.0, -0.5]}, "right": {"position": [0.0, 0.0, 0.5]}},
-        }
+        body[f"bar{k}"] = _rod([k + 0.5 + s, 0.0, c], "z", ("left", "right"), axes=lying, velocity=[c, 0.0, -s])
         joint[f"L{k}"] = {"type": "spherical", "between": [f"upright{k}.top", f"bar{k}.left"]}
         joint[f"R{k}"] = {"type": "spherical", "between": [f"upright{k + 1}.top", f"bar{k}.right"]}
-    return Scene.model_validate(
-        {
-            "title": f"{loops} four-bars",
-            "body": body,
-            "joint": joint,
-            "load": {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
-            "time": {"end": 0.1},
-            "output": {"interval": 0.01},
-        }
-    )
+    return _scene(f"{loops} four-bars", body, joint, 0.1, {})
 
 
-def hinged(links: int, end: float = 0.2) -> Scene:
+def hinged(links: int) -> Scene:
     """An open chain of rods of 1 m and 1 kg on hinges about y, along x at the start, under gravity along -z."""
-    across = {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}
-    body: dict[str, Any] = {"ground": {"type": "ground", "frames": {"tip": {"axes": across}}}}
+    body: dict[str, Any] = {"ground": {"type": "ground", "frames": {"tip": {"axes": ACROSS}}}}
     joint: dict[str, Any] = {}
     for k in range(links):
-        body[f"link{k}"] = {
-            "type": "rigid",
-            "mass": 1.0,
-            "inertia": [1e-4, 1.0 / 12.0, 1.0 / 12.0],
-            "pose": {"position": [k + 0.5, 0.0, 0.0]},
-            "frames": {
-                "foot": {"position": [-0.5, 0.0, 0.0], "axes": across},
-                "tip": {"position": [0.5, 0.0, 0.0], "axes": across},
-            },
-        }
+        body[f"link{k}"] = _rod([k + 0.5, 0.0, 0.0], "x", ("foot", "tip"), ("foot", "tip"))
         joint[f"J{k}"] = {"type": "revolute", "between": [f"link{k - 1}.tip" if k else "ground.tip", f"link{k}.foot"]}
+    return _scene(f"{links} links", body, joint, 0.2, {"integrator": "dop853", "rtol": 1e-10})
+
+
+#: of hinges about the world's y
+ACROSS = {"z": [0.0, 1.0, 0.0], "x": [1.0, 0.0, 0.0]}
+
+
+def _rod(
+    place: list[float],
+    along: str,
+    ends: tuple[str, str],
+    hinges: Sequence[str] = (),
+    axes: dict[str, Any] | None = None,
+    **moving: Any,
+) -> dict[str, Any]:
+    """A rod of 1 kg and 1 m along one of its own axes; hinges: ends whose frames have the axes of one."""
+    # the small moment only keeps the spin about itself regular
+    inertia = [1e-4 if axis == along else 1.0 / 12.0 for axis in "xyz"]
+    frames = {
+        end: {"position": [side if axis == along else 0.0 for axis in "xyz"]}
+        | ({"axes": ACROSS} if end in hinges else {})
+        for end, side in zip(ends, (-0.5, 0.5), strict=True)
+    }
+    pose = {"position": place} | ({"axes": axes} if axes else {})
+    return {"type": "rigid", "mass": 1.0, "inertia": inertia, "pose": pose, "frames": frames, **moving}
+
+
+def _scene(title: str, body: dict[str, Any], joint: dict[str, Any], end: float, solver: dict[str, Any]) -> Scene:
     return Scene.model_validate(
         {
-            "title": f"{links} links",
+            "title": title,
             "body": body,
             "joint": joint,
             "load": {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
             "time": {"end": end},
             "output": {"interval": end / 10.0},
-            "solver": {"integrator": "dop853", "rtol": 1e-10},
+            "solver": solver,
         }
     )
 
 
+#: what there are numbers of: the numbers, and the mechanism with so many
+KINDS: dict[str, tuple[Sequence[int], Callable[[int], Mechanism]]] = {
+    "loops": (LOOPS, lambda n: Mechanism(f"{n} loops", four_bars(n), {})),
+    "modes": (MODES, with_modes),
+    "contacts": (range(1, len(LOOSE) + 1), with_contacts),
+    "flexible rods": (range(1, len(RODS) + 1), with_flexible_rods),
+    "outputs": (OUTPUTS, with_outputs),
+}
+
+
 def show(records: list[Record]) -> str:
     """All tables, with the exponents of the growth."""
-    loops, modes = ([r for r in records if "us" in r and what in r] for what in ("loops", "modes"))
     absent: Columns = {
         "absent effect": lambda r: f"{r['case']}, against {r['scene']}",
         "removed [us]": lambda r: f"{r['stripped_us']:.2f}",
@@ -285,69 +247,46 @@ def show(records: list[Record]) -> str:
         "spread": lambda r: percent(r["spread"]),
         "same compiled code": lambda r: "yes" if r["same_code"] else "no",
     }
-    growth: Columns = {
-        "loops": lambda r: str(r["loops"]),
-        "us per evaluation": lambda r: spread(r, "us", 1),
-        "us per loop": lambda r: short(r["us"] / r["loops"]),
-    }
-    parts = [table([r for r in records if "same_code" in r], absent), table(loops, growth)]
-    if len(loops) > 1:
-        exponent = slope([r["loops"] for r in loops], [r["us"] for r in loops])
-        parts.append(f"Time grows as the number of loops to the power {exponent:.2f}.")
-    if modes:
-        parts.append(_of_modes(modes))
-    parts += [_of_parts(found, what) for what in PARTS if (found := [r for r in records if what in r])]
-    return "\n\n".join(parts + [f"{r['case']} skipped: {r['reason']}" for r in records if "reason" in r])
+    parts = [table([r for r in records if "same_code" in r], absent)]
+    for what in KINDS:
+        # older records of loops are of code that is gone
+        if found := [r for r in records if what in r and ("straight" in r or what == "outputs")]:
+            parts.append(table(found, _columns(found, what)))
+        if what == "loops" and len(found) > 1:
+            exponent = slope([r[what] for r in found], [r["straight"]["us"] for r in found])
+            parts.append(f"Time grows as the number of loops to the power {exponent:.2f}.")
+    return "\n\n".join(parts)
 
 
-def _straight(r: Record) -> Any:
-    return r.get("straight", {}).get("us")
+def _columns(records: list[Record], what: str) -> Columns:
+    """What the table over numbers of a kind has; exponents are those from each record to the next."""
 
+    def exponent(of: Callable[[Record], Any]) -> Callable[[Record], str]:
+        def to_here(r: Record) -> str:
+            before = records[max(records.index(r) - 1, 0)]
+            if before is r:
+                return ""
+            return f"{slope([before[what], r[what]], [of(before), of(r)]):.2f}"
 
-def _exponent(records: list[Record], number: str, of: Callable[[Record], Any]) -> Callable[[Record], str]:
-    """The exponent of growth from each record to the next."""
+        return to_here
 
-    def to_here(r: Record) -> str:
-        before = records[records.index(r) - 1] if r is not records[0] else r
-        if before is r or not (of(before) and of(r)):
-            return ""
-        return f"{slope([before[number], r[number]], [of(before), of(r)]):.2f}"
-
-    return to_here
-
-
-def _of_parts(records: list[Record], what: str) -> str:
-    """The table over numbers of contacts, flexible rods or outputs."""
-    exponent = _exponent(records, what, lambda one: one.get("us", one.get("s")))
-    if what == "outputs":
-        runs: Columns = {
-            what: lambda r: str(r[what]),
-            "simulate stage [s]": lambda r: spread(r, "s", 3),
-            "exponent": exponent,
+    columns: dict[str, Callable[[Record], str]] = {what: lambda r: str(r[what])}
+    if what == "loops":
+        return columns | {
+            "us per evaluation": lambda r: spread(r["straight"], "us", 1),
+            "us per loop": lambda r: short(r["straight"]["us"] / r[what]),
         }
-        return table(records, runs)
-    columns: Columns = {
-        what: lambda r: str(r[what]),
-        "kernels [us]": lambda r: spread(r, "us", 2),
-        "exponent": exponent,
-        "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
-        "its exponent": _exponent(records, what, _straight),
+    if what == "outputs":
+        return columns | {"simulate stage [s]": lambda r: spread(r, "s", 3), "exponent": exponent(lambda r: r["s"])}
+    if what == "modes":
+        columns |= {
+            "of them held": lambda r: str(r["held"]),
+            "integrals of two modes": lambda r: str(r["products"]),
+        }
+    return columns | {
+        "us per evaluation": lambda r: spread(r["straight"], "us", 2),
+        "exponent": exponent(lambda r: r["straight"]["us"]),
     }
-    return table(records, columns)
-
-
-def _of_modes(records: list[Record]) -> str:
-    """The table over numbers of modes, with exponents from each one to the next."""
-    columns: Columns = {
-        "modes": lambda r: str(r["modes"]),
-        "of them held": lambda r: str(r["held"]),
-        "integrals of two modes": lambda r: str(r["products"]),
-        "kernels [us]": lambda r: spread(r, "us", 2),
-        "exponent": _exponent(records, "modes", lambda one: one["us"]),
-        "straight [us]": lambda r: spread(r["straight"], "us", 2) if "straight" in r else "",
-        "its exponent": _exponent(records, "modes", _straight),
-    }
-    return table(records, columns)
 
 
 FAMILY = Family(

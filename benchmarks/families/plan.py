@@ -19,6 +19,7 @@ import numpy as np
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Family, Measured, Record
 from benchmarks.page import Columns, short, table
 from benchmarks.plan_scenes import Drawn, drawn
+from flexclear.commands import plan
 from flexclear.commands.plan import MEMBERS
 from flexclear.pipeline.core.artifacts import effect_size
 from flexclear.pipeline.core.artifacts.effect_size import Agreement
@@ -27,7 +28,10 @@ from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.quantity import Quantity, parse
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import FlexclearError
-from flexclear.pipeline.post.answers.plan import MET, MET_TO_HORIZON, MISSED, UNDECIDED, until_decided, verdict
+from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.post.answers.plan import MET, MET_TO_HORIZON, MISSED, UNDECIDED, dataset, until_decided, verdict
+from flexclear.stages import effect_plan, simulation, watched_quantities
+from flexclear.stages.workplace import check, open_workplace
 
 #: the first of consecutive seeds that were never looked at before, how many, and scenes of each
 SEED, SEEDS, SCENES = 3101, 3, 8
@@ -57,10 +61,6 @@ def measure(cases: Sequence[Case], jobs: int) -> Measured:
 
 
 def _measured(seed: int, number: int, folder: Path) -> Record:
-    from flexclear.commands import plan
-    from flexclear.stages import effect_plan
-    from flexclear.stages.workplace import check, open_workplace
-
     made = drawn(seed, number, folder / "recipes")
     scene, drawing = made.scene, dict(made.record)
     place = open_workplace()
@@ -68,15 +68,13 @@ def _measured(seed: int, number: int, folder: Path) -> Record:
         task = effect_plan.task(scene)
         outcome = place.bring(list(task.inputs.values()), 1)
         check(outcome)
-        inputs = {name: place.store.load(outcome.records[id(below)]) for name, below in task.inputs.items()}
+        inputs = {name: place.store.load(outcome.records[below]) for name, below in task.inputs.items()}
         params = {**task.params, **task.context}
         decided, planning = _planned(params, inputs)
         if planning > SECOND:  # that may have fetched code
             decided, planning = _planned(params, inputs)
     except FlexclearError as error:
         return {**drawing, "verdict": REFUSED, "reason": str(error)}
-    from flexclear.pipeline.post.answers.plan import dataset
-
     planned = plan.of(scene, dataset(decided, scene.title, {q.name: q.unit for q in scene.requested()}))
     full = edited(scene, {"accuracy": None})
     chosen = [parse(name, scene.owners()) for name in made.record["wanted"]]
@@ -129,21 +127,13 @@ def _requested(made: Drawn, full: Point, q: Quantity) -> float:
 
 def _planned(params: dict[str, Any], inputs: dict[str, Any]) -> tuple[Any, float]:
     """A plan, and the processor time that it took [s]."""
-    from flexclear.stages import effect_plan
-
     begun = time.process_time()
-    found = effect_plan.decided(params, inputs, _silent)
+    found = effect_plan.decided(params, inputs, silent)
     return found, time.process_time() - begun
-
-
-def _silent(fraction: float | None, text: str) -> None:
-    """Says nothing."""
 
 
 def _reduced(inputs: dict[str, Any], modes: Any) -> dict[str, Any]:
     """Inputs with the bundles of fewer modes where the plan takes them."""
-    from flexclear.stages import effect_plan
-
     by_count = [level for level in effect_plan.less(inputs) if modes and all(body in level for body in modes)]
     chosen = next((n for n in by_count if all(n[body].sizes["mode"] == count for body, count in modes.items())), {})
     return inputs | {f"bundle/{body}": chosen[body] for body in modes}
@@ -151,8 +141,6 @@ def _reduced(inputs: dict[str, Any], modes: Any) -> dict[str, Any]:
 
 def _run(scene: Scene, inputs: dict[str, Any], chosen: list[Any], members: int) -> tuple[Any, float]:
     """What is watched of a scene, and the processor time of one run [s]."""
-    from flexclear.stages import simulation, watched_quantities
-
     plain = watched_quantities.plain(scene)
     rigid = {name: data for name, data in inputs.items() if name.removeprefix("rigid/") in plain.meshed()}
     filled = simulation.rebuild(simulation.params(plain), rigid)
@@ -200,7 +188,10 @@ def show(records: list[Record]) -> dict[str, str]:
         "of these fewer modes": lambda r: str(r["fewer"]),
         "median planning [s]": lambda r: short(r["planning"]),
     }
-    rows = [_together(name, [r for r in done if r["mechanism"] == name]) for name in _names(done)]
+    rows = [
+        _together(name, [r for r in done if r["mechanism"] == name])
+        for name in dict.fromkeys(str(r["mechanism"]) for r in done)
+    ]
     sizes = [
         _together(f"{short(low)} to {short(high)} s" if np.isfinite(high) else f"above {short(low)} s", mine)
         for low, high in pairwise(SIZES)
@@ -238,10 +229,6 @@ def _worst(done: list[Record]) -> str:
 def _asked(of: dict[str, float]) -> str:
     """An accuracy as a scene has it, absolute ones in SI."""
     return f"{of['absolute']:.2g}" if "absolute" in of else f"{100 * of['relative']:.2g} %"
-
-
-def _names(done: list[Record]) -> list[str]:
-    return list(dict.fromkeys(str(r["mechanism"]) for r in done))
 
 
 def _together(name: str, mine: list[Record]) -> Record:

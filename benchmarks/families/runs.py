@@ -1,17 +1,41 @@
-"""Whole warm runs of the paper's scenes at their own tolerance: the integration alone, and the simulate stage."""
+"""Evaluations and whole runs of the paper's scenes: warm ones, and the first one with nothing compiled.
+
+Evaluations: against one LAPACK ``dgesv`` of the order of the maximal-coordinate system.
+
+Warm: the integration alone, and the simulate stage.  The first: as a command, from an empty folder of kernels to the
+dataset; meshes, modes and bundles are made before. The same command with the kernels on disk is measured next to it:
+the difference is what compiling takes. Two processes compile where there are two processors. Wall time means something
+on a machine without other work only; processor time is that of all processes together.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
 
-from benchmarks.family import Case, Family, Measured
-from benchmarks.mechanisms import SCENES, Mechanism, mechanism
-from benchmarks.page import Columns, spread, table
-from benchmarks.timing import interleaved, once
+import numpy as np
+import xarray as xr
+from scipy.linalg.lapack import dgesv
+
+from benchmarks.family import Case, Family, Measured, Record, each
+from benchmarks.mechanisms import SCENES, Mechanism, evaluation_time, mechanism, states, trajectory
+from benchmarks.page import Columns, short, spread, table
+from benchmarks.timing import interleaved, of_children, once
 from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.platforms import cores
 from flexclear.pipeline.core.system.progress import silent
+from flexclear.pipeline.dynamics.model.merge import frames_of, merge
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import integrate
+from flexclear.pipeline.post.plotting.table import pipe_table
 
 ROUNDS = 5
 
@@ -65,5 +89,145 @@ FAMILY = Family(
     cases=lambda: [Case(name) for name in SCENES],
     measure=measure,
     show=lambda records: table(records, COLUMNS),
+    quick="ideal",
+)
+
+
+COLD_SCENES = ("ideal", "csj", "far_csj_cb")
+
+
+def _from_nothing(case: Case) -> list[Record]:
+    with tempfile.TemporaryDirectory() as folder:
+        return [_first_run(f"sps4/{case.name}", Path(folder))]
+
+
+def _first_run(scene: str, folder: Path) -> Record:
+    results = folder / "results"
+    kernels = [folder / name for name in ("before", "cold")]
+
+    def run(kept: Path, *more: str) -> tuple[float, float]:
+        """Seconds of wall and processor time of the command."""
+        said = {"FLEXCLEAR_RESULTS": str(results), "FLEXCLEAR_KERNELS": str(kept)}
+        command = [sys.executable, "-m", "flexclear", "run", scene, "-q", *more]
+        begun, environment = time.monotonic(), {**os.environ, **said}
+        spent = of_children(lambda: subprocess.run(command, env=environment, stdout=subprocess.DEVNULL, check=True))
+        return time.monotonic() - begun, spent
+
+    run(kernels[0], "--to", "bundle")
+    cold = run(kernels[1], "--to", "simulate")
+    shutil.rmtree(results / "cache" / "simulate")
+    warm = run(kernels[1], "--to", "simulate")
+    return {
+        "processors": cores(),
+        "wall_s": cold[0],
+        "processor_s": cold[1],
+        "warm_wall_s": warm[0],
+        "warm_processor_s": warm[1],
+        "kilobytes": sum(file.stat().st_size for file in kernels[1].rglob("*.code")) // 1000,
+    }
+
+
+COLD_COLUMNS: Columns = {
+    "scene": lambda r: r["case"],
+    "processors": lambda r: str(r["processors"]),
+    "nothing compiled, wall [s]": lambda r: short(r["wall_s"]),
+    "processor [s]": lambda r: short(r["processor_s"]),
+    "kernels on disk, wall [s]": lambda r: short(r["warm_wall_s"]),
+    "its processor [s]": lambda r: short(r["warm_processor_s"]),
+    "code [kB]": lambda r: str(r["kilobytes"]),
+}
+
+
+COLD = Family(
+    what="the first run of a scene, with nothing compiled",
+    takes="1 min",
+    page="benchmarks.md",
+    cases=lambda: [Case(name) for name in COLD_SCENES],
+    measure=each(_from_nothing),
+    show=lambda records: table(records, COLD_COLUMNS),
+    children=True,
+)
+
+
+#: of a round, some milliseconds each: short against the drift of the machine, long against the clock
+EVALUATIONS, SOLUTIONS, TURNS = 2000, 30, 25
+#: rows of a joint in maximal coordinates; a fixed one joins two bodies to one link
+JOINT_ROWS = {"spherical": 3, "revolute": 5, "prismatic": 5, "fixed": 0, "clearance-spherical": 0}
+
+
+def _evaluations(case: Case) -> list[Record]:
+    """Both in turns in one process, the ratio the median of the ratios of neighbours."""
+    here = mechanism(case.name)
+    engine = here.engine()
+    unknowns, derivation = maximal_unknowns(here.scene, here.bundles)
+    tasks: dict[str, Callable[[], float]] = {"dgesv": partial(dgesv_time, unknowns)}
+    for label, state in states(engine, trajectory(engine)).items():
+        tasks[f"{label}, straight"] = partial(evaluation_time, engine, state, EVALUATIONS)
+    times = interleaved(tasks, TURNS)
+    dense = times.pop("dgesv")
+    ours = {label: found.record("us") | {"ratio": dense.over(found)} for label, found in times.items()}
+    return [{"unknowns": unknowns, "derivation": derivation, "dgesv": dense.record("us"), "ours": ours}]
+
+
+def maximal_unknowns(scene: Scene, bundles: Mapping[str, xr.Dataset]) -> tuple[int, str]:
+    """Order of the system in maximal coordinates, and where it comes from in words.
+
+    Its unknowns are the accelerations of every moving link (6 each, rigidly joined bodies being one, also where one of
+    them is flexible), those of the modes, and one multiplier for each row of every joint, drives included. Joints with
+    clearance are forces and have no rows.
+    """
+    frames = frames_of(scene, bundles)
+    groups, group_of = merge(scene, frames)
+    # rigid groups that a fixed joint ties to a flexible one move with its frame
+    tied = [
+        {group_of[frames[f].body] for f in joint.between} for joint in scene.joint.values() if joint.type == "fixed"
+    ]
+    carried = {i for pair in tied if len(pair) == 2 for i in pair if not groups[i].flexible}
+    links = len(groups) - 1 - len(carried)
+    modes = sum(bundles[group.host].sizes["mode"] for group in groups if group.flexible)
+    rows = sum(JOINT_ROWS[joint.type] for joint in scene.joint.values())
+    unknowns = 6 * links + modes + rows + len(scene.drive)
+    of_modes = f" + {modes} modes" if modes else ""
+    return unknowns, f"6 x {links} links{of_modes} + {rows} joint rows + {len(scene.drive)} drive rows = {unknowns}"
+
+
+def dgesv_time(order: int) -> float:
+    """Processor time of one solution of a dense system [s]; making its matrix is not counted.
+
+    The matrix is a random one: to within 2 % its entries do not matter for the time.
+    """
+    random = np.random.default_rng(order)
+    systems = [(random.normal(size=(order, order)).T, random.normal(size=order)) for _ in range(SOLUTIONS)]
+
+    def solve() -> None:
+        for A, b in systems:
+            dgesv(A, b, overwrite_a=1, overwrite_b=1)
+
+    return once(solve) / SOLUTIONS
+
+
+def shown_evaluations(records: list[Record]) -> str:
+    """The table, and where the numbers of unknowns come from."""
+    rows = []
+    for r in records:
+        cells = [r["case"], str(r["unknowns"]), spread(r["dgesv"], "us", 1)]
+        for label in ("free", "in contact"):
+            ours = r["ours"].get(f"{label}, straight")
+            cells += [spread(ours, "us", 2), f"1/{ours['ratio']:.1f}"] if ours else ["", ""]
+        rows.append(cells)
+    head = ["scene", "n", "dgesv(n) [us]"]
+    for label in ("free", "in contact"):
+        head += [f"{label} [us]", "of dgesv"]
+    derivations = "\n".join(f"- {r['case']}: n = {r['derivation']}" for r in records)
+    return f"{pipe_table(head, rows)}\n\n{derivations}"
+
+
+EVALUATION = Family(
+    what="microseconds of one evaluation, against a dense solve",
+    takes="1 min",
+    page="benchmarks.md",
+    cases=lambda: [Case(name) for name in SCENES],
+    measure=each(_evaluations),
+    show=shown_evaluations,
     quick="ideal",
 )

@@ -7,7 +7,6 @@ import pickle
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -130,10 +129,7 @@ def _workers() -> Record:
     scene = load_scene(TREE / "flexclear" / "scenes" / f"{kind.scene}.toml")
     family = Points("family", params(scene), bundles(scene), kind.keep, 0, False)
     packed, ratios = {"family": pickle.dumps(family)}, []
-    jobs = [
-        Job(str(k), "family", {kind.place: float(x)}, Path(str(k)))
-        for k, x in enumerate(np.linspace(*kind.ends, SHARED))
-    ]
+    jobs = [Job(str(k), "family", {kind.place: float(x)}) for k, x in enumerate(np.linspace(*kind.ends, SHARED))]
     with engine(2, None) as two, engine(1, None) as one:
         for turn in range(TURNS + 1):
             seconds = []

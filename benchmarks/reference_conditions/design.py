@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import itertools
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from benchmarks.geometry import identify
-from benchmarks.geometry.kinematics import Layout
-from benchmarks.geometry.scenes import edits
+from benchmarks.layouts import FIRST, Layout, chosen, edits, family
 from flexclear.commands.scenes import find_scene
 from flexclear.pipeline.core.scene.load import load_scene, read_toml
 from flexclear.pipeline.core.scene.schema import Scene
@@ -32,11 +31,9 @@ CONDITIONS = ("free-free", "fixed-fixed", "pinned-pinned", "cantilever", "craig-
 #: coordinates that the sets are compared with, and at which convergence is looked at; a count that would cut a pair of
 #: equal frequencies is raised to the next whole one
 COUNT, COUNTS = 13, (7, 13, 25, 49)
-#: of these, with ideal joints, where the full rod is there as well: a run costs with the third power of the count
-FAR_COUNTS = (7, 13, 25)
-#: in the scene with clearance, where each costs an ensemble
-CLEARANCE_COUNTS = (7, 13, 25)
-#: there, the most complete sets; the last is the reference, and the one before it shows how far it is settled
+#: of these, those that are run: a run costs with the third power of the count, and with clearance is an ensemble
+RUN_COUNTS = (7, 13, 25)
+#: with clearance, the most complete sets; the last is the reference, and the one before it shows how far it is settled
 MOST_COMPLETE = (25, 37)
 #: ensembles of sets beyond COUNT have this share of the members: a run with 37 coordinates costs ten of those with 13
 LARGE_SETS = 0.5
@@ -106,24 +103,11 @@ def task(case: Case) -> Task:
         scene=given.name,
         run=f"{module}:{'members' if case.clearance and case.condition != RIGID else 'single'}",
         params=simulation.params(given, ensemble=case.clearance),
-        inputs={f"bundle/{body}": _told_apart(made, case) for body, made in graph.bundle.items()},
+        inputs={f"bundle/{body}": made for body, made in graph.bundle.items()},
         modules=(module, *simulation.modules(given)),
         folder="",
-        part=f"{_where(case)}, {case.label}" + (", clearance" if case.clearance else ""),
+        part=f"{case.place} mm, {case.label}" + (", clearance" if case.clearance else ""),
     )
-
-
-def _where(case: Case) -> str:
-    """What is special to a case's mechanism, for progress reports."""
-    if case.layout is None:
-        return f"{case.place} mm"
-    return "layout " + ", ".join(f"{1e3 * getattr(case.layout, name):.1f}" for name in ("ay", "bx", "by")) + " mm"
-
-
-def _told_apart(made: Task, case: Case) -> Task:
-    """The task and its inputs under the case's name: progress is shown by name, and many cases share a scene."""
-    above = {name: _told_apart(task, case) for name, task in made.inputs.items()}
-    return replace(made, scene=f"{made.scene}, {case.label}, elements x {case.finer}", inputs=above)
 
 
 @cache
@@ -142,63 +126,55 @@ def solved(case: Case) -> xr.Dataset:
 
 
 @cache
+def is_whole(case: Case) -> bool:
+    """Whether the count of a case cuts no pair of equal frequencies."""
+    try:
+        solved(case)
+    except InputError as error:
+        if "cut a cluster" in str(error):
+            return False
+        raise
+    return True
+
+
 def whole(place: int, condition: str, count: int) -> int:
     """The least whole count that is not below `count`."""
-    while True:
-        try:
-            solved(Case(place, condition, count))
-        except InputError as error:
-            if "cut a cluster" not in str(error):
-                raise
-            count += 1
-        else:
-            return count
+    return next(n for n in itertools.count(count) if is_whole(Case(place, condition, n)))
 
 
-def whole_counts(place: int, condition: str, most: int) -> list[int]:
-    """Counts up to `most` that cut no pair."""
-    found = []
-    for count in range(1, most + 1):
-        try:
-            solved(Case(place, condition, count))
-        except InputError:
-            continue
-        found.append(count)
-    return found
+def _sets(place: int) -> list[tuple[int, str, int]]:
+    """Places, conditions and counts that are run wherever the joint is: all of COUNT, the paper's two of fewest."""
+    sets = [(c, COUNT) for c in CONDITIONS] + [(c, 7) for c in CONDITIONS[:2]]
+    return [(place, c, whole(place, c, n)) for c, n in sets]
 
 
-def far(places: tuple[int, ...] = tuple(PLACES)) -> list[Case]:
+def far() -> list[Case]:
     """Ideal joints: rigid, every condition, the full rod; at the first place in all counts and meshes."""
     found = []
-    for place in places:
-        found += [Case(place, RIGID), Case(place, FULL)]
-        found += [Case(place, c, whole(place, c, COUNT)) for c in CONDITIONS]
-        found += [Case(place, c, whole(place, c, 7)) for c in ("free-free", "fixed-fixed")]
-    found += [Case(places[0], c, whole(places[0], c, n)) for c in CONDITIONS for n in FAR_COUNTS]
-    found += [Case(places[0], "craig-bampton", COUNT, finer=n) for n in FINER]
+    for place in PLACES:
+        found += [Case(place, RIGID), Case(place, FULL), *(Case(*key) for key in _sets(place))]
+    found += [Case(0, c, whole(0, c, n)) for c in CONDITIONS for n in RUN_COUNTS]
+    found += [Case(0, "craig-bampton", COUNT, finer=n) for n in FINER]
     return list(dict.fromkeys(found))
 
 
-def clearance(members: int, places: tuple[int, ...] = tuple(PLACES)) -> list[Case]:
+def clearance(members: int) -> list[Case]:
     """Clearance at A1: likewise, as ensembles."""
     found = []
-    for place in places:
-        found.append((place, RIGID, COUNT))
-        sets = [(c, COUNT) for c in CONDITIONS] + [(c, 7) for c in ("free-free", "fixed-fixed")]
-        sets += [("craig-bampton", n) for n in MOST_COMPLETE]
-        found += [(place, c, whole(place, c, n)) for c, n in sets]
-    first = places[0]
+    for place in PLACES:
+        found += [(place, RIGID, COUNT), *_sets(place)]
+        found += [(place, "craig-bampton", whole(place, "craig-bampton", n)) for n in MOST_COMPLETE]
     for condition in ("free-free", "craig-bampton"):
-        found += [(first, condition, whole(first, condition, n)) for n in CLEARANCE_COUNTS]
+        found += [(0, condition, whole(0, condition, n)) for n in RUN_COUNTS]
     return [Case(*key, clearance=True, members=_share(members, *key[1:])) for key in dict.fromkeys(found)]
 
 
 @cache
 def layouts() -> tuple[Layout, ...]:
     """The identified layout that is taken, members of its family by falling regularity, and last the first layout."""
-    family = sorted(identify.family(LAYOUT_GRID), key=lambda member: member.answer.condition)
-    found = [identify.chosen(identify.family()), *family[::EVERY]]
-    return (*(member.layout for member in found), identify.FIRST)
+    members = sorted(family(LAYOUT_GRID), key=lambda member: member.answer.condition)
+    found = [chosen(family()), *members[::EVERY]]
+    return (*(member.layout for member in found), FIRST)
 
 
 def of_layout(layout: Layout, members: int) -> list[Case]:

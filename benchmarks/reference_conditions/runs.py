@@ -9,24 +9,11 @@ import numpy as np
 import xarray as xr
 
 import flexclear as fc
-from benchmarks import family
+from benchmarks import family, layouts
 from benchmarks.family import Measured
 from benchmarks.family import Record as Row
-from benchmarks.geometry import identify
 from benchmarks.reference_conditions import design
 from benchmarks.reference_conditions.cases import BODY
-from benchmarks.reference_conditions.design import (
-    CONDITIONS,
-    COUNT,
-    COUNTS,
-    FINER,
-    FULL,
-    PLACES,
-    RIGID,
-    TIMES,
-    TOP,
-    Case,
-)
 from flexclear.papers.wang_wang_2019.deviations import Deviation, ensemble_deviations, max_deviation
 from flexclear.stages.workplace import Workplace, check, open_workplace
 
@@ -48,17 +35,17 @@ def measure(cases: Sequence[family.Case], jobs: int) -> Measured:
         yield case, list(rows() if case.of is None else rows(case.of))
 
 
-def bring(cases: list[Case], place: Workplace) -> dict[Case, xr.Dataset]:
+def bring(cases: list[design.Case], place: Workplace) -> dict[design.Case, xr.Dataset]:
     """Datasets of the cases, from the cache where fresh."""
     tasks = {case: design.task(case) for case in cases}
     outcome = place.bring(list(tasks.values()))
     check(outcome)
-    return {case: place.store.load(outcome.records[id(task)]) for case, task in tasks.items()}
+    return {case: place.store.load(outcome.records[task]) for case, task in tasks.items()}
 
 
-def identity(case: Case) -> Row:
+def identity(case: design.Case) -> Row:
     """What a row is about."""
-    reference = case.condition not in (FULL, RIGID)
+    reference = case.condition not in (design.FULL, design.RIGID)
     return {
         "place_mm": case.place,
         "condition": case.condition,
@@ -72,34 +59,38 @@ def static_rows() -> Iterator[Row]:
 
     Over all whole counts.
     """
-    for place in PLACES:
-        full = design.solved(Case(place, FULL))
+    for place in design.PLACES:
+        full = design.solved(design.Case(place, design.FULL))
         row = {"highest": float(full["frequency"].max())} | _compliance(full["compliance_full"], place)
-        yield {"place_mm": place, "condition": FULL, "count": 0} | row
-        for condition in CONDITIONS:
-            for count in design.whole_counts(place, condition, max(COUNTS)):
-                fraction = design.solved(Case(place, condition, count))["compliance_share"]
+        yield {"place_mm": place, "condition": design.FULL, "count": 0} | row
+        for condition in design.CONDITIONS:
+            for count in range(1, max(design.COUNTS) + 1):
+                if not design.is_whole(design.Case(place, condition, count)):
+                    continue
+                fraction = design.solved(design.Case(place, condition, count))["compliance_share"]
                 yield {"place_mm": place, "condition": condition, "count": count} | _compliance(fraction, place)
 
 
 def _compliance(values: xr.DataArray, place: int) -> Row:
-    found = values.sel(frame=TOP, frame_held=PLACES[place])
+    found = values.sel(frame=design.TOP, frame_held=design.PLACES[place])
     return {direction: float(found.sel(direction=direction)) for direction in DIRECTIONS}
 
 
 def mesh_rows() -> Iterator[Row]:
     """Frequencies [Hz] of the Craig-Bampton set at 0 mm on finer meshes, the finest last."""
-    for finer in FINER:
-        found = design.solved(Case(0, "craig-bampton", COUNT, finer=finer))["frequency"]
+    for finer in design.FINER:
+        found = design.solved(design.Case(0, "craig-bampton", design.COUNT, finer=finer))["frequency"]
         yield {"elements": finer * design.rod(1).sizes["cell"], "frequency": found.values.tolist()}
 
 
 def frequency_rows() -> Iterator[Row]:
     """Lowest frequencies [Hz] of the assembled mechanism, drives held, at each of `TIMES`."""
-    for where in PLACES:
-        sets = [Case(where, c, design.whole(where, c, COUNT)) for c in CONDITIONS] + [Case(where, FULL)]
+    for where in design.PLACES:
+        sets = [design.Case(where, c, design.whole(where, c, design.COUNT)) for c in design.CONDITIONS] + [
+            design.Case(where, design.FULL)
+        ]
         for case in sets:
-            for time in TIMES:
+            for time in design.TIMES:
                 found = fc.frequencies(design.scene(case), time)["undamped_frequency"].values
                 elastic = np.sort(found[found > 1.0])[:VIBRATIONS]
                 yield identity(case) | {"time": time, "frequency": elastic.tolist()}
@@ -109,7 +100,7 @@ def far_rows() -> Iterator[Row]:
     """Ideal joints: deviation from the rigid mechanism, and from the mechanism with the full rod."""
     runs = bring(design.far(), open_workplace())
     for case, run in runs.items():
-        rigid, full = runs[Case(case.place, RIGID)], runs[Case(case.place, FULL)]
+        rigid, full = runs[design.Case(case.place, design.RIGID)], runs[design.Case(case.place, design.FULL)]
         effect = max_deviation(run, rigid, BODY)
         row = identity(case) | _deviation(effect) | _costs(run)
         yield row | {
@@ -126,14 +117,14 @@ def clearance_rows(members: int) -> Iterator[Row]:
     """
     place = open_workplace()
     runs = bring(design.clearance(members), place)
-    rigid = bring([Case(where, RIGID) for where in PLACES], place)
+    rigid = bring([design.Case(where, design.RIGID) for where in design.PLACES], place)
     for case, run in runs.items():
-        yield identity(case) | _with_clearance(case, run, rigid[Case(case.place, RIGID)])
+        yield identity(case) | _with_clearance(case, run, rigid[design.Case(case.place, design.RIGID)])
 
 
-def _with_clearance(case: Case, run: xr.Dataset, ideal: xr.Dataset) -> Row:
+def _with_clearance(case: design.Case, run: xr.Dataset, ideal: xr.Dataset) -> Row:
     """Means and standard deviations over the members of one set, or the one run of the rigid rod."""
-    if case.condition == RIGID:
+    if case.condition == design.RIGID:
         spread = {"peak_force": [float(run.attrs["peak_force"])], "impacts": [int(run.attrs["impacts"])]}
         effects = [max_deviation(run, ideal, BODY)]
         acceleration = [float(run.attrs["peak_acceleration"])]
@@ -152,8 +143,8 @@ def layout_rows(members: int) -> Iterator[Row]:
     place = open_workplace()
     for number, layout in enumerate(design.layouts()):
         runs = bring(design.of_layout(layout, members), place)
-        ideal = next(run for case, run in runs.items() if case.condition == RIGID and not case.clearance)
-        which: Row = {"layout": number} | ({"first": True} if layout == identify.FIRST else {})
+        ideal = next(run for case, run in runs.items() if case.condition == design.RIGID and not case.clearance)
+        which: Row = {"layout": number} | ({"first": True} if layout == layouts.FIRST else {})
         which |= {name: float(getattr(layout, name)) for name in ("ax", "ay", "bx", "by", "height")}
         for case, run in runs.items():
             row = which | identity(case) | {"clearance": case.clearance}

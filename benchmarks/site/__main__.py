@@ -9,7 +9,7 @@ from collections.abc import Callable
 from functools import partial
 
 from benchmarks.page import DOCS
-from benchmarks.site import datasets, keys, python, quantities
+from benchmarks.site import keys, reference
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 
 
@@ -22,9 +22,9 @@ def readme() -> str:
 #: page below docs/ -> what makes its text
 PAGES: dict[str, Callable[[], str]] = {
     "index.md": readme,
-    "reference/python.md": python.text,
-    "datasets.md": datasets.text,
-    "reference/quantities.md": quantities.text,
+    "reference/python.md": reference.python,
+    "datasets.md": reference.datasets,
+    "reference/quantities.md": reference.quantities,
     **{f"reference/{kind}.md": partial(keys.page, kind) for kind in keys.HEADS},
 }
 

@@ -5,21 +5,16 @@ from __future__ import annotations
 import json
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from pydantic import TypeAdapter
 
-from benchmarks.site.text import table
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.sweep import Sweep
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.structure.fe.recipe import Recipe
 
-#: how `Field` describes what may be written as a number or with a unit
-_QUANTITY = re.compile(r"(?:^|; )([a-z ]+): SI number, or text with a unit$")
-_VECTORS = ("length", "angular velocity", "velocity", "number", "acceleration", "angle")
-_OWN_UNIT = "SI number, or text with a unit that fits where the law is"
 #: unit of a bare number
 SI = {
     "length": "m",
@@ -119,7 +114,6 @@ def _references(node: Any) -> Iterator[str]:
 def _section(name: str, definitions: dict[str, Any], examples: dict[str, str]) -> str:
     part = definitions[name]
     entry = str(part.get("description", "")).partition("\n\n")[0].replace("\n", " ")
-    entry = re.split(r"(?<=\.) +\w[\w, ]*: ", entry)[0]
     key = _kind(part)
     example = f"```toml\n{examples[key]}\n```\n\n" if key in examples else ""
     return f"## {_heading(name, part)}\n\n{entry}\n\n{_table(part, definitions)}\n\n{example}"
@@ -165,10 +159,7 @@ def _default(entry: dict[str, Any]) -> str:
 
 
 def _meaning(entry: dict[str, Any]) -> str:
-    text = _QUANTITY.sub("", str(entry.get("description", ""))).removesuffix(_OWN_UNIT).removesuffix("; ")
-    for vector in _VECTORS:
-        text = text.removesuffix(f"; {vector}")
-    return text.replace("\n", " ")
+    return " ".join(str(entry.get("description", "")).split())
 
 
 def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
@@ -186,9 +177,8 @@ def _value(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
             if set(_references(entry)) >= _LAW_KINDS and len(kinds) > 1:
                 return f"[law of time](#{_anchor('Constant', definitions)}), or a constant value"
             return " or ".join(dict.fromkeys(kinds))
-    quantity = _QUANTITY.search(str(entry.get("description", "")))
-    if quantity is not None:
-        return _with_unit(quantity[1])
+    if "format" in entry:
+        return _with_unit(entry["format"])
     return _plain(entry, definitions)
 
 
@@ -200,10 +190,9 @@ def _with_unit(quantity: str) -> str:
 def _plain(entry: dict[str, Any], definitions: dict[str, Any]) -> str:
     kind = entry.get("type")
     if kind == "array":
-        vector = next((v for v in _VECTORS if str(entry.get("description", "")).endswith(v)), "")
-        if vector:
-            return f"three components, {_with_unit(vector)}"
         inner = entry.get("items") or (entry.get("prefixItems") or [{}])[0]
+        if "format" in inner and entry.get("maxItems") == 3:
+            return f"three components, {_with_unit(inner['format'])}"
         return f"list of {_value(inner, definitions)}" if inner else "list"
     if kind == "object":
         inner = entry.get("additionalProperties")
@@ -249,3 +238,9 @@ def _inline(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(_inline(item) for item in value) + "]"
     return json.dumps(value, ensure_ascii=False)
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of words; bars in cells are written so that they stay in them."""
+    lines = [heads, ["---"] * len(heads), *([cell.replace("|", "\\|") for cell in row] for row in rows)]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -9,20 +9,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flexclear.commands import cost
-from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.scene import variants
 from flexclear.pipeline.core.scene.integrators import DEFAULT, VIBRATING
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, ideal, loose
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import effect_ranking, kernels, limit, watched_quantities
+from flexclear.stages import effect_ranking, kernels, watched_quantities
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check
+from flexclear.stages.workplace import Made, Workplace, open_workplace, seconds
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,33 +35,12 @@ TIMES, LEAST = 3.0, 30.0
 AT_ONCE, COMPILING = 2.0, 4.0
 #: of variants without a clearance or a flexible body, the kernels of so many are compiled next to the scene's own run
 AHEAD = 2
-#: tolerance of members with contacts, at most so tight: they start a thousandth of the clearance apart
+#: tolerance of members with contacts, at most so tight: their starts differ by a thousandth of the clearance
 MEANS = 1e-7
 #: members with which effects are compared: more of them until the difference is decided or the budget is used
 MEMBERS = (4, 8, 16, 32)
 #: the effect that represents all clearances and flexible bodies; that of `post.answers.matters`
 IDEAL = "clearance and flexibility"
-
-
-@dataclass(frozen=True)
-class Answer:
-    """One answer: its task, its record and where its files are."""
-
-    task: Task
-    record: Record
-    workplace: Workplace
-
-    def dataset(self) -> xr.Dataset:
-        """Its numbers."""
-        return self.workplace.store.load(self.record)
-
-    def file(self, name: str) -> Path | None:
-        """One of its files, in the store; None where there is none."""
-        return self.workplace.store.path(self.task.stage, self.record.key, name) if name in self.record.files else None
-
-    def text(self, name: str) -> str:
-        """One of its files that are text."""
-        return self.workplace.store.path(self.task.stage, self.record.key, name).read_text(encoding="utf-8")
 
 
 @dataclass(frozen=True)
@@ -77,11 +54,11 @@ class Said:
     table: str = ""
 
 
-def said(name: str, answer: Answer, scene: Scene) -> Said:
+def said(name: str, answer: Made, scene: Scene) -> Said:
     """What is shown of the answer called accuracy, stability or matters."""
     from flexclear.pipeline.post.answers import matters
     from flexclear.pipeline.post.cost.answer import sentences
-    from flexclear.pipeline.post.overview.page import prose
+    from flexclear.pipeline.post.pages import prose
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
     data = answer.dataset()
@@ -101,7 +78,7 @@ def said(name: str, answer: Answer, scene: Scene) -> Said:
     return Said("Which effects matter", matters.sentence(data, requested), "matters.png", caption, table)
 
 
-def dataset(name: str, scene: Scene, workplace: Workplace, budget: str | float | None) -> xr.Dataset:
+def dataset(name: str, scene: Scene, budget: str | float | None) -> xr.Dataset:
     """One of the three answers as a dataset that shows the answer in a notebook.
 
     budget: processor time [s], or text such as "2min".  Raises InputError for a scene that has nothing to answer.
@@ -109,23 +86,15 @@ def dataset(name: str, scene: Scene, workplace: Workplace, budget: str | float |
     from flexclear.pipeline.post.answers.answered import answered
 
     # in this process: workers would run a caller's script again from its top
-    answer = getattr(Answers(scene, replace(workplace, jobs=1), seconds(budget), questions=1), name)
+    workplace = replace(open_workplace(), jobs=1)
+    answer = getattr(
+        Answers(scene, workplace, None if budget is None else seconds(budget, "budget"), questions=1), name
+    )
     if answer is None:
         raise InputError(str(scene.path or scene.name), "has no effect that could be taken away, or watches nothing")
     words = said(name, answer, scene)
-    picture = answer.file(words.picture)
-    return answered(answer.dataset(), words.text, None if picture is None else picture.read_bytes(), words.table)
-
-
-def seconds(budget: str | float | None) -> float | None:
-    """A budget [s], which may be text such as "2min"; InputError for what is no time."""
-    return limit.seconds(budget, "budget") if isinstance(budget, str) else budget
-
-
-def _brought(task: Task, workplace: Workplace) -> Answer:
-    outcome = workplace.bring([task])
-    check(outcome)
-    return Answer(task, outcome.records[id(task)], workplace)
+    picture = answer.read(words.picture) if words.picture in answer.record.files else None
+    return answered(answer.dataset(), words.text, picture, words.table)
 
 
 @dataclass(frozen=True)
@@ -170,12 +139,12 @@ class Answers:
         return study
 
     @cached_property
-    def accuracy(self) -> Answer:
+    def accuracy(self) -> Made:
         """What accuracy costs (`stages.cost_study`); SolverError where no run could be made."""
-        return _brought(self._study.task(), self.workplace)
+        return self.workplace.made(self._study.task())[0]
 
     @cached_property
-    def stability(self) -> Answer:
+    def stability(self) -> Made:
         """Whether the run is stable (`stages.stability_checks`), with what the costs of accuracy were measured with."""
         try:
             study = {"study": self._study.task()}
@@ -192,16 +161,16 @@ class Answers:
             folder=f"stability/{self.scene.name.replace('/', '_')}",
             names={"nc": "stability.nc"},
         )
-        return _brought(task, self.workplace)
+        return self.workplace.made(task)[0]
 
     @cached_property
-    def matters(self) -> Answer | None:
+    def matters(self) -> Made | None:
         """Which effects matter (`stages.effect_ranking`); None for a scene without effects, or which watches
         nothing."""
         effects, chosen = variants.effects(self.scene), self.scene.watched()
         if not effects or not chosen:
             return None
-        return _brought(_Comparison(self.scene, self.workplace, effects, chosen, self._begun).task(), self.workplace)
+        return self.workplace.made(_Comparison(self.scene, self.workplace, effects, chosen, self._begun).task())[0]
 
 
 @dataclass
@@ -213,7 +182,9 @@ class _Comparison:
     effects: Sequence[Effect]
     chosen: Sequence[Quantity]
     study: cost.Study
-    tasks: dict[str, dict[int, Task]] = field(default_factory=dict)
+    #: by effect that is missing, and number of members
+    tasks: dict[tuple[str, int], Task] = field(default_factory=dict)
+    points: dict[tuple[str, int], Point] = field(default_factory=dict)
     spent: float = 0.0
     #: whether members are run at the scene's own tolerance, since the one for means was refused
     tight: bool = False
@@ -233,17 +204,17 @@ class _Comparison:
             if not waiting:
                 break
             self._bring(["", *waiting], members)
-            if not self.tight and any(self._point(name, members).refused for name in ("", *waiting)):
+            if not self.tight and any(self.points[name, members].refused for name in ("", *waiting)):
                 self.tight = True
                 self._bring(["", *waiting], members)
             pairs |= dict.fromkeys(waiting, members)
-            full = self._point("", members)
-            waiting = [n for n in waiting if undecided(Pair(full, self._point(n, members), members), self.chosen)]
+            full = self.points["", members]
+            waiting = [n for n in waiting if undecided(Pair(full, self.points[n, members], members), self.chosen)]
         alone = IDEAL in self._gone and self._repeats(IDEAL, [name for name in self._gone if name != IDEAL])
         words = {effect.name: effect.words for effect in self.effects} | {IDEAL: "" if alone else IDEAL}
-        made = {name: (self._variant(name), self.tasks[name]) for name in ("", *names)}
+        scenes = {name: self._variant(name) for name in ("", *names)}
         left = [words[name] for name in undone if words[name]]
-        return effect_ranking.task(self.scene, self.chosen, words, made, pairs, left)
+        return effect_ranking.task(self.scene, self.chosen, words, scenes, self.tasks, pairs, left)
 
     def _affordable(self) -> tuple[list[str], list[str]]:
         """Effects in the order in which they are examined, and those that the budget does not reach."""
@@ -273,8 +244,8 @@ class _Comparison:
         alone = {e.name: self._closed({e.name}) for e in self.effects}
         ideal = self._closed({e.name for e in self.effects if e.kind in (CLEARANCE, FLEXIBILITY)})
         both = {IDEAL: ideal} if ideal and (loose(self.scene) or self.scene.flexible()) else {}
-        order = sorted(alone, key=lambda name: _kind(self.effects, name) not in (CLEARANCE, FLEXIBILITY))
-        return both | {name: alone[name] for name in order}
+        order = sorted(self.effects, key=lambda effect: effect.kind not in (CLEARANCE, FLEXIBILITY))
+        return both | {effect.name: alone[effect.name] for effect in order}
 
     def _closed(self, names: set[str]) -> frozenset[str]:
         """With the effects that are nothing without one that is gone."""
@@ -314,23 +285,11 @@ class _Comparison:
         return any(self._gone.get(name) == self._gone.get(other) for other in others)
 
     def _bring(self, names: Sequence[str], members: int) -> None:
-        made = {name: watched_quantities.task(self._variant(name), self.chosen, members) for name in names}
-        outcome = self.workplace.bring(list(made.values()))
-        check(outcome)
-        brought = list[str]()
-        for name, task in made.items():
-            self.tasks.setdefault(name, {})[members] = task
-            seconds = self.workplace.store.load(outcome.records[id(task)]).attrs
-            self.took[name] = float(seconds["cpu_seconds"]) / (members if self._touching(name) else 1)
-            if not self._repeats(name, brought):
-                self.spent += self._seconds(name, members) + float(seconds["compile_seconds"]) / AT_ONCE
-            brought.append(name)
-
-    def _point(self, name: str, members: int) -> Point:
-        task = self.tasks[name][members]
-        stored = self.workplace.store.load(self.workplace.bring([task]).records[id(task)])
-        return watched_quantities.point(stored, self._variant(name), self.chosen)
-
-
-def _kind(effects: Sequence[Effect], name: str) -> str:
-    return next(effect.kind for effect in effects if effect.name == name)
+        tasks = [watched_quantities.task(self._variant(name), self.chosen, members) for name in names]
+        for k, (name, made) in enumerate(zip(names, self.workplace.made(*tasks), strict=True)):
+            stored = made.dataset()
+            self.tasks[name, members] = made.task
+            self.points[name, members] = watched_quantities.point(stored, self._variant(name), self.chosen)
+            self.took[name] = float(stored.attrs["cpu_seconds"]) / (members if self._touching(name) else 1)
+            if not self._repeats(name, names[:k]):
+                self.spent += self._seconds(name, members) + float(stored.attrs["compile_seconds"]) / AT_ONCE

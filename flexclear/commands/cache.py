@@ -20,9 +20,9 @@ ACTIONS = {
     "prune": "remove what is damaged and what nothing shows any more",
 }
 #: artifacts that nothing shows are stored for so many days: going back to an earlier value costs nothing then
-KEPT = 30.0
+DAYS = 30.0
 #: faults that `check` lists one by one
-SHOWN = 20
+LISTED_FAULTS = 20
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +33,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
         if name == "explain":
             below.add_argument("what", metavar="FILE|KEY", help="a shown file, or a key or its beginning")
         if name == "prune":
-            below.add_argument("--days", type=float, default=KEPT, help=f"keep what is younger (default {KEPT:g})")
+            below.add_argument("--days", type=float, default=DAYS, help=f"keep what is younger (default {DAYS:g})")
             below.add_argument("--dry-run", action="store_true", help="only say what would be removed")
 
 
@@ -78,10 +78,10 @@ def _check(options: argparse.Namespace) -> None:
     others = {path for path in kernels if files.of_another_build(path)}
     damaged = [path for path in kernels if path not in others and not files.compiled(path)]
     faults = [*inventory.damaged, *upkeep.shown_faults(store, store.root), *(f"{path} is damaged" for path in damaged)]
-    for fault in faults[:SHOWN]:
+    for fault in faults[:LISTED_FAULTS]:
         print(shown(fault))
-    if len(faults) > SHOWN:
-        print(f"... and {len(faults) - SHOWN} more")
+    if len(faults) > LISTED_FAULTS:
+        print(f"... and {len(faults) - LISTED_FAULTS} more")
     text = (
         f"{len(inventory.artifacts)} artifacts, {len(faults)} faults, {len(inventory.orphans)} files without a record"
     )
@@ -108,6 +108,8 @@ def _explain(options: argparse.Namespace) -> None:
 
 
 def _prune(options: argparse.Namespace) -> None:
+    from flexclear.pipeline.dynamics.compile.folder import prune
+
     if not options.days >= 0.0:
         raise InputError(f"--days {options.days}", "must not be negative", "0 removes all that nothing shows")
     store = open_workplace().store
@@ -123,17 +125,11 @@ def _prune(options: argparse.Namespace) -> None:
             upkeep.remove(store, artifact)
         for path in (*inventory.orphans, *inventory.unreadable):
             upkeep.take_away(path)
-        kernels = _prune_kernels()
+        kernels = sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
     verb = "would remove" if options.dry_run else "removed"
     print(f"{verb} {len(chosen)} artifacts and {len(inventory.orphans)} files without a record,{_megabytes(size)}")
     if kernels:
         print(f"removed {kernels} compiled kernels")
-
-
-def _prune_kernels() -> int:
-    from flexclear.pipeline.dynamics.compile.folder import prune
-
-    return sum(prune(folder) for folder in kernel_root().glob("*") if folder.is_dir())
 
 
 def _megabytes(size: int) -> str:

@@ -1,4 +1,7 @@
-"""``flexclear check``: every mistake of scenes, recipes and sweeps at once, with file and line; nothing is run."""
+"""``flexclear check``: every mistake of scenes, recipes and sweeps at once, with file and line; nothing is run.
+
+What it computes takes seconds, without modes and without compiling: meshes, the start, free motions.
+"""
 
 from __future__ import annotations
 
@@ -6,25 +9,39 @@ import argparse
 import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import examination, scenes
-from flexclear.commands.examination import MISTAKES
+from flexclear.commands import scenes
 from flexclear.pipeline.core.scene import lines
-from flexclear.pipeline.core.scene.file_kinds import RECIPE, SCENE, SWEEP, kind_of_file
 from flexclear.pipeline.core.scene.limits import Limits
-from flexclear.pipeline.core.scene.load import compose, read_toml
+from flexclear.pipeline.core.scene.load import RECIPE, SCENE, SWEEP, compose, kind_of_file, read_toml
 from flexclear.pipeline.core.scene.references import dangling
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError, InputErrors, ResourceError
-from flexclear.stages import meshing
+from flexclear.stages import meshing, rigid_body
 from flexclear.stages.graph import Graph
 from flexclear.stages.workplace import add_options
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.scene.parts import FlexibleBody
     from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.dynamics.model.mechanism import Mechanism
+    from flexclear.pipeline.structure.fe.model import Model
+
+#: the message about a file: it is wrong, or asks for too much
+MISTAKES = (InputError, ResourceError)
+#: larger files of meshes, and meshes with more unknowns, are left to the run [bytes, unknowns]
+LARGEST_FILE, LARGEST_MESH = 20 << 20, 150_000
+#: extents of a mesh from a file beyond which its unit of length is doubted [m]
+SMALLEST_MESH_SIZE, LARGEST_MESH_SIZE = 1e-3, 10.0
+#: parts that a mechanism does not need in order to fit together
+ACTING = ("[load.", "[gear.", "[stop.")
+#: unused frames that are listed
+LISTED_FRAMES = 3
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -110,17 +127,20 @@ def _of_scene(path: Path, settings: Sequence[str] = ()) -> tuple[list[FlexclearE
         scene = scenes.loaded(str(path), settings)
     except MISTAKES as error:
         errors += _each(error)
-    recipes = _collect(_recipes(path))
-    errors += recipes
+    # a recipe that several bodies name is meshed once
+    mesh_of = cache(partial(meshed, limits=Limits() if scene is None else scene.limits))
+    bodies = compose(path).get("body", {}).values()
+    for mesh in dict.fromkeys(body["mesh"] for body in bodies if isinstance(body.get("mesh"), str)):
+        errors += mesh_of(Path(mesh))[1].errors
     if scene is None:
         return _once(errors), Seen()
     errors += _collect([lambda: Graph(scene).up_to("post")], path)
     errors += _collect(_laws(scene), path)
     warnings, summary = scenes.implausibilities(scene, settings), scene.summary()
     if not errors:
-        found = examination.scene(scene)
-        errors, warnings = found.errors, [*warnings, *found.warnings]
-        summary = "; ".join([summary, *found.notes])
+        findings = computed(scene, mesh_of)
+        errors, warnings = findings.errors, [*warnings, *findings.warnings]
+        summary = "; ".join([summary, *findings.notes])
     return _once(errors), Seen(summary, tuple(warnings))
 
 
@@ -142,41 +162,17 @@ def _of_sweep(path: Path) -> tuple[list[FlexclearError], Seen]:
 
 def _of_recipe(path: Path) -> tuple[list[FlexclearError], Seen]:
     """A recipe is examined as where a scene names it, with the limits of a scene that says none."""
-    errors = _collect([lambda: meshing.check_size(path, Limits())])
-    if any(isinstance(error, ResourceError) for error in errors):  # what is too large is not meshed
-        return errors, Seen()
-    body, found = examination.recipe(path)
-    errors = _once([*errors, *found.errors])
-    if errors:
-        return errors, Seen()
+    body, findings = meshed(path)
+    if findings.errors:
+        return _once(findings.errors), Seen()
     table = meshing.params(path)["recipe"]
     frames = ", ".join(table.get("frames", {})) or "none"
     text = f"a mesh recipe, {table['shape']['type']}, frames: {frames}"
     text += f", mass {float(body.rigid.mass):.6g} kg" if body is not None else ""
-    return [], Seen(text, tuple(found.warnings))
+    return [], Seen(text, tuple(findings.warnings))
 
 
 OTHERS = {SWEEP: _of_sweep, RECIPE: _of_recipe}
-
-
-def _recipes(path: Path) -> Iterator[Callable[[], Any]]:
-    """A check for each mesh recipe that a scene names, also of a scene with other mistakes."""
-    from flexclear.pipeline.structure.fe.recipe import read_recipe
-
-    bodies = compose(path).get("body", {})
-    meshes = dict.fromkeys(body["mesh"] for body in bodies.values() if isinstance(body.get("mesh"), str))
-    for mesh in meshes:
-        if meshing.kind_of(Path(mesh)) == "beam":  # lays out the nodes at which frames and masses have to lie, too
-            yield partial(_beam, Path(mesh))
-        else:
-            yield partial(read_recipe, Path(mesh))
-
-
-def _beam(path: Path) -> None:
-    from flexclear.pipeline.structure.fe import beam_mesh
-    from flexclear.pipeline.structure.fe.recipe import parse, read_recipe
-
-    beam_mesh.build(parse(read_recipe(path), str(path)), path.parent, str(path))
 
 
 def _laws(scene: Scene) -> Iterator[Callable[[], Any]]:
@@ -219,3 +215,195 @@ def _record(mistake: FlexclearError, severity: str) -> dict[str, Any]:
     file, line = (str(location[0]), location[1]) if location else (None, None)
     place = {"file": file, "line": line, "place": mistake.place}
     return {**record, **place, "problem": mistake.problem, "remedy": mistake.remedy}
+
+
+@dataclass
+class Findings:
+    """errors: what is refused.  warnings: what is doubtful.  notes: facts that a summary adds."""
+
+    errors: list[FlexclearError] = field(default_factory=list)
+    warnings: list[InputError] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def attempt(self, check: Callable[[], None], place: Callable[[InputError], InputError]) -> bool:
+        """Run a check; what it raises is collected, located by `place`.  Returns whether it passed."""
+        try:
+            check()
+        except InputErrors as errors:
+            self.errors += [place(error) for error in errors.errors]
+        except InputError as error:
+            self.errors.append(place(error))
+        except ResourceError as error:
+            self.errors.append(error)
+        else:
+            return True
+        return False
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mesh without its modes.  rigid: mass, inertia and frames (schema RIGID).  interfaces: those of the recipe."""
+
+    model: Model
+    rigid: xr.Dataset
+    interfaces: tuple[str, ...]
+
+
+#: what gives `meshed` of a recipe
+MeshOf = Callable[[Path], tuple[Body | None, Findings]]
+
+
+def computed(whole: Scene, mesh_of: MeshOf) -> Findings:
+    """Meshes and requested modes of a scene whose recipes can be read, and the mechanism made of them."""
+    seen = Findings()
+    bodies = dict(_bodies(whole, seen, mesh_of))
+    for name, body in whole.flexible().items():
+        if name in bodies:
+            seen.attempt(partial(_modes, bodies[name], body), partial(_of_modes, whole, name))
+    if seen.errors or set(bodies) != set(whole.recipes()):
+        return seen
+    rigid = {name: body.rigid for name, body in bodies.items()}
+    if seen.attempt(partial(_assembled, whole, rigid, seen), partial(_in_file, whole)):
+        _free_motions(whole, rigid, seen)
+    return seen
+
+
+def meshed(path: Path, limits: Limits | None = None) -> tuple[Body | None, Findings]:
+    """A mesh recipe: its mesh, where that is allowed and can be made in seconds, and what is to be said of it."""
+    seen = Findings()
+    made: list[Body] = []
+    if seen.attempt(partial(meshing.check_size, path, limits or Limits()), lambda error: error):
+        seen.attempt(lambda: made.extend(_meshed(path, seen)), lambda error: error)
+    return (made[0] if made else None), seen
+
+
+def _bodies(whole: Scene, seen: Findings, mesh_of: MeshOf) -> Iterator[tuple[str, Body]]:
+    """Bodies with a mesh."""
+    for name, path in whole.recipes().items():
+        body, of_recipe = mesh_of(Path(path))
+        seen.errors += [error for error in of_recipe.errors if error not in seen.errors]
+        seen.warnings += [warning for warning in of_recipe.warnings if warning not in seen.warnings]
+        if body is not None:
+            yield name, body
+
+
+def _meshed(path: Path, seen: Findings) -> Iterator[Body]:
+    from flexclear.pipeline.structure.fe.recipe import parse
+    from flexclear.pipeline.structure.kinds import kind
+    from flexclear.pipeline.structure.modes import rigid
+
+    table = meshing.params(path)["recipe"]
+    parse(table, str(path))
+    named = meshing.files(table, path.parent)
+    if any(file.stat().st_size > LARGEST_FILE for file in named):
+        return
+    try:
+        mesh = kind.build(table, path.parent)
+    except InputError as error:
+        raise meshing.in_recipe(error, path) from None
+    seen.warnings += _unit(mesh, table, path)
+    if 3 * mesh.sizes.get("node", 0) > LARGEST_MESH:
+        return
+    model = kind.of_mesh(mesh).assemble(mesh)
+    yield Body(model, rigid.of_model(model, mesh.attrs["title"]), tuple(mesh.attrs["interfaces"].split()))
+
+
+def _unit(mesh: xr.Dataset, table: dict[str, object], path: Path) -> Iterator[InputError]:
+    """A mesh from a file whose size suggests another unit of length; files do not say theirs."""
+    import numpy as np
+
+    shape = table["shape"]
+    if not isinstance(shape, dict) or shape.get("type") != "mesh-file":
+        return
+    size, unit = float(np.ptp(mesh["node_position"].values, axis=0).max()), shape.get("length_unit")
+    if not SMALLEST_MESH_SIZE <= size <= LARGEST_MESH_SIZE:
+        other = "mm" if size > LARGEST_MESH_SIZE else "m"
+        yield InputError(
+            f"{path} [shape.length_unit]",
+            f"with lengths in {unit} the mesh is {size:.4g} m long",
+            f'write length_unit = "{other}" if its numbers are in {other}',
+        )
+
+
+def _modes(body: Body, part: FlexibleBody) -> None:
+    from flexclear.pipeline.structure.modes.solution import require_possible
+
+    require_possible(body.model, part.modes, body.interfaces)
+
+
+def _of_modes(whole: Scene, body: str, error: InputError) -> InputError:
+    """An error of modes, located in the scene."""
+    return InputError(f"{whole.path or whole.name} [body.{body}.{error.place}]", error.problem, error.remedy)
+
+
+def _in_file(whole: Scene, error: InputError) -> InputError:
+    if whole.path is None or not error.place.startswith("["):
+        return error
+    return InputError(f"{whole.path} {error.place}", error.problem, error.remedy)
+
+
+def _assembled(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) -> None:
+    """Build the mechanism where the run begins: poses, axes, loads and loose joints are checked against each other.
+
+    Flexible bodies are undeformed; of rigid mechanisms rank and drives are checked, too.
+    """
+    from flexclear.pipeline.dynamics.model.mobility import analyse
+    from flexclear.pipeline.dynamics.model.model import tabulate
+    from flexclear.pipeline.dynamics.model.plausibility import (
+        forgotten,
+        refuse_missed,
+        refuse_overlap,
+        unused_frames,
+    )
+
+    mechanism = _mechanism(whole, rigid)
+    if mechanism.all_rigid:
+        model = tabulate(mechanism)
+        mechanism = model.mechanism
+        analyse(model)
+        refuse_missed(mechanism)
+        refuse_overlap(mechanism)
+    else:
+        from flexclear.pipeline.dynamics.model.assembly import assembled
+
+        mechanism = assembled(mechanism)
+        refuse_missed(mechanism)
+    for body, text, remedy in forgotten(mechanism):
+        seen.warnings.append(_in_file(whole, InputError(f"[body.{body}]", text, remedy)))
+    unused = unused_frames(mechanism)
+    if unused:
+        more = f" and {len(unused) - LISTED_FRAMES} more" if len(unused) > LISTED_FRAMES else ""
+        seen.notes.append(f"frames that nothing uses: {', '.join(unused[:LISTED_FRAMES])}{more}")
+
+
+def _mechanism(whole: Scene, rigid: dict[str, xr.Dataset]) -> Mechanism:
+    from flexclear.pipeline.dynamics.model.mechanism import build
+    from flexclear.pipeline.dynamics.run.run import placed
+
+    meshed = {f"{rigid_body.PREFIX}{name}": rigid[name] for name in whole.meshed()}
+    if meshed:
+        table = whole.model_dump(mode="python", exclude_none=True)
+        table["body"] = rigid_body.filled(table["body"], meshed)
+        whole = type(whole).model_validate(table)
+    return build(placed(whole), {name: rigid[name] for name in whole.flexible()})
+
+
+def _free_motions(whole: Scene, rigid: dict[str, xr.Dataset], seen: Findings) -> None:
+    """Note the free motions besides the drives, with rigid bodies and loose joints closed, where these fit.
+
+    Loads, gears and stops are read for it: what is wrong with them is an error of the scene itself.
+    """
+    from flexclear.pipeline.core.scene.variants import ideal, loose
+    from flexclear.pipeline.dynamics.model.mobility import analyse
+    from flexclear.pipeline.dynamics.model.model import tabulate
+
+    idealised = bool(loose(whole) or whole.flexible())
+    try:
+        mechanism = _mechanism(ideal(whole) if idealised else whole, rigid)
+        free = analyse(tabulate(mechanism)).mobility
+    except InputError as error:  # others: only as flexible bodies or with clearance it moves
+        if error.place.startswith(ACTING):
+            seen.errors.append(_in_file(whole, error))
+        return
+    closed = " with loose joints closed" if loose(whole) else ""
+    seen.notes.append(f"free motions besides the drives{closed}: {free}")

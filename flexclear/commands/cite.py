@@ -1,7 +1,7 @@
 """``flexclear cite``: sources of the methods and data that a scene uses, from the modules that it reaches.
 
-What every run of the scene imports is apart from what functions import where they need it: another integrator where the
-scene's own is too slow, singular poses, accuracies, frequencies.
+What every run of the scene imports is listed separately from what functions import where they need it: another
+integrator where the scene's own is too slow, singular poses, accuracies, frequencies.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from importlib import import_module
 from flexclear.commands import scenes
 from flexclear.pipeline.core.scene.citations import cited
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
-from flexclear.pipeline.core.scene.registry import module_name
+from flexclear.pipeline.core.scene.registry import module_name, module_of
 from flexclear.pipeline.core.workflow.fingerprint import Sources, imported, parents, source_file
 from flexclear.pipeline.core.workflow.task import in_order
 from flexclear.stages.graph import Graph
@@ -91,8 +91,9 @@ def _unused(reached: Collection[str], parts: Collection[str]) -> Iterator[str]:
         listed = getattr(import_module(family), "NAMES", None) if inside else None
         if listed is None:
             continue
-        those = {f"{family}.{where.partition(':')[0]}" for where in listed.values()}
-        yield from (inside & those) - set(parts) if inside & set(parts) else inside
+        those = {module_of(family, name) for name in listed} & set(reached)
+        yield from those - set(parts)
+        yield from inside if not those & set(parts) else ()
 
 
 def named(source: str) -> Iterator[str]:

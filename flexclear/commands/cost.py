@@ -3,41 +3,50 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from flexclear.commands import as_json, cost_design, cost_peers, scenes
-from flexclear.commands.cost_peers import Track
-from flexclear.commands.scenes import Workplace, bundles
+from pydantic import RootModel, Strict, ValidationError, model_validator
+
+from flexclear.commands import cost_design, scenes
+from flexclear.commands.export import as_json
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
+from flexclear.pipeline.core.scene.fields import Part
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.solver import of_run
-from flexclear.pipeline.core.system.errors import FlexclearError, SolverError
+from flexclear.pipeline.core.scene.validation_errors import input_errors
+from flexclear.pipeline.core.system.errors import FlexclearError, InputError, SolverError
+from flexclear.pipeline.core.system.external_files import require_file
 from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import kernels, limit, simulation
+from flexclear.stages import kernels, simulation
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import open_workplace, relative
+from flexclear.stages.workplace import Made, Workplace, open_workplace, relative, seconds
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.scene.quantity import Quantity
     from flexclear.pipeline.core.scene.schema import Scene
-    from flexclear.pipeline.post.cost.page import Studied
+    from flexclear.pipeline.post.cost.answer import Studied
 
+#: a `Peer` as parameters of tasks have it
+Track = dict[str, Any]
+#: bytes of a file of them
+LARGEST_PEERS = 16 << 20
 #: tolerances at which ensembles are compared, where a scene has one
 ENSEMBLES = (1e-6, 1e-8, 1e-10)
 #: processor time that a study's runs may take [s]; what one takes besides its integration, and a new set of kernels
 BUDGET, POINT, COMPILING = 100.0, 0.6, 8.0
 #: a point may take so many times the evaluations of the scene's own run, or this fraction of the budget if that is more
-MOST = 10.0
+MOST_EVALUATIONS = 10.0
 #: of runs that were left undone, so many are named
-LISTED = 6
+LISTED_RUNS = 6
 #: tables of a study, in the order in which they are printed
 PRINTED = ("price.md", "quantities.md", "causes.md", "statistics.md")
 #: figures of a study and their titles
@@ -63,28 +72,24 @@ def command(options: argparse.Namespace) -> None:
     """Bring the studies up to date and print their tables."""
     if options.page is not None:
         scenes.check_target(options.page, "--page")
-    peers = {} if options.peer is None else cost_peers.read(options.peer)
+    peers = {} if options.peer is None else read_peers(options.peer)
     workplace, studies = open_workplace(options), {}
-    seconds = limit.seconds(options.budget, "--budget")
+    budget = seconds(options.budget, "--budget")
 
-    def first(folder: Path) -> None:
+    def first(made: Made) -> None:
         if not options.json:
-            text = (folder / PRINTED[0]).read_text(encoding="utf-8")
-            print(text, f"{relative(folder)}: first answer; going on\n", sep="\n", flush=True)
+            text = f"{relative(made.folder)}: first answer; going on\n"
+            print(made.text(PRINTED[0]), text, sep="\n", flush=True)
 
     for graph in scenes.graphs(options.scenes, options.set):
         scene, others = graph.scene, peers.get(graph.scene.name, ())
-        studies[scene.name] = _, folder = bring(
-            scene, workplace, others, options.integrators, seconds=seconds, models=options.models, answered=first
+        studies[scene.name] = made = bring(
+            scene, workplace, others, options.integrators, budget=budget, models=options.models, answered=first
         )
         if not options.json:
-            print(
-                *((folder / name).read_text(encoding="utf-8") for name in PRINTED if (folder / name).is_file()),
-                sep="\n",
-            )
-            print(f"figures and data: {folder}\n")
+            print(*tables(made), f"figures and data: {made.folder}\n", sep="\n")
     if options.json:
-        print(as_json.as_json({name: one for name, (one, _) in studies.items()}))
+        print(as_json({name: made.dataset() for name, made in studies.items()}))
     if options.page is not None:
         said = f" --peer {options.peer.as_posix()}" if options.peer else ""
         said += f" --integrators {' '.join(options.integrators)}" if options.integrators else ""
@@ -143,7 +148,8 @@ class Study:
         """Make the points farther away, the cheapest first, as far as the budget goes."""
         scene, more = self.scene, cost_design.wide(self.scene, self.integrators)
         if self.models and scene.flexible():
-            more += cost_design.models(scene, self.setting, _highest(scene, self.workplace))
+            bundles = scenes.bundles(scene, self.workplace, jobs=None).values()
+            more += cost_design.models(scene, self.setting, max(float(one["frequency"].max()) for one in bundles))
         there = {design.key for design in (*self.points, *self.undone)}
         more = [design for design in more if design.key not in there]
         self._queue(sorted(more, key=lambda d: d.evaluations(self.evaluations, self.own)))
@@ -190,10 +196,9 @@ class Study:
             names={"nc": "cost.nc"},
         )
 
-    def drawn(self) -> tuple[xr.Dataset, Path]:
-        """The dataset of the points so far, and the folder with its tables and figures."""
-        task = self.task()
-        return self.workplace.datasets(task)[0], self.workplace.store.root / task.folder
+    def drawn(self) -> Made:
+        """The study of the points so far, with its tables and figures."""
+        return self.workplace.made(self.task())[0]
 
     def ensembles(self) -> None:
         """Ensembles at several tolerances, of a scene that has one, as far as the budget goes."""
@@ -242,7 +247,7 @@ class Study:
 
     def _most(self) -> int:
         """Evaluations that a point may take: a power of ten, so that its key does not change with each budget."""
-        affordable = max(MOST * self.own, self.seconds / self.pace / MOST, 1e5)
+        affordable = max(MOST_EVALUATIONS * self.own, self.seconds / self.pace / MOST_EVALUATIONS, 1e5)
         return int(10.0 ** math.ceil(math.log10(affordable)))
 
     def _kernels(self, design: cost_design.Design) -> Task:
@@ -258,20 +263,19 @@ def bring(
     peers: Sequence[Track] = (),
     integrators: Collection[str] = (),
     *,
-    seconds: float = BUDGET,
+    budget: float = BUDGET,
     models: bool = False,
-    answered: Callable[[Path], None] = lambda folder: None,
-) -> tuple[xr.Dataset, Path]:
-    """The study's dataset, brought up to date as far as the budget goes, and the folder with its tables and figures.
+    answered: Callable[[Made], None] = lambda made: None,
+) -> Made:
+    """The study of a scene with its tables and figures, brought up to date as far as the budget [s] goes.
 
-    peers: runs of other programs, see `flexclear.commands.cost_peers`.  integrators: see `cost_design.wide`.  seconds,
-    models: of the `Study`.  answered: called with the folder when the first answer is there.
+    peers: runs of other programs.  integrators: see `cost_design.wide`.  models: of the `Study`.  answered: called with
+    the first answer.
     Raises InputError when the scene has nothing to measure.  Work that is interrupted leaves the answer so far.
     """
-    study = Study(scene, workplace, seconds, integrators, models, peers)
+    study = Study(scene, workplace, budget, integrators, models, peers)
     study.first()
-    _, folder = study.drawn()
-    answered(folder)
+    answered(study.drawn())
     try:
         study.neighbourhood()
         study.beyond()
@@ -283,58 +287,59 @@ def bring(
     return study.drawn()
 
 
-def dataset(scene: Scene, workplace: Workplace, budget: str | float | None = None, models: bool = False) -> xr.Dataset:
+def dataset(scene: Scene, budget: str | float | None = None, models: bool = False) -> xr.Dataset:
     """The study as a dataset that shows its answer in a notebook; budget: [s], or text such as "2min"."""
     from flexclear.pipeline.post.answers.answered import answered
     from flexclear.pipeline.post.cost.answer import sentences
 
-    given = limit.seconds(budget, "budget") if isinstance(budget, str) else budget
     # in this process: workers would run a caller's script again from its top
-    result, folder = bring(scene, replace(workplace, jobs=1), seconds=BUDGET if given is None else given, models=models)
-    return answered(result, sentences(result), (folder / "accuracy.png").read_bytes())
+    workplace, given = replace(open_workplace(), jobs=1), BUDGET if budget is None else seconds(budget, "budget")
+    made = bring(scene, workplace, budget=given, models=models)
+    result = made.dataset()
+    return answered(result, sentences(result), made.read("accuracy.png"))
 
 
-def figures_and_tables(name: str, study: xr.Dataset, folder: Path, pictures: str) -> tuple[Studied, dict[str, Path]]:
-    """What a page says of a scene, and the files of its pictures, by path relative to the page.
+def tables(made: Made) -> tuple[str, ...]:
+    """Those tables of a study that there are, as Markdown."""
+    return tuple(made.text(name) for name in PRINTED if name in made.record.files)
 
-    study, folder: as `bring` returned them.  pictures: folder for them next to the page.
+
+def figures_and_tables(name: str, made: Made, pictures: str) -> tuple[Studied, dict[str, str]]:
+    """What a page says of a scene, and the study's files of its pictures, by path relative to the page.
+
+    made: as `bring` returned it.  pictures: folder for them next to the page.
     """
-    from flexclear.pipeline.post.cost.page import Studied, advice
+    from flexclear.pipeline.post.cost.answer import Studied, advice
 
-    tables = tuple((folder / file).read_text(encoding="utf-8") for file in PRINTED if (folder / file).is_file())
-    files = {stem: folder / f"{stem}.png" for stem in FIGURES}
-    shown = {stem: f"{pictures}/{name.replace('/', '_')}_{stem}.png" for stem, file in files.items() if file.is_file()}
-    said = Studied(name, advice(study, tables), tables, {FIGURES[stem]: path for stem, path in shown.items()})
-    return said, {path: files[stem] for stem, path in shown.items()}
+    shown = {stem: f"{pictures}/{name.replace('/', '_')}_{stem}.png" for stem in FIGURES}
+    shown = {stem: path for stem, path in shown.items() if f"{stem}.png" in made.record.files}
+    said = advice(made.dataset(), tables(made))
+    page = Studied(name, said, tables(made), {FIGURES[stem]: path for stem, path in shown.items()})
+    return page, {path: f"{stem}.png" for stem, path in shown.items()}
 
 
-def write_page(studies: Mapping[str, tuple[xr.Dataset, Path]], page: Path, options: str = "") -> None:
+def write_page(studies: Mapping[str, Made], page: Path, options: str = "") -> None:
     """The page on accuracy, with its pictures in a folder of its name next to it.
 
     studies: what `bring` returned, by scene.  options: the command's other options.
     """
-    from flexclear.pipeline.post.cost.page import markdown
+    from flexclear.pipeline.post.cost.answer import markdown
 
     sections = []
     with disk_limits(page.parent):
         (page.parent / page.stem).mkdir(parents=True, exist_ok=True)
-        for name, (study, folder) in studies.items():
-            said, pictures = figures_and_tables(name, study, folder, page.stem)
+        for name, made in studies.items():
+            said, pictures = figures_and_tables(name, made, page.stem)
             sections.append(said)
             for path, file in pictures.items():
-                publish(page.parent / path, file.read_bytes())
+                publish(page.parent / path, made.read(file))
         publish(page, markdown(tuple(sections), f"{page.as_posix()}{options}").encode())
-
-
-def _highest(scene: Scene, workplace: Workplace) -> float:
-    """The highest frequency in the bundles of a scene with flexible bodies [Hz]; they are made first."""
-    return max(float(bundle["frequency"].max()) for bundle in bundles(scene, workplace, jobs=None).values())
 
 
 def _listed(keys: Sequence[str]) -> str:
     """The first of many, and how many more there are."""
-    more = f" and {len(keys) - LISTED} more" if len(keys) > LISTED else ""
-    return "; ".join(keys[:LISTED]) + more
+    more = f" and {len(keys) - LISTED_RUNS} more" if len(keys) > LISTED_RUNS else ""
+    return "; ".join(keys[:LISTED_RUNS]) + more
 
 
 def _bundles(design: cost_design.Design) -> dict[str, Task]:
@@ -355,3 +360,36 @@ def _measured(design: cost_design.Design, function: str, more: Mapping[str, obje
         folder="",
         exclusive=True,
     )
+
+
+class Peer(Part):
+    """Points of another program, measured elsewhere: times [s], and errors [SI] by quantity, a list each."""
+
+    name: str
+    note: str = ""
+    seconds: list[Annotated[float, Strict()]]
+    error: dict[str, list[Annotated[float, Strict()]]]
+
+    @model_validator(mode="after")
+    def _same_length(self) -> Self:
+        if any(len(errors) != len(self.seconds) for errors in self.error.values()):
+            raise ValueError(f"'{self.name}' has {len(self.seconds)} times, but another number of errors")
+        return self
+
+
+class Peers(RootModel[dict[str, list[Peer]]]):
+    """By scene, as in a file."""
+
+
+def read_peers(path: Path) -> dict[str, list[Track]]:
+    """What a file says of other programs, by scene.  InputErrors for one that cannot be read or says something else."""
+    where = f"--peer {path}"
+    require_file(path, where)
+    try:
+        if path.stat().st_size > LARGEST_PEERS:
+            raise ValueError(f"it is larger than {LARGEST_PEERS >> 20} MB")
+        return Peers.model_validate(json.loads(path.read_bytes())).model_dump(mode="json", exclude_none=True)
+    except ValidationError as error:
+        raise input_errors(where, error, Peers) from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(where, f"cannot be read: {error}", "docs/accuracy/exudyn.json is one") from None

@@ -1,4 +1,4 @@
-"""Which runs a cost study makes of a scene: the factors, how dear each is foreseen to be, and in which order.
+"""Which runs a cost study makes of a scene: the factors, how expensive each is predicted to be, and in which order.
 
 First the neighbourhood of the scene's own setting: looser and tighter tolerances, another family of methods, denser
 output. Then, cheapest first, all methods over all their tolerances and steps. No run is a reference by itself: the
@@ -35,7 +35,7 @@ REFINEMENTS = (1, 2, 4)
 FINER_OUTPUT = 10.0
 #: what no point of a study has
 PLAIN: Mapping[str, None] = {"accuracy": None, "ensemble": None}
-#: what a method is foreseen to take of which no run is known, in evaluations of the scene's own run
+#: what a method is predicted to take of which no run is known, in evaluations of the scene's own run
 UNSEEN = 3.0
 
 
@@ -65,7 +65,7 @@ class Design:
     recipe: Mapping[str, Any] = field(default_factory=dict)
 
     def evaluations(self, seen: Mapping[str, Mapping[float, float]], own: float) -> float:
-        """Foreseen evaluations of the right-hand side.
+        """Predicted evaluations of the right-hand side.
 
         seen: those of runs with chosen steps, by integrator and tolerance.  own: those of the scene as it is.
         """

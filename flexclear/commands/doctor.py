@@ -64,7 +64,7 @@ mass = 2.0
 inertia = [0.1, 0.1, 0.1]
 pose = {{}}
 """
-#: run apart, where nothing is compiled: that would take longer than all else
+#: run in a process of its own, where nothing is compiled: that would take longer than all else
 RUN = """import sys
 import flexclear as fc
 from flexclear.pipeline.core.system.errors import FlexclearError

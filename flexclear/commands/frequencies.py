@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.commands import as_json, export, scenes
+from flexclear.commands import export, scenes
+from flexclear.commands.export import as_json
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 #: characters of a bare number
 NUMBER = "+-.0123456789eE"
 #: speeds of one diagram
-MOST = 10_000
+MOST_SPEEDS = 10_000
 #: endings of pictures of Campbell diagrams
 PICTURES = (".png", ".svg")
 
@@ -66,7 +67,7 @@ def command(options: argparse.Namespace) -> None:
         raise InputError("--out", "pictures are of Campbell diagrams", "add --speeds, e.g. 0:500rpm:50")
     targets = _targets(options, ())
     modes = scenes.linear(graph.scene, time, moving=options.moving, workplace=open_workplace(options))
-    print(as_json.as_json(modes) if options.json else text(modes).rstrip("\n"))
+    print(as_json(modes) if options.json else text(modes).rstrip("\n"))
     for target in targets:
         with disk_limits(target.parent):
             export.write(modes, target, ("vibration",))
@@ -88,7 +89,7 @@ def diagram(scene: Scene, time: float | None, options: argparse.Namespace) -> No
     made = scenes.linear(scene, time, speeds=given, drive=options.drive, workplace=open_workplace(options))
     from flexclear.pipeline.post.plotting import campbell
 
-    print(as_json.as_json(made) if options.json else campbell.text(made))
+    print(as_json(made) if options.json else campbell.text(made))
     pictures = campbell.files("campbell", made) if any(target.suffix in PICTURES for target in targets) else {}
     for target in targets:
         with disk_limits(target.parent):
@@ -114,8 +115,10 @@ def speeds(text: str) -> list[float]:
     if not (step > 0.0 and last > first):
         raise InputError(f"--speeds {text}", rule, "for example 0:500rpm:50")
     count = int(np.floor((last - first) / step * (1.0 + 1e-12))) + 1
-    if count > MOST:
-        raise InputError(f"--speeds {text}", f"asks for {count} speeds; at most {MOST} are computed", "a larger step")
+    if count > MOST_SPEEDS:
+        raise InputError(
+            f"--speeds {text}", f"asks for {count} speeds; at most {MOST_SPEEDS} are computed", "a larger step"
+        )
     return [first + k * step for k in range(count)]
 
 

@@ -4,20 +4,20 @@ evidence."""
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import as_json, export, scenes
-from flexclear.pipeline.core.artifacts.store import Record, publish
+from flexclear.commands import export, scenes
+from flexclear.pipeline.core.artifacts.store import publish
 from flexclear.pipeline.core.scene import variants
-from flexclear.pipeline.core.scene.coupling import lessened
 from flexclear.pipeline.core.scene.load import edited, load_scene
+from flexclear.pipeline.core.scene.variants import lessened
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.core.workflow.task import Task
-from flexclear.stages import effect_plan, limit, watched_quantities
-from flexclear.stages.workplace import FailedTasksError, Workplace, check, open_workplace
+from flexclear.stages import effect_plan, watched_quantities
+from flexclear.stages.workplace import FailedTasksError, Made, Workplace, open_workplace, seconds
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -50,7 +50,7 @@ def command(options: argparse.Namespace) -> None:
         scenes.check_target(options.out)
     workplace = open_workplace(options)
     missed, plans = list[str](), dict[str, object]()
-    budget = limit.seconds(options.budget, "--budget")
+    budget = seconds(options.budget, "--budget")
     for graph in scenes.graphs(options.scenes, options.set):
         if graph.scene.accuracy is None and not options.verify and options.out is None:
             plans[graph.scene.name] = table = levels(graph.scene, workplace)
@@ -58,17 +58,18 @@ def command(options: argparse.Namespace) -> None:
                 print(table)
             continue
         planned = bring(graph.scene, workplace)
-        plans[graph.scene.name] = planned.dataset() if options.json else None
+        plans[graph.scene.name] = planned.made.dataset() if options.json else None
         if not options.json:
-            print(planned.text())
+            print(planned.made.text("plan.md"))
         if options.out is not None:
             publish(options.out, planned.file(options.out))
         if options.verify:
             missed += verify(planned, workplace, budget)
         if not options.json:
-            planned.tell()
+            files = {"index.html": "the page", planned.target.name: "the planned scene", "plan.nc": "all effect sizes"}
+            scenes.print_files(planned.made.folder, files)
     if options.json:
-        print(as_json.as_json(plans))
+        print(export.as_json(plans))
     if missed:
         raise scenes.MissedAccuracyError("\n".join(missed))
 
@@ -84,7 +85,7 @@ def levels(scene: Scene, workplace: Workplace) -> str:
     plans: dict[str, xr.Dataset | str] = {}
     for level in LEVELS:
         try:
-            plans[level] = bring(asking(scene, level), workplace).dataset()
+            plans[level] = bring(asking(scene, level), workplace).made.dataset()
         except (InputError, FailedTasksError) as error:
             if not variants.effects(scene):
                 raise
@@ -102,7 +103,7 @@ def asking(scene: Scene, level: str) -> Scene:
     return asked
 
 
-def dataset(scene: Scene, workplace: Workplace, level: str, budget: str | float | None) -> tuple[Scene, xr.Dataset]:
+def dataset(scene: Scene, level: str, budget: str | float | None) -> tuple[Scene, xr.Dataset]:
     """The planned scene, and the plan as a dataset that shows its answer in a notebook.
 
     level: accuracy of all watched quantities, where the scene requests none.  budget: of `errors_of` [s], or text; None
@@ -112,50 +113,33 @@ def dataset(scene: Scene, workplace: Workplace, level: str, budget: str | float 
     from flexclear.pipeline.post.answers.plan import verified, words
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
+    workplace = open_workplace()
     planned = bring(scene if scene.accuracy is not None else asking(scene, level), workplace)
-    result, table = planned.dataset(), as_html(from_markdown(planned.text()))
+    result, table = planned.made.dataset(), as_html(from_markdown(planned.made.text("plan.md")))
     if budget is not None:
-        seconds = limit.seconds(budget, "budget") if isinstance(budget, str) else budget
-        compared = errors_of(planned, workplace, seconds)
+        compared = errors_of(planned, workplace, seconds(budget, "budget"))
         result = result.assign(
             {name: compared[name] for name in ("wanted", "error", "chance", "allowed", "horizon", "scatter")}
         )
         table = as_html(verified(compared)) + table
-    picture = planned.stored("plan.png").read_bytes()
-    return planned.planned, answered(result, words(result), picture, table)
+    return planned.planned, answered(result, words(result), planned.made.read("plan.png"), table)
 
 
 @dataclass(frozen=True)
 class Planned:
-    """A plan that is up to date. scene: the full one.  planned: what the plan makes of it."""
+    """A plan that is up to date. scene: the full one.  planned: what the plan makes of it.
+
+    made: effect sizes, decisions and evidence (`pipeline.post.answers.plan.dataset`), and the table ``plan.md``.
+    """
 
     scene: Scene
     planned: Scene
-    task: Task
-    record: Record
-    workplace: Workplace
-
-    @property
-    def folder(self) -> Path:
-        """Where its files are shown."""
-        return self.workplace.store.root / self.task.folder
+    made: Made
 
     @property
     def target(self) -> Path:
         """The planned scene's file."""
-        return self.folder / f"{self.scene.name.rpartition('/')[2]}{SUFFIX}"
-
-    def dataset(self) -> xr.Dataset:
-        """Influences, decisions and evidence (`pipeline.post.answers.plan.dataset`)."""
-        return self.workplace.store.load(self.record)
-
-    def stored(self, name: str) -> Path:
-        """One of its files, in the store."""
-        return self.workplace.store.path(self.task.stage, self.record.key, name)
-
-    def text(self) -> str:
-        """The table of decisions."""
-        return self.stored("plan.md").read_text(encoding="utf-8")
+        return self.made.folder / f"{self.scene.name.rpartition('/')[2]}{SUFFIX}"
 
     def file(self, target: Path) -> bytes:
         """The planned scene's file for a given path; it extends the full scene's."""
@@ -166,11 +150,6 @@ class Planned:
         )
         base = load_scene(self.scene.path)
         return variants.text(base, self.planned, variants.relative(target, self.scene.path), head).encode()
-
-    def tell(self) -> None:
-        """One line on what was written where."""
-        files = {"index.html": "the page", self.target.name: "the planned scene", "plan.nc": "all influences"}
-        scenes.print_files(self.folder, files)
 
 
 def _example(scene: Scene) -> str:
@@ -197,20 +176,17 @@ def bring(scene: Scene, workplace: Workplace) -> Planned:
         raise InputError(
             where, "has no effect that could be left out: no clearance, flexible body, friction, gravity or stop"
         )
-    task = effect_plan.task(scene)
-    outcome = workplace.bring([task])
-    check(outcome)
-    record = outcome.records[id(task)]
-    planned = Planned(scene, of(scene, workplace.store.load(record)), task, record, workplace)
+    (made,) = workplace.made(effect_plan.task(scene))
+    planned = Planned(scene, of(scene, made.dataset()), made)
     if scene.path is not None:
         publish(planned.target, planned.file(planned.target))
-        publish(planned.folder / "index.html", page(planned))
+        publish(made.folder / "index.html", page(planned))
     return planned
 
 
 def of(scene: Scene, plan: xr.Dataset) -> Scene:
     """The scene that a plan makes of a scene: parts replaced and removed, solver and watched quantities set."""
-    decided = effect_plan.from_dataset(plan)
+    decided = json.loads(plan.attrs["planned"])
     bare = variants.without(scene, variants.named(scene, decided["gone"], f"{scene.name} [plan]"))
     fewer = lessened(variants.with_modes(bare, decided["modes"]), decided["uncoupled"])
     owners = fewer.owners()
@@ -238,18 +214,18 @@ def page(planned: Planned) -> bytes:
     import html
 
     from flexclear.pipeline.post.answers.plan import words
-    from flexclear.pipeline.post.overview.page import Part, media
-    from flexclear.pipeline.post.overview.page import page as made
+    from flexclear.pipeline.post.pages import Part, media
+    from flexclear.pipeline.post.pages import page as made
     from flexclear.pipeline.post.plotting.table import as_html, from_markdown
 
-    picture = media("plan.png", planned.stored("plan.png").read_bytes(), "Estimated influence of each effect, at most")
+    picture = media("plan.png", planned.made.read("plan.png"), "Estimated size of each effect, at most")
     text = html.escape(planned.file(planned.target).decode())
     parts = [
-        Part("chart", "Influences", picture),
-        Part("decisions", "Decisions", as_html(from_markdown(planned.text()))),
+        Part("chart", "Effect sizes", picture),
+        Part("decisions", "Decisions", as_html(from_markdown(planned.made.text("plan.md")))),
         Part("scene", "The planned scene", f"<figure><pre class='scroll'>{text}</pre></figure>"),
     ]
-    return made(f"Plan: {planned.scene.title}", words(planned.dataset()), parts)
+    return made(f"Plan: {planned.scene.title}", words(planned.made.dataset()), parts)
 
 
 def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> list[str]:
@@ -264,8 +240,8 @@ def verify(planned: Planned, workplace: Workplace, budget: float = BUDGET) -> li
     print(as_markdown(verified(compared)))
     if planned.scene.accuracy is not None and planned.scene.accuracy.allow_missed:
         return []
-    found = [agreement_of(compared, k) for k in range(compared.sizes["quantity"])]
-    columns = zip(compared["quantity"].values, compared["unit"].values, found, strict=True)
+    verdicts = [agreement_of(compared, k) for k in range(compared.sizes["quantity"])]
+    columns = zip(compared["quantity"].values, compared["unit"].values, verdicts, strict=True)
     return [
         f"{planned.scene.name}: the plan misses {name}: {one.error:.3g} instead of {one.allowed:.3g} {unit}"
         for name, unit, one in columns
@@ -287,16 +263,12 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
     asked, begun = planned.scene.accuracy.quantities, time.monotonic()
     chosen = [parse(name, planned.scene.owners()) for name in asked]
     full = edited(planned.scene, {"accuracy": None})
-    result, first = planned.dataset()[["wanted"]].copy(), list[float]()
+    result, first = planned.made.dataset()[["wanted"]].copy(), list[float]()
 
     def compared(members: int) -> list[effect_size.Agreement]:
-        tasks = [watched_quantities.task(scene, chosen, members) for scene in (full, planned.planned)]
-        outcome = workplace.bring(tasks)
-        check(outcome)
-        one, two = (
-            watched_quantities.point(workplace.store.load(outcome.records[id(task)]), scene, chosen)
-            for task, scene in zip(tasks, (full, planned.planned), strict=True)
-        )
+        both = full, planned.planned
+        stored = workplace.datasets(*(watched_quantities.task(scene, chosen, members) for scene in both))
+        one, two = (watched_quantities.point(d, scene, chosen) for d, scene in zip(stored, both, strict=True))
         for point, what in ((one, "full"), (two, "planned")):
             if point.refused:
                 raise SolverError(f"{planned.scene.name}: the {what} run is refused: {point.refused}")
@@ -314,7 +286,7 @@ def errors_of(planned: Planned, workplace: Workplace, budget: float = BUDGET) ->
         return time.monotonic() - begun + first[0] * members / MEMBERS[0] <= budget
 
     loose = planned.scene.contacts() or planned.scene.stop
-    found, members = until_decided(compared, MEMBERS if loose else MEMBERS[:1], affordable)
+    verdicts, members = until_decided(compared, MEMBERS if loose else MEMBERS[:1], affordable)
     for name in ("error", "chance", "allowed", "horizon"):
-        result[name] = (("quantity",), [getattr(one, name) for one in found])
+        result[name] = (("quantity",), [getattr(one, name) for one in verdicts])
     return result.assign_attrs(members=members if loose else 0)

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.commands import as_json, scenes
+from flexclear.commands import scenes
+from flexclear.commands.export import as_json
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.workflow.task import Task
 from flexclear.stages.graph import Graph
 from flexclear.stages.rendering import FORMATS
-from flexclear.stages.workplace import Workplace, check, open_workplace, relative
+from flexclear.stages.workplace import check, open_workplace, relative
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.core.scene.schema import Scene
+    pass
 
 #: what is made where nothing is asked for
 USUAL = (("motion", "png"), ("motion", "mp4"), ("motion", "html"), ("modes", "html"))
@@ -49,18 +49,17 @@ def command(options: argparse.Namespace) -> None:
     tasks = {graph.scene.name: _tasks(graph, requested, options.what is not None, time) for graph in graphs}
     made = [task for group in tasks.values() for task in group]
     if len(graphs) > 1 and requested == [("modes", "html")]:
-        made.append(_beside(graphs))
+        made.append(_mode_sets(graphs))
     outcome = workplace.bring(made)
-    files = dict[str, list[str]]()
-    for task in made:
-        record = outcome.records.get(id(task))
-        if record is None:
-            continue
-        files.setdefault(task.scene, []).extend(str(workplace.store.root / task.folder / name) for name in record.files)
+    there, files = workplace.artifacts(outcome), dict[str, list[str]]()
+    for one in (there[task] for task in made if task in there):
+        files.setdefault(one.task.scene, []).extend(str(one.folder / name) for name in one.record.files)
         if not options.json:
-            _tell(workplace, task.folder, list(record.files))
+            shown = [name for name in sorted(one.record.files) if not name.endswith(".vtp")]
+            rest = len(one.record.files) - len(shown)
+            print(f"{relative(one.folder)}: {', '.join(shown)}{f' and {rest} more files' if rest else ''}")
     if options.json:
-        print(as_json.as_json(files))
+        print(as_json(files))
     check(outcome)
 
 
@@ -86,7 +85,7 @@ def _tasks(graph: Graph, requested: list[tuple[str, str]], asked: bool, time: fl
         return [graph.picture(what, kind, time) for what, kind in there]
 
 
-def _beside(graphs: list[Graph]) -> Task:
+def _mode_sets(graphs: list[Graph]) -> Task:
     """The mode sets of several scenes on one page."""
     bundles = {f"bundle/{graph.scene.name}: {body}": task for graph in graphs for body, task in graph.bundle.items()}
     return Task(
@@ -98,17 +97,3 @@ def _beside(graphs: list[Graph]) -> Task:
         inputs=bundles,
         folder=f"compare/{scenes.joined([graph.scene.name for graph in graphs])}",
     )
-
-
-def _tell(workplace: Workplace, folder: str, files: list[str]) -> None:
-    shown = [name for name in sorted(files) if not name.endswith(".vtp")]
-    rest = len(files) - len(shown)
-    print(f"{relative(workplace.store.root / folder)}: {', '.join(shown)}{f' and {rest} more files' if rest else ''}")
-
-
-def rendered(scene: Scene, workplace: Workplace | None = None) -> Path:
-    """The folder with the pictures and the film of a scene, brought up to date.  Raises FlexclearError."""
-    workplace, requested = workplace or open_workplace(), Graph(scene)
-    scenes.require_names(scene)
-    check(workplace.bring(list(requested.render.values()), jobs=1))
-    return workplace.store.root / requested.simulate.folder

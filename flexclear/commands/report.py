@@ -1,18 +1,85 @@
-"""``flexclear report``: every figure and table of the paper, and the page that shows them
-(`papers.wang_wang_2019.tasks`).
+"""``flexclear report``: the page of scenes, or without scenes every figure and table of the paper and their page.
 
-With scenes it is the report of these (`flexclear.commands.scene_report`). What brings either up to date is imported
-when something may have changed.
+The page of a scene: the answer, then film, figures, comparison with its ideal mechanism, assumptions, warnings.
 """
 
 from __future__ import annotations
 
 import argparse
+import html
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import as_json
+from flexclear.commands import compare
+from flexclear.commands.export import as_json
+from flexclear.commands.scenes import graphs, in_file, pictures
+from flexclear.pipeline.core.artifacts.disk import publish
+from flexclear.pipeline.core.scene.provenance import assumed
+from flexclear.pipeline.core.scene.variants import loose
+from flexclear.pipeline.core.system.errors import InputError, SolverError
+from flexclear.pipeline.core.workflow.task import Task
 from flexclear.pipeline.post.render import gl
-from flexclear.stages.workplace import Workplace, add_options, check, open_workplace, relative
+from flexclear.stages import derived_series
+from flexclear.stages.workplace import (
+    FailedTasksError,
+    Made,
+    Workplace,
+    add_options,
+    check,
+    open_workplace,
+    relative,
+    seconds,
+)
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.commands.answers import Answers
+    from flexclear.pipeline.core.scene.schema import Scene
+    from flexclear.pipeline.post.pages import Part
+    from flexclear.stages.graph import Graph
+
+#: what a report shows of the motion, by the names of `Graph.render`
+SHOWN_MOTION = ("motion mp4", "motion html", "modes html")
+#: general figures, in this order: caption, and what a reader who does not see them reads
+FIGURES = {
+    "motion.png": ("Motion", "Displacement, velocity and rotation of the bodies over time"),
+    "reactions.png": (
+        "Reactions and drives",
+        "Magnitude of the force in each joint, and what drives supply, over time",
+    ),
+    "contacts.png": (
+        "Joints with clearance",
+        "Path of the ball or pin in its socket, the gap, and the normal force over time",
+    ),
+    "wear.png": ("Wear of contacts", "Load times sliding way over time, and how deep the surfaces wear over the angle"),
+    "joint_friction.png": ("Friction of ideal joints", "Normal force in the bearings and energy lost, over time"),
+    "watched.png": ("Watched quantities", "What the scene watches, over time"),
+    "energy.png": ("Energy", "Energies over time, and the error of their balance"),
+}
+#: of a run's attributes, those that say how it was made, and what they are called
+COST = {
+    "method": "integrator",
+    "method_reason": "why this one",
+    "evaluations": "evaluations of the equations of motion",
+    "steps": "steps",
+    "rejected_steps": "steps made again, shorter, since their error was too large",
+    "jacobians": "Jacobians of the equations",
+    "projections": "times the closed loops were put together again",
+}
+STABILITY = {
+    "switched": "another integrator continued",
+    "stiff_share": "fraction of the steps that stability made shorter than accuracy would have",
+    "redundant_closure_rows": "conditions of closed loops that follow from the others",
+    "accuracy_verdict": "accuracy asked for",
+}
+PROVENANCE = {
+    "scene": "scene",
+    "source": "made by",
+    "versions": "versions of the libraries",
+    "Conventions": "conventions of the datasets",
+}
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:
@@ -33,29 +100,26 @@ def command(options: argparse.Namespace) -> None:
     """Bring it up to date and say where it is."""
     workplace = open_workplace(options)
     pages: dict[str, str] = {}
-
-    def made(name: str, page: Path) -> None:
+    for name, page in _pages(options, workplace):
         pages[name] = str(page)
         if not options.json:
             print(relative(page))
-
-    if not options.scenes:
-        made("paper", make(workplace, folder=options.folder))
-    else:
-        from flexclear.commands import scene_report, scenes
-        from flexclear.stages import limit
-
-        seconds = None if options.budget is None else limit.seconds(options.budget, "--budget")
-        for graph in scenes.graphs(options.scenes, options.set):
-            answers = options.answers != "none"
-            page = scene_report.make(graph, workplace, folder=options.folder, seconds=seconds, answers=answers)
-            made(graph.scene.name, page)
     if options.json:
-        print(as_json.as_json(pages))
+        print(as_json(pages))
 
 
-def make(workplace: Workplace, *, folder: bool = False) -> Path:
-    """Bring everything that the report shows up to date; returns the page; with `folder` one with files next to it.
+def _pages(options: argparse.Namespace, workplace: Workplace) -> Iterator[tuple[str, Path]]:
+    """Name and page of everything asked for, as soon as it is there."""
+    if not options.scenes:
+        yield "paper", of_paper(workplace, folder=options.folder)
+        return
+    budget, answers = options.budget and seconds(options.budget, "--budget"), options.answers != "none"
+    for graph in graphs(options.scenes, options.set):
+        yield graph.scene.name, of_scene(graph, workplace, folder=options.folder, budget=budget, answers=answers)
+
+
+def of_paper(workplace: Workplace, *, folder: bool = False) -> Path:
+    """Bring everything that the page of the paper shows up to date; returns the page, with `folder` one next to files.
 
     What fails is left out of the page and raised (FailedTasksError) after the page is written.
     """
@@ -66,8 +130,193 @@ def make(workplace: Workplace, *, folder: bool = False) -> Path:
         workplace.monitor.say(f"shapes are drawn as lines and there is no film: {gl.remedy()}")
     check(outcome)
     target = workplace.store.root / "report" / "index.html"
-    if not folder:
-        return target
-    from flexclear.commands.scene_report import publish_page
+    return publish_page(target.parent, "folder", target.read_bytes(), folder=True) if folder else target
 
-    return publish_page(target.parent, "folder", target.read_bytes(), folder=True)
+
+def of_scene(
+    graph: Graph, workplace: Workplace, *, folder: bool = False, budget: float | None = None, answers: bool = True
+) -> Path:
+    """Bring everything that the report of a scene shows up to date; returns the page.
+
+    One file with all inside; or with `folder` a folder with the page and its pictures as files.  Without GL libraries
+    it has no film.  budget: of the three answers (`flexclear.commands.answers`) [s].  answers: whether they are there.
+    Raises FailedTasksError when the run itself cannot be made.
+    """
+    from flexclear.commands.answers import Answers
+
+    scene = graph.scene
+    compared, answering = None, Answers(scene, workplace, budget)
+    if loose(scene) or scene.flexible():
+        with in_file(scene.path):
+            compared = compare.bring([scene], workplace, "both", answering.kernels() if answers else ())
+    drawn = [task for what, task in graph.render.items() if what in SHOWN_MOTION]
+    members = [graph.ensemble, graph.post] if graph.ensemble else []
+    outcome = workplace.bring([*drawn, graph.overview, *members])  # the film takes longest, so it begins first
+    if any(failure.task not in [*drawn, *members] for failure in outcome.failures):
+        check(outcome)
+    for failure in outcome.failures:
+        workplace.monitor.say(f"not in the report: {failure.message}")
+    made = workplace.artifacts(outcome)
+    run = made[graph.simulate].dataset() if graph.simulate in made else None
+    result = _answers(answering, workplace) if answers and run is not None else {}
+    text = _page(graph, made, compared, run, result)
+    return publish_page(workplace.store.root / f"runs/{scene.name}", "report", text, folder=folder)
+
+
+def publish_page(where: Path, name: str, page: bytes, *, folder: bool) -> Path:
+    """Write a page as ``<name>.html``, or as ``<name>/index.html`` with its files next to it."""
+    if not folder:
+        publish(where / f"{name}.html", page)
+        return where / f"{name}.html"
+    from flexclear.pipeline.post.pages import in_folder
+
+    (where / name).mkdir(parents=True, exist_ok=True)
+    for file, content in in_folder(page).items():
+        publish(where / name / file, content)
+    return where / name / "index.html"
+
+
+def _answers(answers: Answers, workplace: Workplace) -> dict[str, Made]:
+    """Those of the three answers that can be given, by name; why one cannot is said."""
+    result = {}
+    for name in ("accuracy", "stability", "matters"):
+        try:
+            answer = getattr(answers, name)
+        except (InputError, SolverError, FailedTasksError) as error:
+            workplace.monitor.say(f"not in the report: {name}: {error}")
+            continue
+        if answer is not None:
+            result[name] = answer
+    return result
+
+
+def _answered(scene: Scene, result: Mapping[str, Made]) -> list[Part]:
+    """The three sections: each with a sentence that answers, a picture and a table."""
+    from flexclear.commands.answers import said
+    from flexclear.pipeline.post.pages import Part
+
+    parts = []
+    for name, answer in result.items():
+        words = said(name, answer, scene)
+        shown = pictures(answer, {words.picture: (words.caption,)})
+        parts.append(Part(name, words.heading, f"<p>{html.escape(words.text)}</p>\n{shown}{words.table}"))
+    return parts
+
+
+def _page(
+    graph: Graph,
+    made: Mapping[Task, Made],
+    compared: Made | None,
+    run: xr.Dataset | None,
+    answers: Mapping[str, Made],
+) -> bytes:
+    from flexclear.pipeline.post.answers.matters import ideal_sentences
+    from flexclear.pipeline.post.answers.summary import answer, by_weight, effects
+    from flexclear.pipeline.post.pages import Part, downloads, listed, page
+    from flexclear.pipeline.post.single_run.series import parameters
+
+    scene = graph.scene
+    attributes: Mapping[Any, Any] = {} if run is None else run.attrs
+    doubts = [text for text in str(attributes.get("warnings", "")).split("\n") if text]
+    assumptions = by_weight(assumed(derived_series.sources(scene)), run)
+    members = _members(graph, made)
+    parts: list[Any] = [
+        Part("film", "The mechanism moving", _moving(graph, made)),
+        Part("run", "The run", pictures(made.get(graph.overview), FIGURES)),
+        *_answered(scene, answers),
+        *(compare.parts(compared) if compared is not None else []),
+        Part("doubts", "Warnings", listed({f"{k + 1}": text for k, text in enumerate(doubts)}, ("no.", "warning"))),
+        Part("assumptions", "Assumptions, the most influential first", listed(assumptions, ("value", "assumption"))),
+        Part(
+            "effects",
+            "Effects present and absent",
+            listed(effects(parameters(run)), ("effect", "in the scene")) if run is not None else "",
+        ),
+        Part("cost", "Computing cost", listed(_rows(attributes, COST), ("figure", "value"))),
+        Part(
+            "stability",
+            "Stability and constraints",
+            "" if "stability" in answers else listed(_stability(run, members), ("figure", "value")),
+        ),
+        Part("provenance", "Provenance", listed(_provenance(graph, made), ("item", "value"))),
+        Part("downloads", "Downloads", downloads(_files(graph, compared))),
+    ]
+    dataset = None if compared is None else compared.dataset()
+    lead = " ".join(scene.description.split()) or scene.name
+    changes = ideal_sentences(answers["matters"].dataset()) if "matters" in answers else []
+    return page(scene.title, lead, parts, answer(dataset, run, doubts, changes, members))
+
+
+def _rows(attributes: Mapping[Any, Any], names: Mapping[str, str]) -> dict[str, str]:
+    """Attributes by what they are called; whole numbers in groups of three, shares in per cent."""
+    rows = {}
+    for name, label in names.items():
+        value = attributes.get(name)
+        if value not in (None, ""):
+            whole = isinstance(value, int) or (getattr(value, "dtype", None) is not None and value.dtype.kind in "iu")
+            if name.endswith("_share"):
+                rows[label] = f"{100.0 * float(value):.3g} %"
+            elif whole:
+                rows[label] = f"{int(value):,}"
+            else:
+                rows[label] = f"{value:.4g}" if isinstance(value, float) else str(value)
+    return rows
+
+
+def _members(graph: Graph, made: Mapping[Task, Made]) -> float | None:
+    """Horizon of the scene's ensemble [s]; None where there is none, or where it cannot be made."""
+    if graph.ensemble is None or graph.post not in made:
+        return None
+    return float(made[graph.post].dataset()["ensemble_horizon"])
+
+
+def _stability(run: xr.Dataset | None, members: float | None) -> dict[str, str]:
+    from flexclear.pipeline.post.single_run.series import sentence
+
+    if run is None:
+        return {}
+    rows = _rows(run.attrs, STABILITY)
+    if "horizon" in run:
+        rows["predictability"] = sentence(float(run["horizon"]), float(run["time"].values[-1]), members)
+    for name, label, unit in (
+        ("energy_error", "largest error of the energy balance", "J"),
+        ("constraint_error", "largest error of a closed loop", "m"),
+    ):
+        if name in run:
+            rows[label] = f"{float(abs(run[name]).max()):.2e} {unit}"
+    return rows
+
+
+def _provenance(graph: Graph, made: Mapping[Task, Made]) -> dict[str, str]:
+    rows = {"command": f"`flexclear report {graph.scene.path.name if graph.scene.path else graph.scene.name}`"}
+    run = made.get(graph.simulate)
+    if run is not None:
+        rows |= _rows(run.dataset().attrs, PROVENANCE) | {"digest of the run": run.record.digest}
+    return rows | {"sources of methods and data": f"`flexclear cite {graph.scene.name}`"}
+
+
+def _files(graph: Graph, compared: Made | None) -> dict[str, bytes]:
+    """The scene as it was written, with what it extends, its recipes, and the tables; small enough for any page."""
+    files = {}
+    if graph.scene.path is not None:
+        files[graph.scene.path.name] = graph.scene.path.read_bytes()
+    for recipe in graph.scene.recipes().values():
+        files[Path(recipe).name] = Path(recipe).read_bytes()
+    tables = compared.record.files if compared is not None else {}
+    return files | {
+        name: compared.read(name) for name in ("differences.csv", "costs.csv") if compared and name in tables
+    }
+
+
+def _moving(graph: Graph, made: Mapping[Task, Made]) -> str:
+    """The film, and the views that can be turned."""
+    from flexclear.pipeline.post.pages import figures_of
+
+    text = ""
+    for what, one in ((what, made[task]) for what, task in graph.render.items() if task in made):
+        if what.endswith("html"):
+            text += "".join(figures_of(one.text(name)) for name in sorted(one.record.files))
+        elif what == "motion mp4":
+            film = ("The mechanism moving", f"Film of {graph.scene.title}")
+            text = pictures(one, dict.fromkeys(one.record.files, film)) + text
+    return text

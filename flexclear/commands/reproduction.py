@@ -27,10 +27,10 @@ from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.stages import meshing
 from flexclear.stages.sweeps.sweep_points import source_digest
 
-#: entries of the file: what it is about, what was said; the scene's files stand below the folder
+#: entries of the file: what it is about, what was said; the scene's files are below the folder
 FACTS, LOG, FILES = "facts.json", "log.txt", "files"
 #: bytes that are unpacked at most, and characters of a log that are stored
-LARGEST, LONGEST = 1 << 30, 200_000
+LARGEST_UNPACKED, LONGEST_LOG = 1 << 30, 200_000
 #: last lines of what was said that are shown of each
 REPORTED = 5
 #: variables of the environment that change what is computed, or where
@@ -71,7 +71,7 @@ def make(name: str, settings: Sequence[str], libraries: Sequence[str], target: P
         "environment": {k: _without(v, hidden) for k, v in sorted(os.environ.items()) if k.startswith(VARIABLES)},
     }
     content = {FACTS: json.dumps(facts, indent=1, sort_keys=True).encode()}
-    content[LOG] = _without(done.stdout + done.stderr, hidden)[-LONGEST:].encode()
+    content[LOG] = _without(done.stdout + done.stderr, hidden)[-LONGEST_LOG:].encode()
     for path in sorted(files):
         content[f"{FILES}/{path.relative_to(top).as_posix()}"] = _bytes(path, files)
     path = target or Path(f"{scene.stem}.repeat.zip")
@@ -90,7 +90,7 @@ def repeat(path: Path, libraries: Sequence[str]) -> tuple[bool, str]:
         facts, log = _unpack(path, folder)
         environment = {**os.environ, "FLEXCLEAR_RESULTS": str(folder / "results")}
         done, digest = _run(folder / FILES / facts["scene"], facts["settings"], environment)
-        said = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST:]
+        said = _without(done.stdout + done.stderr, _hidden(folder / FILES))[-LONGEST_LOG:]
     differences = [f"here it ended with {done.returncode}, there with {facts['exit_code']}"]
     if digest and facts.get("run"):
         differences += [
@@ -201,7 +201,7 @@ def _unpack(path: Path, folder: Path) -> tuple[dict[str, Any], str]:
             entries = archive.infolist()
             names = [PurePosixPath(entry.filename) for entry in entries]
             strange = [n for n in names if n.is_absolute() or ".." in n.parts or "\\" in str(n) or ":" in str(n)]
-            if strange or sum(entry.file_size for entry in entries) > LARGEST:
+            if strange or sum(entry.file_size for entry in entries) > LARGEST_UNPACKED:
                 raise InputError(str(path), "holds names that lead out of it, or more than 1 GB", "do not open it")
             facts, log = json.loads(archive.read(FACTS)), archive.read(LOG).decode(errors="replace")
             for entry, name in zip(entries, names, strict=True):

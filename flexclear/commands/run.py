@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from flexclear.commands import as_json, export, plan
+from flexclear.commands import export, plan
+from flexclear.commands.export import as_json
 from flexclear.commands.scenes import (
     FACTS,
     check_out,
@@ -39,7 +40,9 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--planned", action="store_true", help="plan first, and run what the requested accuracy calls for"
     )
-    parser.add_argument("--verify", action="store_true", help="with --planned: run the full scene, tell the true error")
+    parser.add_argument(
+        "--verify", action="store_true", help="with --planned: run the full scene, report the true error"
+    )
 
 
 def command(options: argparse.Namespace) -> None:
@@ -50,7 +53,7 @@ def command(options: argparse.Namespace) -> None:
     requested = graphs(options.scenes, options.set)
     workplace = open_workplace(options)
     plans = [plan.bring(graph.scene, workplace) for graph in requested] if options.planned else []
-    print(*(f"{one.text()}\n" for one in plans), sep="", end="")
+    print(*(f"{one.made.text('plan.md')}\n" for one in plans), sep="", end="")
     requested = [Graph(one.planned) for one in plans] or requested
     for graph in requested:
         check_run(graph.scene, workplace.store.root)
@@ -64,7 +67,7 @@ def command(options: argparse.Namespace) -> None:
     if options.out is not None:
         copy_run(requested[0], workplace, options.out)
     if options.json:
-        print(as_json.as_json({graph.scene.name: _result(graph, workplace, outcome) for graph in requested}))
+        print(as_json({graph.scene.name: _result(graph, workplace, outcome) for graph in requested}))
     for graph in requested if options.to in ("simulate", "ensemble", "post") and not options.json else ():
         print_files(workplace.store.root / graph.simulate.folder, {"run.nc": "the run", "post.nc": "derived from it"})
     missed = [text for one in plans if options.verify for text in plan.verify(one, workplace)]
@@ -73,7 +76,7 @@ def command(options: argparse.Namespace) -> None:
 
 def _result(graph: Graph, workplace: Workplace, outcome: Outcome) -> dict[str, object]:
     """What `run --json` prints of a scene: the files that are shown, warnings, and the verdict on its accuracy."""
-    folder, record = workplace.store.root / graph.simulate.folder, outcome.records.get(id(graph.simulate))
+    folder, record = workplace.store.root / graph.simulate.folder, outcome.records.get(graph.simulate)
     said = {} if record is None else record.said
     return {
         "files": [str(path) for path in sorted(folder.rglob("*")) if path.is_file() and FACTS not in path.parts],

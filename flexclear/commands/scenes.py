@@ -1,4 +1,4 @@
-"""Scenes that a command or a function of Python names: found, examined, brought up to date."""
+"""Scenes that a command or a function of Python names: read, examined, brought up to date."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from flexclear.pipeline.core.artifacts.store import PARTIAL, Store
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.scene.load import is_file, load_scene, read_toml, scene_name
 from flexclear.pipeline.core.scene.references import dangling
+from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system import file_names
 from flexclear.pipeline.core.system.errors import InputError, InputErrors, ResourceError, SolverError
@@ -27,13 +28,13 @@ from flexclear.pipeline.core.workflow.progress import WARNING
 from flexclear.pipeline.core.workflow.schedule import Outcome
 from flexclear.stages.derived_series import origins
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, add_options, open_workplace, relative
+from flexclear.stages.workplace import Made, Workplace, add_options, open_workplace, relative
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from flexclear.pipeline.core.scene.schema import Scene
-#: bytes of what `--set` changes that stand in the name of a folder
+#: bytes of what `--set` changes that are in the name of a folder
 LONGEST_EDITS = 100
 #: folder below a scene's results that is not for users
 FACTS = ".facts"
@@ -50,6 +51,14 @@ def print_files(folder: Path, files: Mapping[str, str]) -> None:
     there = [f"{name} ({text})" for name, text in files.items() if (folder / name).is_file()]
     if there:
         print(f"{relative(folder)}: {', '.join(there)}")
+
+
+def pictures(made: Made | None, captions: Mapping[str, Sequence[str]]) -> str:
+    """Those pictures and films of an artifact that are there, as HTML; by name their captions, and what they show."""
+    from flexclear.pipeline.post.pages import media
+
+    files = made.record.files if made is not None else {}
+    return "".join(media(name, made.read(name), *text) for name, text in captions.items() if made and name in files)
 
 
 def joined(names: Sequence[str]) -> str:
@@ -69,14 +78,9 @@ def find_scene(name: str) -> Path:
     named = DATA / "scenes" / f"{name}.toml"
     if is_file(named):
         return named
-    raise InputError(name, "is neither a scene file nor the name of one below scenes/", _known(name))
-
-
-def _known(name: str) -> str:
-    from flexclear.pipeline.core.scene.registry import suggestion
-
     scenes = DATA / "scenes"
-    return suggestion(name, sorted(p.relative_to(scenes).with_suffix("").as_posix() for p in scenes.rglob("*.toml")))
+    known = sorted(p.relative_to(scenes).with_suffix("").as_posix() for p in scenes.rglob("*.toml"))
+    raise InputError(name, "is neither a scene file nor the name of one below scenes/", suggestion(name, known))
 
 
 def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
@@ -95,12 +99,6 @@ def run(scene: Scene, workplace: Workplace | None = None) -> xr.Dataset:
     from flexclear.pipeline.core.artifacts.table import recorded
 
     return recorded(made.assign_attrs(title=scene.title, scene=scene.name, **origins(scene)))
-
-
-def graph(scene: Scene) -> Graph:
-    """The tasks of a scene; an edited one does not replace its file's results under results/runs."""
-    examine(scene)
-    return Graph(scene, shown=scene.path is None or as_in_its_file(scene))
 
 
 def results(scene: Scene | str | Path) -> xr.DataTree:
@@ -200,21 +198,14 @@ def linear(
     return workplace.datasets(task)[0].assign_attrs(title=scene.title, scene=scene.name)
 
 
-def sensitivities(scene: Scene, of: Sequence[str], to: Sequence[str], workplace: Workplace | None = None) -> xr.Dataset:
-    """Derivatives of quantities by numbers of a scene, brought up to date as `run` is."""
-    examine(scene)
-    task = Graph(scene, shown=False).sensitivities(of, to)
-    return (workplace or open_workplace()).datasets(task, jobs=1)[0]
-
-
 def conclude(graphs: Sequence[Graph], workplace: Workplace, outcome: Outcome, plans: Sequence[str] = ()) -> None:
-    """Tell what the scenes' runs are to be doubted for, as the last thing that a command says.
+    """Report what the scenes' runs are to be doubted for, as the last thing that a command says.
 
     Raises MissedAccuracyError, after that, for runs that are not as accurate as asked, and for what `plans` miss.
     """
     missed = [*plans]
     for graph in graphs:
-        record = outcome.records.get(id(graph.simulate))
+        record = outcome.records.get(graph.simulate)
         if record is None:
             continue
         for sentence in filter(None, record.said.get("warnings", "").split("\n")):

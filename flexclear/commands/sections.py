@@ -7,17 +7,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from flexclear.commands import as_json
-from flexclear.commands.scenes import as_in_its_file, check_target, graphs, scene_arguments
+from flexclear.commands.export import as_json
+from flexclear.commands.scenes import check_target, graphs, scene_arguments
 from flexclear.pipeline.core.artifacts.disk import disk_limits, publish
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.stages.graph import Graph
-from flexclear.stages.workplace import Workplace, check, open_workplace
+from flexclear.stages.workplace import open_workplace
 
 if TYPE_CHECKING:
     import xarray as xr
 
-    from flexclear.pipeline.core.scene.schema import Scene
 
 #: options and the keys of `[sections]` that they replace
 COUNTS = {"periods": "recorded periods", "transient": "periods before them that are not"}
@@ -38,28 +37,15 @@ def command(options: argparse.Namespace) -> None:
     if options.page is not None:
         check_target(options.page, "--page")
     workplace = open_workplace(options)
-    scenes = [with_sections(graph.scene, asked) for graph in graphs(options.scenes, options.set)]
+    changes = {f"sections.{key}": value for key, value in asked.items()}
+    scenes = [edited(graph.scene, changes) if asked else graph.scene for graph in graphs(options.scenes, options.set)]
     tasks = {scene.name: Graph(scene, shown=not asked) for scene in scenes}
-    outcome = workplace.bring([graph.verdict for graph in tasks.values()])
-    check(outcome)
-    records = {name: outcome.records[id(graph.sections)] for name, graph in tasks.items()}
-    judged = {name: outcome.records[id(graph.verdict)] for name, graph in tasks.items()}
-    verdicts = {name: workplace.store.load(record) for name, record in judged.items()}
-    print(as_json.as_json(verdicts) if options.json else "\n\n".join(text(*judged) for judged in verdicts.items()))
+    judged = dict(zip(tasks, workplace.made(*(graph.verdict for graph in tasks.values())), strict=True))
+    verdicts = {name: made.dataset() for name, made in judged.items()}
+    print(as_json(verdicts) if options.json else "\n\n".join(text(*one) for one in verdicts.items()))
     if options.page is not None:
-        pictures = {
-            name: workplace.store.path(record.stage, record.key, "sections.png").read_bytes()
-            for name, record in judged.items()
-        }
-        write_page(
-            verdicts, {name: workplace.store.load(record) for name, record in records.items()}, pictures, options.page
-        )
-
-
-def with_sections(scene: Scene, asked: Mapping[str, object]) -> Scene:
-    """The scene with some keys of `[sections]` replaced, whether it has that table or not."""
-    present = {} if scene.sections is None else scene.sections.model_dump(mode="json", exclude_none=True)
-    return edited(scene, {"sections": {**present, **asked}}) if asked else scene
+        sections = dict(zip(tasks, workplace.datasets(*(graph.sections for graph in tasks.values())), strict=True))
+        write_page(verdicts, sections, {n: made.read("sections.png") for n, made in judged.items()}, options.page)
 
 
 def write_page(
@@ -75,15 +61,6 @@ def write_page(
             publish(folder / f"{name.replace('/', '_')}.png", picture)
         publish(folder / "verdicts.csv", csv_text(verdicts).encode())
         publish(page, markdown(verdicts, sections, page.as_posix(), page.stem).encode())
-
-
-def judge(scene: Scene, workplace: Workplace | None = None) -> tuple[xr.Dataset, xr.Dataset]:
-    """Sections (schema SECTIONS) and verdict (schema VERDICT) of a scene, brought up to date as `run` is."""
-    workplace = workplace or open_workplace()
-    graph = Graph(scene, shown=as_in_its_file(scene))
-    made = workplace.datasets(graph.sections, graph.verdict, jobs=1)
-    sections, judged = (data.assign_attrs(title=scene.title, scene=scene.name) for data in made)
-    return sections, judged
 
 
 def text(scene: str, verdict: xr.Dataset) -> str:

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import as_json, scenes
+from flexclear.commands import scenes
+from flexclear.commands.export import as_json
 from flexclear.pipeline.core.scene import lines
 from flexclear.pipeline.core.system.errors import InputError, ResourceError
 from flexclear.stages import meshing, rendering, rigid_body
@@ -42,7 +43,7 @@ def command(options: argparse.Namespace) -> int:
             print(f"flexclear: {lines.located(refused)}", file=sys.stderr)
             result = refused.exit_code
     if options.json:
-        print(as_json.as_json(made))
+        print(as_json(made))
     return result
 
 
@@ -116,7 +117,7 @@ def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False
     content = {f"{stem}_start.html": _page(scene, seen)}
     if gl.works():
         from flexclear.pipeline.post.render.pictures import png
-        from flexclear.pipeline.post.render.start_picture import picture
+        from flexclear.pipeline.post.render.start_view import picture
 
         content[f"{stem}_start.png"] = png(picture(seen, scene.title or stem))
     elif not quiet:
@@ -130,8 +131,7 @@ def files_of(scene: Scene, seen: StartView, folder: Path, *, quiet: bool = False
 
 
 def _page(scene: Scene, seen: StartView) -> bytes:
-    from flexclear.pipeline.post.overview.page import viewer_page
-    from flexclear.pipeline.post.pages import viewer
+    from flexclear.pipeline.post.pages import viewer, viewer_page
     from flexclear.pipeline.post.render.start_view import page_view
 
     title = scene.title or Path(scene.name).name

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flexclear.commands import as_json, export, scenes
+from flexclear.commands import export, scenes
+from flexclear.commands.export import as_json
 from flexclear.pipeline.core.artifacts.store import disk_limits, write_dataset
 from flexclear.pipeline.core.scene.load import is_file, load_scene, scene_name
 from flexclear.pipeline.core.scene.sweep import Sweep, load_sweep
@@ -65,7 +66,7 @@ def command(options: argparse.Namespace) -> None:
             made[name] = bring(plan, workers, workplace, folder := workplace.store.root / "sweeps" / name)
             _show(plan, made[name], folder, options.out, quiet=options.json)
     if options.json:
-        print(as_json.as_json(made))
+        print(as_json(made))
 
 
 def width(asked: int | None) -> int:
@@ -121,7 +122,7 @@ class _Desk:
     def __post_init__(self) -> None:
         self.refused = sum(bool(point.refused) for point in self.done.values())
 
-    def take(self, finished: Sequence[tuple[Job, Point]], tell: Callable[[float, str], None]) -> None:
+    def take(self, finished: Sequence[tuple[Job, Point]], report: Callable[[float, str], None]) -> None:
         """Note finished points."""
         self.waiting += finished
         self.done |= {job.key: sweep_large.stripped(point) if self.large else point for job, point in finished}
@@ -132,7 +133,7 @@ class _Desk:
             self.store()
         text = f", {self.refused} refused" if self.refused else ""
         rate = self.fresh / since if since > 0.0 else 0.0
-        tell(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{text}, {rate:.3g}/s")
+        report(len(self.done) / self.total, f"{len(self.done)} of {self.total} points{text}, {rate:.3g}/s")
 
     def store(self) -> None:
         """Put what waits into the cache, family by family."""

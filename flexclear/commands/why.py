@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Mapping, Sequence
 
-from flexclear.commands import as_json, scenes
+from flexclear.commands import scenes
+from flexclear.commands.export import as_json
 from flexclear.pipeline.core.artifacts.store import Record
 from flexclear.pipeline.core.system.errors import shown
 from flexclear.pipeline.core.system.machine import instruction_set
@@ -27,7 +28,7 @@ def command(options: argparse.Namespace) -> None:
         stages = states(graph.up_to(options.to), workplace.store, workplace.sources)
         reasons[graph.scene.name] = {state.task.label: list(state.why) for state in stages}
         others[graph.scene.name] = [text for state in stages for text in elsewhere(state.task.label, state.record)]
-    print(as_json.as_json(reasons) if options.json else text(reasons, others))
+    print(as_json(reasons) if options.json else text(reasons, others))
 
 
 def elsewhere(label: str, record: Record | None) -> list[str]:

@@ -1,15 +1,19 @@
-"""Differences between two runs, without interpolation: only at times that both have.
+"""Differences between two runs, without interpolation, and what the models differ in as numbers.
+
+Differences are taken only at times that both runs have.
 
 But for what happens between these: a smooth motion can be interpolated with its accelerations.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
+from flexclear.papers.wang_wang_2019.models import BALL_FRAME, IDEAL, JOINT, PLATFORM, Model
 from flexclear.pipeline.core.artifacts.quantities import SAME_TIME, common_times
 from flexclear.pipeline.core.numerics.rotations import angle_about_y, rotation_between
 
@@ -23,6 +27,10 @@ class Deviation:
     displacement: float  #: z [m]
     velocity: float  #: along z [m/s]
     until: float  #: last time that was compared [s]
+
+    def over(self, other: Deviation) -> tuple[float, float, float]:
+        """Angle, displacement and velocity as fractions of another one's."""
+        return self.angle / other.angle, self.displacement / other.displacement, self.velocity / other.velocity
 
 
 def max_deviation(run: xr.Dataset, reference: xr.Dataset, body: str, until: float = np.inf) -> Deviation:
@@ -86,3 +94,88 @@ def _compare(a: _Motion, i: np.ndarray, b: _Motion, j: np.ndarray, time: np.ndar
 
 def _largest(values: np.ndarray) -> float:
     return float(np.max(np.abs(values)))
+
+
+#: artifacts by reference, such as ``sps4/csj:run``
+Data = dict[str, xr.Dataset]
+#: two answers differ by more than this fraction, and those of two ensembles also by this many standard deviations of
+#: the members
+SLIGHT, SEPARATION = 0.1, 2.0
+
+
+def moved(data: Data, model: Model, ideal_model: Model = IDEAL) -> Deviation:
+    """Largest deviations from the ideal model; of a model with an ensemble the means over the members."""
+    ideal = data[f"{ideal_model.scene}:run"]
+    if f"{model.scene}:ensemble" not in data:
+        return max_deviation(data[f"{model.scene}:run"], ideal, PLATFORM)
+    members = ensemble_deviations(data[f"{model.scene}:ensemble"], ideal, PLATFORM)
+    names = ("angle", "rotation", "displacement", "velocity", "until")
+    return Deviation(**{name: float(np.mean([getattr(m, name) for m in members])) for name in names})
+
+
+def sizes(data: Data, ideal_model: Model = IDEAL) -> Deviation:
+    """Largest values of the ideal model's own motion."""
+    run, post = data[f"{ideal_model.scene}:run"], data[f"{ideal_model.scene}:post"]
+    z = np.abs(post.displacement.sel(body=PLATFORM, axis="z").values).max()
+    v = np.abs(run.velocity.sel(body=PLATFORM, axis="z").values).max()
+    angle = np.abs(post.rotation_y.sel(body=PLATFORM).values).max()
+    return Deviation(float(angle), float(angle), float(z), float(v), float(run.time.values[-1]))
+
+
+def effects(data: Data, model: Model) -> dict[str, float]:
+    """Largest differences from the ideal model, that of the force at A1 [N] among them."""
+    most = moved(data, model)
+    newtons = float(np.linalg.norm(difference(data, model, force), axis=1).max())
+    return {"angle": most.angle, "displacement": most.displacement, "velocity": most.velocity, "force": newtons}
+
+
+def reaction(data: Data, model: Model) -> float:
+    """Largest force at A1 [N], with clearance the normal one; of ensembles the mean of the members' largest."""
+    if f"{model.scene}:ensemble" in data:
+        return float(data[f"{model.scene}:ensemble"].peak_force.sel(contact=JOINT).mean())
+    post = data[f"{model.scene}:post"]
+    return float(post.peak_force.sel(contact=JOINT) if "contact" in post.sizes else post.peak_reaction.sel(joint=JOINT))
+
+
+def peaks(data: Data, model: Model) -> tuple[float, float]:
+    """Largest force at A1 [N] as of `reaction`, and largest vertical acceleration of the platform [m/s^2]."""
+    return reaction(data, model), acceleration(data, model)
+
+
+def acceleration(data: Data, model: Model) -> float:
+    """Largest vertical acceleration of the platform [m/s^2]; of ensembles the mean of the members' largest."""
+    kind = "ensemble" if f"{model.scene}:ensemble" in data else "post"
+    return float(data[f"{model.scene}:{kind}"].peak_acceleration.sel(body=PLATFORM, axis="z").mean())
+
+
+def difference(data: Data, model: Model, of: Callable[[xr.Dataset], np.ndarray]) -> np.ndarray:
+    """Sizes of the differences from the ideal model at the outputs that both have."""
+    run, ideal = data[f"{model.scene}:run"], data[f"{IDEAL.scene}:run"]
+    i, j = common_times(run.time.values, ideal.time.values)
+    return np.abs(of(run)[i] - of(ideal)[j])
+
+
+def vertical(run: xr.Dataset) -> np.ndarray:
+    """The platform's acceleration along z [m/s^2], shape (time,)."""
+    return run.acceleration.sel(body=PLATFORM, axis="z").values
+
+
+def ball_centre(run: xr.Dataset) -> np.ndarray:
+    """The ball_centre of ball A1, world axes [m], shape (time, 3)."""
+    return run.frame_position.sel(frame=BALL_FRAME).values
+
+
+def force(run: xr.Dataset) -> np.ndarray:
+    """What joint A1 transmits [N], shape (time, 3)."""
+    return run.joint_force.sel(joint=JOINT).values
+
+
+def differ(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether the means of two ensembles' members do, by `SLIGHT` and by `APART`."""
+    gap, spread = abs(a.mean() - b.mean()), max(a.std(ddof=1), b.std(ddof=1))
+    return bool(gap > SLIGHT * abs(b.mean()) and gap > SEPARATION * spread)
+
+
+def mode_set(model: Model) -> str:
+    """The name of a model's modes, such as `free-free`; empty where its rod is rigid."""
+    return model.label.partition(", ")[2].split(" ")[0]

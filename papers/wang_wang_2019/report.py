@@ -2,37 +2,49 @@
 
 from __future__ import annotations
 
+import base64
+import html
 import json
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
 from flexclear.papers.wang_wang_2019 import figures
-from flexclear.papers.wang_wang_2019.discrepancies import DISCREPANCIES
-from flexclear.papers.wang_wang_2019.documents import section
-from flexclear.papers.wang_wang_2019.page import Content, html_page
-from flexclear.papers.wang_wang_2019.published import CITATION
+from flexclear.papers.wang_wang_2019.published import CITATION, DISCREPANCIES
 from flexclear.pipeline.core.system.file_dependencies import note
 from flexclear.pipeline.core.workflow.fingerprint import TREE
-from flexclear.pipeline.post.pages import figures_of
-from flexclear.pipeline.post.plotting.table import Table, from_markdown
+from flexclear.pipeline.post.pages import Part, downloads, figures_of, media, page, prose
+from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, from_markdown
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.system.progress import Progress
 
-#: what the page shows of the project's own pages: file, sections, endings of the pictures
-DOCUMENTS: dict[str, tuple[str, tuple[str, ...], tuple[str, ...]]] = {
+#: what the page shows of the project's own pages: heading, file, sections, endings of the pictures
+DOCUMENTS: dict[str, tuple[str, str, tuple[str, ...], tuple[str, ...]]] = {
     "accuracy": (
+        "Accuracy against time",
         "accuracy.md",
         ("What to choose", "sps4/csj", "sps4/far_csj_cb"),
         ("work_precision.png",),
     ),
-    "stability": ("stability.md", ("", "One parameter at a time"), ("sweeps.png",)),
-    "chaos": ("chaos.md", ("", "sps4/csj", "sps4/far_csj_cb"), (".png",)),
-    "conditions": ("reference-conditions.md", ("In short", "What holds of the paper's statements"), ()),
+    "stability": (
+        "Stability: hard cases, and what became of each",
+        "stability.md",
+        ("", "One parameter at a time"),
+        ("sweeps.png",),
+    ),
+    "chaos": ("Periodic or chaotic", "chaos.md", ("", "sps4/csj", "sps4/far_csj_cb"), (".png",)),
+    "conditions": (
+        "Reference conditions of the modes",
+        "reference-conditions.md",
+        ("In short", "What holds of the paper's statements"),
+        (),
+    ),
 }
 #: of a run's attributes, those that the page shows
 FACTS = ("title", "method", "evaluations", "steps", "versions")
@@ -48,7 +60,7 @@ def run(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: P
     by_scene = run_attributes({scene: results / path for scene, path in params["runs"].items()})
     attributes = {scene: {**attributes_of, **params["origins"][scene]} for scene, attributes_of in by_scene.items()}
     content = collect(results, attributes, params["rendered"], TREE)
-    return {"index.html": page(content), "paper.md": paper_markdown(content).encode()}
+    return {"index.html": html_page(content).encode(), "paper.md": paper_markdown(content).encode()}
 
 
 def collect(
@@ -82,7 +94,7 @@ def collect(
 
 
 def _documents(docs: Path) -> dict[str, str]:
-    return {key: section(docs / file, heads, endings) for key, (file, heads, endings) in DOCUMENTS.items()}
+    return {key: section(docs / file, heads, endings) for key, (_, file, heads, endings) in DOCUMENTS.items()}
 
 
 def _variants(folder: Path) -> list[tuple[str, str]]:
@@ -115,12 +127,6 @@ def merged_assumptions(attributes: Mapping[str, Mapping[str, object]]) -> dict[s
         key = where if where not in result else f"{where} ({', '.join(names)})"
         result[key] = (text, tuple(names))
     return result
-
-
-def page(content: Content) -> bytes:
-    """The report, results/report/index.html: one page, images and film inside."""
-    captions = {name: figures.figure(name).title for name in content.images}
-    return html_page(content, captions, assumption_rows(content)).encode()
 
 
 def paper_markdown(content: Content) -> str:
@@ -200,3 +206,155 @@ def _table(name: str, table: Table) -> str:
 def _pipe(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [" | ".join(heads), "|".join("---" for _ in heads), *(" | ".join(row) for row in rows)]
     return "\n".join(f"| {line} |" if "---" not in line else f"|{line}|" for line in lines) + "\n"
+
+
+#: what generated pages put around what they measured
+COMMENT = re.compile(r"<!--.*?-->\s*", re.DOTALL)
+
+
+def section(page: Path, headings: Sequence[str] = (), pictures: Sequence[str] | None = None) -> str:
+    """The text of a page below its title, as HTML; empty where there is no such page.
+
+    headings: only what is below these; "" is what is before the first of them.  pictures: endings of the
+    names of those that are shown; default: all.
+    """
+    note(page)
+    if not page.is_file():
+        return ""
+    parts = _parts(COMMENT.sub("", page.read_text(encoding="utf-8")))
+    text = "\n\n".join(
+        f"### {head}\n\n{body}" if head else body for head, body in parts if not headings or head in headings
+    )
+    return _pictures(_html(text), page.parent, pictures)
+
+
+def _parts(text: str) -> list[tuple[str, str]]:
+    """Heading and text of each section of second level."""
+    pieces = re.split(r"^## (.+)$", re.sub(r"\A# .+\n", "", text), flags=re.MULTILINE)
+    return [("", pieces[0].strip()), *((pieces[k].strip(), pieces[k + 1].strip()) for k in range(1, len(pieces), 2))]
+
+
+def _html(text: str) -> str:
+    from markdown_it import MarkdownIt
+
+    made: str = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
+    # links between pages lead nowhere in one file
+    made = re.sub(r'<a href="(?!https?:|#)[^"]*">(.*?)</a>', r"<i>\1</i>", made, flags=re.DOTALL)
+    made = made.replace("<table>", "<figure><div class='scroll'><table class='sorts'>").replace(
+        "</table>", "</table></div></figure>"
+    )
+    return made
+
+
+def _pictures(text: str, folder: Path, requested: Sequence[str] | None) -> str:
+    def shown(match: re.Match[str]) -> str:
+        name, alt = match[1], match[2]
+        path = folder / name
+        if not path.is_file() or (requested is not None and not name.endswith(tuple(requested))):
+            return ""
+        note(path)
+        data = base64.b64encode(path.read_bytes()).decode()
+        return f"<figure class='plot'><img src='data:image/png;base64,{data}' alt='{alt}'></figure>"
+
+    return re.sub(r'<p>\s*<img src="([^"]+)" alt="([^"]*)"\s*/?>\s*</p>', shown, text)
+
+
+#: the table with a verdict on each statement, and its words
+VERDICTS = "table_verdicts"
+GOOD, BAD = ("holds",), ("does not hold",)
+#: tables that print what the paper gives, the others compare results with it
+GIVEN = ("table01", "table02", "table03", "table04", "table05", "table06")
+
+
+@dataclass(frozen=True, slots=True)
+class Content:
+    """All that the page shows."""
+
+    tables: Mapping[str, Table]
+    assumptions: Mapping[str, tuple[str, tuple[str, ...]]]  #: place -> (text, scenes)
+    images: Mapping[str, bytes]  #: PNG of each figure, by name
+    film: tuple[str, bytes] | None  #: file name and content
+    still: bytes | None
+    views: str  #: HTML of the views that can be turned
+    facts: Mapping[str, Mapping[str, str]]  #: scene -> run attributes
+    documents: Mapping[str, str]  #: of DOCUMENTS -> HTML
+    variants: Sequence[tuple[str, str]]  #: scene and title
+
+
+def html_page(content: Content) -> str:
+    """The report, results/report/index.html: one page, images and film inside."""
+    drawn = "".join(media(f"{name}.png", png, figures.figure(name).title) for name, png in content.images.items())
+    results = [table for name, table in content.tables.items() if name not in (*GIVEN, VERDICTS)]
+    given = [content.tables[name] for name in GIVEN if name in content.tables]
+    files = {f"{name}.csv": as_csv(table).encode() for name, table in content.tables.items()}
+    parts = [
+        Part("verdicts", "The verdict on every statement", _verdicts(content.tables.get(VERDICTS))),
+        Part("film", "The mechanism moving", _film(content)),
+        Part("figures", "Figures", drawn),
+        Part("tables", "Tables", "".join(as_html(table) for table in results)),
+        *(Part(key, heading, content.documents.get(key, "")) for key, (heading, *_) in DOCUMENTS.items()),
+        Part("parameters", "Parameters, as the paper prints them and as they are here", "".join(map(as_html, given))),
+        Part("variants", "Variants", prose(("scene", "what it is"), content.variants)),
+        Part(
+            "assumptions",
+            "Assumptions, the most influential first",
+            prose(("value", "assumption", "scenes"), assumption_rows(content)),
+        ),
+        Part(
+            "discrepancies",
+            "Discrepancies",
+            prose(("place", "matter", "here"), DISCREPANCIES),
+        ),
+        Part("versions", "How it was computed, and by which versions", _versions(content)),
+        Part("downloads", "Downloads", downloads(files)),
+    ]
+    title = "Rod flexibility and joint clearance: the paper, reproduced"
+    return page(title, CITATION, parts, _answer(content)).decode()
+
+
+def _answer(content: Content) -> str:
+    """How many of the paper's statements hold, and which do not; empty without verdicts."""
+    table = content.tables.get(VERDICTS)
+    if table is None:
+        return ""
+    verdict = table.columns.index("verdict")
+    said = [row[verdict] for row in table.rows]
+    counts = "; ".join(f"{_word(word)}: {said.count(word)}" for word in dict.fromkeys(said))
+    lines = [f"<li>Of {len(said)} statements of the paper, judged by rules: {counts}.</li>"]
+    for row in table.rows:
+        if row[verdict] in BAD:
+            section, text, word, numbers = row
+            lines.append(
+                f"<li><i>{html.escape(text)}</i> ({html.escape(section)}): {_word(word)}; {html.escape(numbers)}.</li>"
+            )
+    where = "<a href='#verdicts'>All verdicts</a>, <a href='#tables'>tables next to the paper's</a>"
+    return f"<ul>{''.join(lines)}</ul><p>{where}.</p>"
+
+
+def _word(verdict: str) -> str:
+    look = "good" if verdict in GOOD else "bad" if verdict in BAD else ""
+    return f"<span class='{look}'>{html.escape(verdict)}</span>" if look else html.escape(verdict)
+
+
+def _verdicts(table: Table | None) -> str:
+    if table is None:
+        return ""
+    text = as_html(table, prose=True)
+    for word in dict.fromkeys(row[table.columns.index("verdict")] for row in table.rows):
+        text = text.replace(f"<td>{html.escape(word)}</td>", f"<td>{_word(word)}</td>")
+    return text
+
+
+def _film(content: Content) -> str:
+    shown, caption = "", "Flexible rod and clearance at A1"
+    if content.film is not None:
+        shown = media(*content.film, caption, f"Film of the mechanism: {caption}")
+    elif content.still is not None:
+        shown = media("mechanism.png", content.still, "The mechanism")
+    return shown + content.views
+
+
+def _versions(content: Content) -> str:
+    keys = list(dict.fromkeys(key for facts in content.facts.values() for key in facts))
+    rows = [(f"`{scene}`", *(facts.get(key, "") for key in keys)) for scene, facts in content.facts.items()]
+    return prose(("scene", *keys), rows)

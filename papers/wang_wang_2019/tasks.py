@@ -48,16 +48,13 @@ class Scenes:
         They are seconds of the processor, and so are measured while other tasks run: alone they would be a third of the
         whole report's time, with all other cores idle.
         """
-        if family not in self.times:
-            self.times[family] = self._timing(family)
-        return self.times[family]
-
-    def _timing(self, family: str) -> Task:
+        if family in self.times:
+            return self.times[family]
         files = sorted((DATA / "scenes" / family).glob("*.toml"))
         if not files:
             raise InputError(f"{family}:timing", f"there are no scenes in scenes/{family}")
         graphs = [self.graph(f"{family}/{path.stem}") for path in files]
-        return Task(
+        self.times[family] = Task(
             stage="timing",
             scene=family,
             run="flexclear.papers.wang_wang_2019.timing:run",
@@ -68,6 +65,7 @@ class Scenes:
             folder=f"runs/{family}",
             names={"nc": "timing.nc"},
         )
+        return self.times[family]
 
 
 def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
@@ -83,9 +81,8 @@ def _paper_kernels(graphs: list[Graph]) -> dict[str, Task]:
 def bring(workplace: Workplace) -> Outcome:
     """Bring everything that the report shows, and the page, up to date; what fails is left out of the page."""
     scenes = Scenes()
-    tasks = report_tasks(workplace, scenes)  # records go by the identity of tasks, which must not end before
-    shown = workplace.bring(tasks)
-    graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in shown.records]
+    shown = workplace.bring(report_tasks(workplace, scenes))
+    graphs = [graph for graph in scenes.graphs.values() if graph.simulate in shown.records]
     made = workplace.bring([page_task(workplace, shown.records, graphs)])
     check(made)
     return Outcome({**shown.records, **made.records}, shown.failures)
@@ -116,16 +113,12 @@ def figure_index(workplace: Workplace) -> Mapping[str, Mapping[str, Any]]:
         modules=tuple(dict.fromkeys(module_of(figures.__name__, name) for name in names)),
         folder="",
     )
-    outcome = workplace.bring([task])
-    check(outcome)
-    record = outcome.records[id(task)]
-    index: dict[str, dict[str, Any]] = json.loads(
-        workplace.store.path(task.stage, record.key, "index.json").read_bytes()
-    )
+    (made,) = workplace.made(task)
+    index: dict[str, dict[str, Any]] = json.loads(made.read("index.json"))
     return index
 
 
-def page_task(workplace: Workplace, records: Mapping[int, Record], graphs: list[Graph]) -> Task:
+def page_task(workplace: Workplace, records: Mapping[Task, Record], graphs: list[Graph]) -> Task:
     """The page; it is written again when anything that it shows has changed."""
     return Task(
         stage="report",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -16,13 +16,11 @@ if TYPE_CHECKING:
     from flexclear.pipeline.dynamics.run.progress_rate import Judges
 
 __all__ = [
-    "campbell",
     "cost",
     "ensemble",
     "equilibrium",
     "frequencies",
     "sections",
-    "sensitivities",
     "simulate",
     "simulated",
 ]
@@ -105,7 +103,7 @@ def cost(
     """One run, and what its integration and its recording cost each (`pipeline.dynamics.record.cost.measure`)."""
     from flexclear.pipeline.dynamics.record.cost import measure
 
-    _require_without_events(scene, "the cost of a run")
+    require_without_events(scene, "the cost of a run")
     return measure(scene, bundles, progress, checked=checked, brief=brief)
 
 
@@ -113,7 +111,7 @@ def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     """All members of a scene's ensemble on its regular output times (schema ENSEMBLE)."""
     from flexclear.pipeline.dynamics.record.ensemble import ensemble as run
 
-    _require_without_events(scene, "an ensemble")
+    require_without_events(scene, "an ensemble")
     return run(scene, bundles, progress)
 
 
@@ -121,26 +119,11 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     """A scene whose laws repeat, sampled once in each period (schema SECTIONS)."""
     from flexclear.pipeline.dynamics.record.sections import sections as run
 
-    _require_without_events(scene, "a section of the motion")
+    require_without_events(scene, "a section of the motion")
     return run(scene, bundles, progress)
 
 
-def sensitivities(
-    scene: Scene,
-    bundles: Mapping[str, Labelled],
-    progress: Progress,
-    of: Sequence[str],
-    to: Sequence[str],
-    horizon: float,
-) -> xr.Dataset:
-    """Derivatives of quantities by numbers of a scene (`pipeline.dynamics.sensitivity.dataset`)."""
-    _require_without_events(scene, "derivatives")
-    from flexclear.pipeline.dynamics.sensitivity.dataset import sensitivities as derivatives
-
-    return derivatives(scene, bundles, progress, of, to, horizon)
-
-
-def _require_without_events(scene: Scene, what: str) -> None:
+def require_without_events(scene: Scene, what: str) -> None:
     """InputError for a scene with events, of which there is no such result."""
     from flexclear.pipeline.core.system.errors import InputError
 
@@ -164,12 +147,9 @@ def equilibrium(
     Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium.
     """
     from flexclear.pipeline.dynamics.linear import dataset
-    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as at_rest
-    from flexclear.pipeline.dynamics.linear.steady import steady
+    from flexclear.pipeline.dynamics.linear.equilibrium import balanced
 
-    if not moving:
-        return dataset.equilibrium(*at_rest(scene, bundles, progress, time, drives), moving)
-    bench, rest, _ = steady(scene, bundles, progress, time, drives)
+    bench, rest, _ = balanced(scene, bundles, progress, time, drives, moving)
     return dataset.equilibrium(bench, rest, moving)
 
 
@@ -183,30 +163,8 @@ def frequencies(
 ) -> xr.Dataset:
     """Natural vibrations of the assembled mechanism about `equilibrium` (schema LINEAR); arguments as there."""
     from flexclear.pipeline.dynamics.linear import dataset
-    from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium as at_rest
-    from flexclear.pipeline.dynamics.linear.steady import steady
+    from flexclear.pipeline.dynamics.linear.equilibrium import balanced
     from flexclear.pipeline.dynamics.linear.vibrations import vibrations
 
-    if moving:
-        return dataset.linear(*steady(scene, bundles, progress, time, drives), moving)
-    bench, rest = at_rest(scene, bundles, progress, time, drives)
-    return dataset.linear(bench, rest, vibrations(bench, rest.at), moving)
-
-
-def campbell(
-    scene: Scene,
-    bundles: Mapping[str, Labelled],
-    progress: Progress,
-    speeds: Sequence[float],
-    drive: str | None = None,
-    time: float | None = None,
-    drives: Mapping[str, float] | None = None,
-) -> xr.Dataset:
-    """Vibrations about steady motion over the speed of a drive (schema CAMPBELL).
-
-    speeds: [rad/s, or m/s].  drive: its name; the only one that moves when None.  time, drives: as of `equilibrium`.
-    Raises InputError for a drive that is not there, SolverError where no speed has a steady motion.
-    """
-    from flexclear.pipeline.dynamics.linear.campbell import campbell as over
-
-    return over(scene, bundles, progress, speeds, drive, time, drives)
+    bench, rest, small = balanced(scene, bundles, progress, time, drives, moving)
+    return dataset.linear(bench, rest, small or vibrations(bench, rest.at), moving)

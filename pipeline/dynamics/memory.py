@@ -9,8 +9,8 @@ A kernel's code depends only on the kinds of parts present. Everything else is i
 - ``n`` (integers): what changes while a run continues.
 
 Kernels read and write all of it by the names that are declared here (`fields`).  Python reads the same rows by the
-names of their fields (`named`), and rows of the record by what they hold (`record`).  ``h[m.NV]`` is a size,
-``h[m.FORCE]`` the index in w where a stretch begins, ``h[m.LINKS.place]`` that of a table in its array, and
+names of their fields (`named`), and rows of the record by what they hold (`integrate.recording`).  ``h[m.NV]`` is a
+size, ``h[m.FORCE]`` the index in w where a stretch begins, ``h[m.LINKS.place]`` that of a table in its array, and
 ``m.LINKS.parent`` where a field begins in a row of it.
 
 Arrays are flat, since calls and compilation cost what the arguments cost.  No two overlap, and the compiler knows:
@@ -33,7 +33,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import count
 from math import prod
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -53,6 +53,9 @@ SIZES: dict[str, int] = {}
 STRETCHES: dict[str, int] = {}
 #: single floats of w by the names that kernels use: the index of their stretch in the header, and their offset there
 FLOATS: dict[str, tuple[int, int]] = {}
+#: how much of w there is of stretches and tables, by their indices in the header: numbers in a row, and how many rows
+#: there are, as a sum of products of sizes, of what the method asks for (`Room`) and of the number of columns
+LENGTHS: dict[int, tuple[int, str]] = {}
 #: rows of tables and layouts as NumPy has them, by the class of what declares them
 _ROWS: dict[type, np.dtype[Any]] = {}
 
@@ -62,12 +65,22 @@ def _places(number: int) -> list[int]:
     return [next(_place) for _ in range(number)]
 
 
-def _named(kind: dict[str, int], declared: str) -> list[int]:
-    """The next indices of the header of h, which join those of their kind by name."""
+def _sizes(declared: str) -> list[int]:
+    """The next indices of the header of h, of sizes."""
     names = declared.split()
     places = _places(len(names))
-    kind.update(zip(names, places, strict=True))
+    SIZES.update(zip(names, places, strict=True))
     return places
+
+
+def _stretches(declared: str) -> list[int]:
+    """The next indices of the header of h, of stretches of w: "name:length", or the name where floats fill it."""
+    made = []
+    for name, _, length in (one.partition(":") for one in declared.split()):
+        STRETCHES[name] = place = next(_place)
+        LENGTHS[place] = (1, length)
+        made.append(place)
+    return made
 
 
 def _numbered(declared: str) -> dict[str, int]:
@@ -79,39 +92,33 @@ def _floats(stretch: int, declared: str) -> range:
     """Offsets of named floats in a stretch of w."""
     names = _numbered(declared)
     FLOATS.update({name: (stretch, offset) for name, offset in names.items()})
+    LENGTHS[stretch] = (1, str(len(names)))
     return range(len(names))
 
 
-def _fields(declared: str) -> dict[str, tuple[int, ...]]:
-    """Shapes of the fields of a row: "name", "name:length" or "name:rowsxcolumns"."""
+def layout(declared: str, number: type[np.number[Any]] = np.float64, kind: str = "Layout", **place: int) -> Any:
+    """Where the fields of a row begin, and its `size`, after its place in the header if it is of a table.
+
+    declared: "name", "name:length" or "name:rowsxcolumns" of each field.  number: what its entries are.
+    """
     parts = (field.partition(":") for field in declared.split())
-    return {name: tuple(int(k) for k in shape.split("x")) if shape else () for name, _, shape in parts}
-
-
-def _begins(fields: dict[str, tuple[int, ...]]) -> dict[str, int]:
-    """Where the fields of a row begin, and as `size` how long it is."""
-    ends = np.cumsum([0, *(prod(shape) for shape in fields.values())]).tolist()
-    return dict(zip([*fields, "size"], ends, strict=True))
-
-
-def layout(declared: str) -> Any:
-    """Where the fields of a row begin, and its `size`."""
-    fields = _fields(declared)
+    fields = {name: tuple(int(k) for k in shape.split("x")) if shape else () for name, _, shape in parts}
+    begins = np.cumsum([0, *(prod(shape) for shape in fields.values())]).tolist()
     make: Any = namedtuple
-    kind = make("Layout", [*fields, "size"])
-    _ROWS[kind] = np.dtype([(name, np.float64, shape) for name, shape in fields.items()])
-    return kind(**_begins(fields))
+    made = make(kind, [*place, *fields, "size"])
+    _ROWS[made] = np.dtype([(name, number, shape) for name, shape in fields.items()])
+    return made(*place.values(), *begins)
 
 
-def _table(array: str, declared: str) -> Any:
-    """A table: its `place` (index) in the header, `size` of its rows, and where each field begins."""
-    (index,), fields = _places(1), _fields(declared)
-    make: Any = namedtuple
-    kind = make("Table", ["place", *fields, "size"])
-    table = kind(place=index, **_begins(fields))
+def _table(array: str, declared: str, count: str = "") -> Any:
+    """A table: its `place` (index) in the header, `size` of its rows, and where each field begins.
+
+    count: of rows of a table in w, as `LENGTHS` has it.
+    """
+    table = layout(declared, np.int64 if array == "h" else np.float64, "Table", place=next(_place))
     TABLES[array].append(table)
-    number = np.int64 if array == "h" else np.float64
-    _ROWS[kind] = np.dtype([(name, number, shape) for name, shape in fields.items()])
+    if count:
+        LENGTHS[table.place] = (table.size, count)
     return table
 
 
@@ -120,7 +127,7 @@ wiring, numbers, work = partial(_table, "h"), partial(_table, "f"), partial(_tab
 
 def named(rows: Any, entries: np.ndarray) -> np.ndarray:
     """Entries with named fields, a view; rows of a table or layout follow each other along the last axis."""
-    return entries.view(_ROWS[type(rows)])
+    return entries.view(row_type(rows))
 
 
 def row_type(rows: Any) -> np.dtype[Any]:
@@ -144,14 +151,13 @@ class Room:
     N_PAIRS, N_KNOWN_PAIRS, N_KNOWN_ENTRIES, N_CLOSURE_PAIRS, N_GROUPS, MASS_SIZE, SCHUR_SIZE, JACOBIAN_SIZE,
     MOST_MODES, N_LAWS, N_LOADS, N_INTERNAL, N_SURFACES, N_BODIES, N_FRAMES, N_COMPONENTS, N_GUARDS, N_LOAD_BENDS,
     N_CHANGES, F_CHANGE, W_CHANGE,
-) = _named(
-    SIZES,
+) = _sizes(
     "n_links n_sites n_flex n_closures n_closure_rows n_kept_rows n_contacts n_drives nq nv ny n_ledger n_pairs "
     "n_known_pairs n_known_entries n_closure_pairs n_groups mass_size schur_size jacobian_size most_modes n_laws "
     "n_loads n_internal n_surfaces n_bodies n_frames n_components n_guards n_load_bends n_changes f_change w_change",
 )
 # fmt: on
-_named(SIZES, " ".join(name for effect in EFFECTS for name in effect.sizes))
+_sizes(" ".join(name for effect in EFFECTS for name in effect.sizes))
 #: addresses of compiled functions, zero until the engine writes them (`compile.calls`)
 #: RATES: of what the steps evaluate with, EVALUATE's or what leaves only what they read (`specialise`)
 EVALUATE, PROJECT, RETRACT, PRESCRIBE, DESCRIBE, RATES = ADDRESSES = _places(6)
@@ -245,73 +251,82 @@ BODY_NUMBERS, NAMED_FRAME_NUMBERS = numbers("mass com:3 inertia:6 axes:3x3"), nu
 #: a frame in world axes; the velocity is that of its origin
 _FRAME = "origin:3 axes:3x3 omega:3 velocity:3 alpha:3 acceleration:3"
 FRAME = layout(_FRAME)
-X, U, DU = _named(STRETCHES, "x u du")
+X, U, DU = _stretches("x:nq+n_drives u:nv+n_drives du:nv+n_drives")
 #: as X and U, but of coordinates: those of moving shapes
-INTERFACE_X, INTERFACE_U = _named(STRETCHES, "interface_x interface_u")
-LINK_FRAMES, SITE_FRAMES = work(_FRAME), work(_FRAME)
+INTERFACE_X, INTERFACE_U = _stretches("interface_x:nv interface_u:nv")
+LINK_FRAMES, SITE_FRAMES = work(_FRAME, "n_links"), work(_FRAME, "n_sites")
 #: the motion subspace S of one joint: a twist per freedom, axes of its first frame
-SUBSPACE = work("angular:3 linear:3")
+SUBSPACE = work("angular:3 linear:3", "6")
 #: spatial inertia: mass, mass * centre, inertia about the kernels' origin (xx yy zz xy xz yz); of the link, of its tree
-OWN, INERTIA = work("mass moment:3 inertia:6"), work("mass moment:3 inertia:6")
-WRENCH = work("moment:3 force:3")
-COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3") for _ in range(3))
+OWN, INERTIA = (work("mass moment:3 inertia:6", "n_links") for _ in range(2))
+WRENCH = work("moment:3 force:3", "n_links")
+COLUMNS, MOMENTA, DEFORMATION = (work("angular:3 linear:3", count) for count in ("columns", "columns", "nv"))
 #: of each link, about its origin, which arm leads to from its parent's: what it offers to its parent, inertia as
 #: (turning mixed; mixed^T moving) of twists to wrenches; a wrench; an acceleration; the wrench that its own
 #: accelerations need (`equations.articulated`)
-ARTICULATED = work("turning:6 mixed:3x3 moving:6 moment:3 force:3 angular:3 linear:3 arm:3 own_moment:3 own_force:3")
+ARTICULATED = work(
+    "turning:6 mixed:3x3 moving:6 moment:3 force:3 angular:3 linear:3 arm:3 own_moment:3 own_force:3", "n_links"
+)
 #: of three closure rows at once: what a link transmits to its parent, a column each
-TRANSMITTED = work("moments:3x3 forces:3x3")
+TRANSMITTED = work("moments:3x3 forces:3x3", "n_links")
 #: of each coordinate: its column about its link's origin, and the factor's K
-LOCAL, GAIN = work("angular:3 linear:3"), work("moment:3 force:3")
+LOCAL, GAIN = work("angular:3 linear:3", "nv+n_drives"), work("moment:3 force:3", "nv")
 #: MODAL: P (9n), V (9n), forces on the modes (n), and their spin (3n) as eigenmodes and in the interface basis
-BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _named(
-    STRETCHES, "bias modal_bias modal scratch mass force residual residual_rate gamma"
+BIAS, MODAL_BIAS, MODAL, SCRATCH, MASS, FORCE, RESIDUAL, RESIDUAL_RATE, GAMMA = _stretches(
+    "bias:nv+n_drives modal_bias:nv modal:25*most_modes scratch:18 mass:mass_size force:nv residual:n_closure_rows "
+    "residual_rate:n_closure_rows gamma:n_closure_rows"
 )
 #: wrenches of the closure rows; then, of the couplings, those on their first joints
-ROWS = work("moment:3 force:3")
+ROWS = work("moment:3 force:3", "n_closure_rows+n_couplings")
 #: ROW_SCALE: per selected row the largest diagonal entry of J M^-1 J^T over the accepted steps, then, after
 #: room for all rows, that of the last evaluation, which may be a trial far away
-JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _named(
-    STRETCHES, "jacobian spread schur row_scale pivot multiplier"
+JACOBIAN, SPREAD, SCHUR, ROW_SCALE, PIVOT, MULTIPLIER = _stretches(
+    "jacobian:jacobian_size spread:jacobian_size schur:schur_size row_scale:2*n_closure_rows pivot "
+    "multiplier:n_closure_rows"
 )
 #: per selected row its distance from those before it, at the end of the step, at its start, and the most that it has
 #: been, each with room for all rows; rows of the state's length: the Chebyshev series that leads over a singular pose
-INDEPENDENCE, COLLOCATION = _named(STRETCHES, "independence collocation")
 COLLOCATION_ROWS = 13
+INDEPENDENCE, COLLOCATION = _stretches(f"independence:3*n_closure_rows collocation:{COLLOCATION_ROWS}*ny")
 #: smallest pivot of J M^-1 J^T as fraction of its row's largest diagonal entry (1: rows at right angles, 0:
 #: dependent or nothing): of the last evaluation; below which the stepper asks for other rows
 LAST_PIVOT, WANTED_PIVOT = _floats(PIVOT, "last_pivot wanted_pivot")
-PIVOT_SIZE = 2
 #: what a contact does now; bent: what the bristles store
-TOUCH = work("gap rate normal_force friction_power damping_power stored bent slip force:3 offset:3 point:3")
+TOUCH = work(
+    "gap rate normal_force friction_power damping_power stored bent slip force:3 offset:3 point:3", "n_contacts"
+)
 #: on the closures' second bodies; of an independent mechanism its kinetic energy, potential energy of gravity, and
 #: what bodies, springs and contacts store [J]
-CLOSURE_WRENCH, ENERGY = work("moment:3 force:3"), work("kinetic potential elastic")
-LAW = work("value rate second_rate")
+CLOSURE_WRENCH, ENERGY = work("moment:3 force:3", "n_closures"), work("kinetic potential elastic", "n_components")
+LAW = work("value rate second_rate", "n_laws")
 #: what a load does now: force on b, its moment about the kernels' origin, length or coordinate, its rate, stored
 #: energy, power that it brings in, power that it loses
-LOAD = work("force:3 moment:3 value rate stored power loss")
-LOAD_BENDS = work("now")  # of loads that bend: speeds along their coordinates, arguments of max, min and abs
-INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _named(
-    STRETCHES, "internal drive_force ledger_rate position_rate y y_new y_stage slopes dense memory"
+LOAD = work("force:3 moment:3 value rate stored power loss", "n_loads")
+#: of loads that bend: speeds along their coordinates, arguments of max, min and abs
+LOAD_BENDS = work("now", "n_load_bends")
+INTERNAL, DRIVE_FORCE, LEDGER_RATE, POSITION_RATE, Y, Y_NEW, Y_STAGE, SLOPES, DENSE, MEMORY = _stretches(
+    "internal:n_internal drive_force:n_drives ledger_rate:n_ledger position_rate:nq+n_drives y:ny y_new:ny y_stage:ny "
+    "slopes:slopes*ny dense:dense*ny memory:memory"
 )
-MAGNITUDE, CORRECTION, LATCHED = _named(STRETCHES, "magnitude correction latched")
+MAGNITUDE, CORRECTION, LATCHED = _stretches("magnitude:n_groups correction:nv latched:n_contacts")
 #: what the stepper watches of a contact, at the start (0) and at the end (1) of the step; trend: rate of the force;
 #: slip_rate: rate of the sliding speed, 0 where it is not known; event_row: of its last closing; mode0, latched0: mode
 #: and impact rate that hold within the step
 WATCH = work(
-    "gap0 rate0 force0 slip0 trend0 gap1 rate1 force1 slip1 trend1 event_row mode0 latched0 slip_rate0 slip_rate1"
+    "gap0 rate0 force0 slip0 trend0 gap1 rate1 force1 slip1 trend1 event_row mode0 latched0 slip_rate0 slip_rate1",
+    "n_contacts",
 )
-GUARDED = work("start:3 end:3")  # what guards watch, at the start and at the end of the step
-(CONTROL,) = _named(STRETCHES, "control")
+GUARDED = work("start:3 end:3", "n_guards")  # what guards watch, at the start and at the end of the step
+(CONTROL,) = _stretches("control")
 
 # Tables of effects ---------------------------------------------------------------------------------------------------
 #: by the names that they declare (`effects.effect`); those of effects that a mechanism lacks are empty
 OF_EFFECTS: dict[str, Any] = {}
 for _effect in EFFECTS:
-    for _array, _tables in (("h", _effect.wiring), ("f", _effect.numbers), ("w", _effect.work)):
+    for _array, _tables in (("h", _effect.wiring), ("f", _effect.numbers)):
         OF_EFFECTS |= {name: _table(_array, rows) for name, rows in _tables.items()}
-    _named(STRETCHES, " ".join(_effect.stretches))
+    OF_EFFECTS |= {name: work(rows, number) for name, (number, rows) in _effect.work.items()}
+    _stretches(" ".join(_effect.stretches))
 HEADER = next(_place)
 
 # the ledger before the contacts' slots (three deflections of each contact with bristles come after them):
@@ -346,7 +361,6 @@ OK, NOT_POSITIVE, SINGULAR, NOT_CLOSED, NOT_FINITE, JAMMED = range(6)
     "rejected_step rejected_norm touched_step first tried norm awaited_time",
 )
 # fmt: on
-N_CONTROLS = AWAITED_TIME + 1
 
 # Integers in n -------------------------------------------------------------------------------------------------------
 # report of the last evaluation; where active pieces and modes start in n, and its state in w; whether it left only what
@@ -384,8 +398,7 @@ NAMED: dict[str, Any] = {
 #: where stretches of w, and tables, begin
 INDICES = {f"at_{name}": index for name, index in STRETCHES.items()}
 INDICES |= {f"at_{name}": table.place for name, table in NAMED.items()}
-_ARRAYS = {table.place: array for array, tables in TABLES.items() for table in tables}
-ARRAYS = {name: _ARRAYS[table.place] for name, table in NAMED.items()}
+ARRAYS = {name: array for name, table in NAMED.items() for array in TABLES if table in TABLES[array]}
 #: shapes of fields that are tuples, and how many numbers these have
 TUPLES: dict[tuple[int, ...], int] = {(3,): 3, (3, 3): 9}
 
@@ -405,33 +418,9 @@ ROOM, EVENTS_OF_A_CONTACT = 8, 4
 STEEPLY = 1e300
 
 
-def _record_columns(contacts: int) -> tuple[int, int, int]:
+def columns_of_record(contacts: int) -> tuple[int, int, int]:
     """Where a row of the record has the contacts' modes, their impact rates and the state; its time is first."""
     return 1, 1 + contacts, 1 + 2 * contacts
 
 
-record_columns = kernel(_record_columns)
-
-
-class Record(NamedTuple):
-    """Rows of the record by what they hold, all views.
-
-    time: [s], shape (rows,).  modes, latched: 1 of closed contacts and 0 of open ones, and their impact rates [m/s];
-    shape (rows, contacts).  state: shape (rows, NY).
-    """
-
-    time: np.ndarray
-    modes: np.ndarray
-    latched: np.ndarray
-    state: np.ndarray
-
-
-def record(rows: np.ndarray, contacts: int) -> Record:
-    """Rows of the record, shape (rows, columns), by what they hold."""
-    mode, latched, state = _record_columns(contacts)
-    return Record(rows[:, 0], rows[:, mode:latched], rows[:, latched:state], rows[:, state:])
-
-
-def empty_record(rows: int, contacts: int, ny: int) -> np.ndarray:
-    """Rows of the record, all zero, shape (rows, columns)."""
-    return np.zeros((rows, _record_columns(contacts)[-1] + ny))
+record_columns = kernel(columns_of_record)

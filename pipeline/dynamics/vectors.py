@@ -243,7 +243,7 @@ def turn_symmetric(s, v):
 
 
 @kernel
-def _about(v, a, b):
+def about(v, a, b):
     """The matrix that takes x to x + a v x x + b v x (v x x)."""
     x, y, z = v
     return (
@@ -265,7 +265,7 @@ def exponential(v):
     s = dot(v, v)
     a = 1.0 - s / 6.0 * (1.0 - s / 20.0 * (1.0 - s / 42.0 * (1.0 - s / 72.0 * (1.0 - s / 110.0))))
     b = 0.5 * (1.0 - s / 12.0 * (1.0 - s / 30.0 * (1.0 - s / 56.0 * (1.0 - s / 90.0 * (1.0 - s / 132.0)))))
-    return _about(v, a, b)
+    return about(v, a, b)
 
 
 @kernel
@@ -292,7 +292,7 @@ def tangent_matrix(v):
     """The matrix of `tangent`: x to angular velocity."""
     s = dot(v, v)
     a, b, _, _ = _tangent_series(s)
-    return _about(v, a, b)
+    return about(v, a, b)
 
 
 @kernel

@@ -10,7 +10,6 @@ from concurrent.futures.process import BrokenProcessPool, ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from math import ceil, inf
-from pathlib import Path
 from typing import Any
 
 from flexclear.pipeline.core.artifacts.points import Point
@@ -20,20 +19,18 @@ from flexclear.pipeline.core.workflow.schedule import TICK
 from flexclear.stages.sweeps.sweep_points import source_digest, work
 
 #: seconds of work that are handed out at a time, most points of it, and how much of it waits for each worker
-BATCH_SECONDS, MOST, QUEUED = 0.5, 1000, 2
+BATCH_SECONDS, MOST_POINTS, QUEUED = 0.5, 1000, 2
 #: towards the end less is handed out, a fraction of what is left, so that all workers finish together; least seconds of
 #: it
-LEAST = 0.02
+LEAST_SECONDS = 0.02
 #: evaluations of a point from which on it is run together with others, and of all that wait, for which code is made
-WORTH, WORTH_CODE = 5_000, 5_000_000
+WORTH_TOGETHER, WORTH_CODE = 5_000, 5_000_000
 #: so many, where each worker has as many, and seconds of work of several times as many: fewer wait for their last ones
-ABREAST, BATCH_SECONDS_TOGETHER = 8, 5.0
+POINTS_TOGETHER, BATCH_SECONDS_TOGETHER = 8, 5.0
 #: more seconds where many workers would ask for work more often than a scheduler can give it: so many for each of them
 PER_WORKER = 5e-3
-#: points that take longer [s] keep their unfinished work; of others nothing is worth the writing
-LONG = 5.0
 #: seconds in which a scheduler must have answered
-PATIENCE = 10.0
+SCHEDULER_TIMEOUT = 10.0
 #: seconds after which a cluster is asked again how many workers it has
 LOOK = 5.0
 #: how often in a row processes of this machine may be lost before it is for good
@@ -42,18 +39,17 @@ LOSSES = 3
 
 @dataclass(frozen=True)
 class Job:
-    """A point to be run. family: its key; point: path in the scene -> value; journal: where it keeps its work."""
+    """A point to be run. family: its key; point: path in the scene -> value."""
 
     key: str
     family: str
     point: dict[str, Any]
-    journal: Path
 
 
 Done = Callable[[Sequence[tuple[Job, Point]], float], None]
 Points = list[dict[str, Any]]
-#: gives `stages.sweeps.sweep_points.work` to whoever does it, with its first six arguments
-Submit = Callable[[str, bytes, Points, bool, Sequence[Path | None], bool], Future[Any]]
+#: gives `stages.sweeps.sweep_points.work` to whoever does it, with its first five arguments
+Submit = Callable[[str, bytes, Points, bool, bool], Future[Any]]
 
 
 @dataclass(frozen=True)
@@ -75,18 +71,17 @@ class Engine:
         dying, StoppedError when all is to stop.
         """
         waiting, running, pace, lost = _by_family(jobs), dict[Future[Any], list[Job]](), 0.0, 0
-        evaluations, abreast = 0.0, False  # of the points that were finished last; whether code is made for several
+        evaluations, together = 0.0, False  # of the points that were finished last; whether code is made for several
         while waiting or running:
             stopping.check()
             # nothing is compiled twice: until the first point is there nothing else begins
             width = self.width()
             while waiting and len(running) < (QUEUED * width if pace else 1):
                 left = sum(map(len, waiting))
-                enough = abreast or (left >= ABREAST * width and left * evaluations >= WORTH_CODE)
-                abreast = evaluations >= WORTH and enough
-                mine = _take(waiting, _portion(left, pace, width, abreast) if pace else 1)
-                keep = self.here and not 0.0 < pace < LONG
-                running[self._given(mine, families, alone=not pace, keep=keep, abreast=abreast)] = mine
+                enough = together or (left >= POINTS_TOGETHER * width and left * evaluations >= WORTH_CODE)
+                together = evaluations >= WORTH_TOGETHER and enough
+                mine = _take(waiting, _portion(left, pace, width, together) if pace else 1)
+                running[self._given(mine, families, alone=not pace, together=together)] = mine
             finished, _ = wait(running, timeout=TICK, return_when=FIRST_COMPLETED)
             for future in finished:
                 mine = running.pop(future)
@@ -108,13 +103,10 @@ class Engine:
                 first, lost = not pace, 0  # what the first one took held compiling and fetching
                 pace = max(1e-6, seconds / len(mine)) if not first else BATCH_SECONDS / 2.0
 
-    def _given(
-        self, mine: list[Job], families: dict[str, bytes], *, alone: bool, keep: bool, abreast: bool
-    ) -> Future[Any]:
+    def _given(self, mine: list[Job], families: dict[str, bytes], *, alone: bool, together: bool) -> Future[Any]:
         family, points = mine[0].family, [job.point for job in mine]
-        journals = [job.journal if keep else None for job in mine]
         try:
-            return self.submit(family, families[family], points, alone, journals, abreast)
+            return self.submit(family, families[family], points, alone, together)
         except (BrokenProcessPool, ConnectionError, EOFError) as error:  # the others: of one killed while it starts
             if not self.here:
                 raise
@@ -131,19 +123,19 @@ def _by_family(jobs: Sequence[Job]) -> list[list[Job]]:
     return [list(reversed(mine)) for mine in reversed(families.values())]
 
 
-def _portion(left: int, pace: float, width: int, abreast: bool) -> int:
+def _portion(left: int, pace: float, width: int, together: bool) -> int:
     """Points that are handed out at a time. left: those that wait; pace: seconds of each.
 
-    abreast: whether they are run side by side; of few, most would wait for the last one.
+    together: whether they are run side by side; of few, most would wait for the last one.
     """
     asking = PER_WORKER * width
-    seconds_of_work = BATCH_SECONDS_TOGETHER if abreast else BATCH_SECONDS
-    seconds = min(max(seconds_of_work, asking), max(LEAST, asking, left * pace / (QUEUED * width)))
-    if abreast and left < ABREAST * width:  # the last ones
-        return max(ABREAST // 2, ceil(left / width))
-    if abreast:
-        return ABREAST * min(MOST // ABREAST, max(1, round(seconds / pace / ABREAST)))
-    return min(MOST, max(1, int(seconds / pace)))
+    seconds_of_work = BATCH_SECONDS_TOGETHER if together else BATCH_SECONDS
+    seconds = min(max(seconds_of_work, asking), max(LEAST_SECONDS, asking, left * pace / (QUEUED * width)))
+    if together and left < POINTS_TOGETHER * width:  # the last ones
+        return max(POINTS_TOGETHER // 2, ceil(left / width))
+    if together:
+        return POINTS_TOGETHER * min(MOST_POINTS // POINTS_TOGETHER, max(1, round(seconds / pace / POINTS_TOGETHER)))
+    return min(MOST_POINTS, max(1, int(seconds / pace)))
 
 
 def _take(waiting: list[list[Job]], count: int) -> list[Job]:
@@ -202,7 +194,7 @@ def _cluster(address: str) -> Iterator[Engine]:
     stack = ExitStack()
     stack.enter_context(_quiet("distributed"))
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
         stack.callback(client.close)
     except (OSError, ValueError, TimeoutError) as error:
         stack.close()
@@ -276,7 +268,9 @@ def _threads(client: Any, where: str) -> int:
         failed = {worker: error for worker, error in digests.items() if isinstance(error, Exception)}
         if not failed:
             break
-        end = min(end, now() + PATIENCE)  # from the first failure on: the check itself may have waited for a worker
+        end = min(
+            end, now() + SCHEDULER_TIMEOUT
+        )  # from the first failure on: the check itself may have waited for a worker
         if now() > end:
             worker, error = next(iter(failed.items()))
             raise ResourceError(f"{where}: worker {worker} does not answer ({error}); is its memory full?")

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 SUFFIX = ".zarr"
 #: a dataset in one file is in memory so many times: points, arrays, the bytes of the file, and what is read back
-HELD = 4.0
+TIMES_IN_MEMORY = 4.0
 #: bytes of a slab; batches of points in memory while slabs are put together
 SLAB, BATCHES = 1 << 26, 8
 INSTALL = "pip install 'flexclear[zarr]'"
@@ -43,8 +43,8 @@ def is_large(plan: Plan) -> bool:
 
     Raises ResourceError where it cannot be written in slabs either.
     """
-    allowed = plan.scene.limits.memory or machine.FRACTION * machine.memory()
-    need = HELD * plan_size(plan)
+    allowed = plan.scene.limits.memory or machine.ALLOWED_FRACTION * machine.memory()
+    need = TIMES_IN_MEMORY * plan_size(plan)
     if need > allowed and find_spec("zarr") is None:
         machine.require_memory(need, "the sweep's dataset", f"keep less, or {INSTALL}: it is then on disk", allowed)
     return need > allowed
@@ -53,7 +53,7 @@ def is_large(plan: Plan) -> bool:
 def require_small(plan: Plan) -> None:
     """ResourceError for a dataset that is to be returned, and does not fit."""
     remedy = "keep less, or make it by `flexclear sweep FILE`, which leaves it on disk"
-    machine.require_memory(HELD * plan_size(plan), "the sweep's dataset", remedy, plan.scene.limits.memory)
+    machine.require_memory(TIMES_IN_MEMORY * plan_size(plan), "the sweep's dataset", remedy, plan.scene.limits.memory)
 
 
 def plan_size(plan: Plan) -> float:

@@ -177,7 +177,7 @@ def _check_values(base: Scene, made: Design, where: str) -> None:
     """InputError for a value that the scene does not take; of many points of a sample the extreme ones are examined.
 
     In a grid each value is next to the first ones of the others: what some combinations mean for the mechanism is
-    found when they are run.
+    known when they are run.
     """
     points = made.points()
     try:
@@ -282,7 +282,7 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
     modules = _modules(requested)
     families = {}
     for text, graph in graphs.items():
-        records = {name: outcome.records[id(task)] for name, task in graph.simulate.inputs.items()}
+        records = {name: outcome.records[task] for name, task in graph.simulate.inputs.items()}
         sections = any(one.reduction == "sections" for one in requested.recorded)
         simulate = simulation.params(graph.scene, sections=sections)
         task = Task(
@@ -310,8 +310,7 @@ def prepare(requested: Plan, workplace: Workplace) -> Plan:
         family = families[text].key
         # what decides the bodies is in the family's scene, whose bodies are numbers by now
         rest = {name: value for name, value in point.items() if name not in own}
-        name, (stage, _) = _point_key(family, point), families[text].folder
-        jobs.append(Job(name, family, rest, workplace.store.path(stage, name, "part").with_suffix("")))
+        jobs.append(Job(_point_key(family, point), family, rest))
     return replace(requested, families=tuple(families.values()), jobs=tuple(jobs))
 
 

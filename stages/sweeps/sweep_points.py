@@ -7,12 +7,10 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.core.workflow import journal
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,15 +59,13 @@ def work(
     packed: bytes,
     points: Sequence[Mapping[str, Any]],
     alone: bool,
-    journals: Sequence[Path | None] = (),
-    abreast: bool = False,
+    together: bool = False,
     sources: str = "",
 ) -> tuple[list[Point], float]:
     """Points of a family, and the processor time that they took [s].
 
     packed: the pickled `Family`.  points: path in the scene -> value.  alone: whether no other worker is busy.
-    journals: of each point, where it keeps its unfinished work (`folder/key`), if it does; none by default.
-    abreast: whether they are worth to be run side by side; no point depends on it.
+    together: whether they are evaluated together; no point depends on it.
     sources: digest of those of who asks, where that is on another machine; InputError where this one has others, as
     of a worker that has joined since.
     """
@@ -80,41 +76,30 @@ def work(
 
     if sources and sources != source_digest():
         raise InputError("--scheduler", "a worker runs other sources of flexclear", "install the same ones there")
-    cores.tell(alone)
+    cores.set_idle(alone)
     threadpool_limits(1)  # whoever loaded NumPy first, with however many threads
     scene, runner = _opened(key, packed)
-    begun, own = time.process_time(), list(journals or [None] * len(points))
-    if not abreast:
-        results = [_point(runner, scene, point, where) for point, where in zip(points, own, strict=True)]
-    else:
-        results = _abreast(runner, scene, points, own)
-    for where in filter(None, own):
-        journal.remove(where)
+    begun = time.process_time()
+    results = _together(runner, scene, points) if together else [_point(runner, scene, point) for point in points]
     return results, time.process_time() - begun
 
 
-def _abreast(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]], own: list[Path | None]) -> list[Point]:
-    """Points side by side, each in a thread, where that can be."""
+def _together(runner: Runner, scene: Scene, points: Sequence[Mapping[str, Any]]) -> list[Point]:
+    """Points concurrently, each in a thread, where that can be."""
     from flexclear.pipeline.core.workflow.cores import side_by_side
 
     places = runner.abreast(scene, len(points))
 
     def one(k: int, alive: Progress) -> Point:
         with places.place() if places else nullcontext() as where:
-            return _point(runner, scene, points[k], own[k], where, alive)
+            return _point(runner, scene, points[k], where, alive)
 
     return side_by_side(one, len(points), lambda _: None, places.seats if places else 1)
 
 
 def _point(
-    runner: Runner,
-    scene: Scene,
-    point: Mapping[str, Any],
-    own: Path | None,
-    where: Place | None = None,
-    alive: Progress = silent,
+    runner: Runner, scene: Scene, point: Mapping[str, Any], where: Place | None = None, alive: Progress = silent
 ) -> Point:
-    """A point; what it has done so far, also when it is done, is stored where it has a journal."""
     from flexclear.pipeline.core.scene.load import with_numbers
     from flexclear.pipeline.core.system.errors import InputError
 
@@ -122,12 +107,7 @@ def _point(
         edited = with_numbers(scene, point)
     except InputError as error:
         return Point({}, {}, {}, 0, str(error))
-    if own is None:
-        return runner.run(edited, where, alive)
-    with journal.storage(own.parent, own.name) as storage:
-        result = runner.run(edited, where, alive)
-        storage.write()  # others of its batch may take long
-        return result
+    return runner.run(edited, where, alive)
 
 
 @cache

@@ -1,7 +1,5 @@
 """Rods as finite elements, taken apart into planes: recipes, and frequencies with the ends held."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -38,17 +36,23 @@ def build(**changes: Any) -> xr.Dataset:
     return kind.build(RECIPE | changes)
 
 
-def held_system(rod: xr.Dataset, motions: tuple[int, ...], ends: str) -> tuple[np.ndarray, np.ndarray]:
-    """Dense stiffness and mass of some motions of the section, ends held as the two letters say."""
-    found = beam.assemble(rod)
-    kept = np.isin(found.component, motions)
-    for node, letter in zip((0, rod.sizes["node"] - 1), ends, strict=True):
+def held_rows(system: beam.Beam, motions: tuple[int, ...], ends: str) -> np.ndarray:
+    """Which unknowns of some motions of the section remain, ends held as the two letters say; shape (size,), bool."""
+    remain = np.isin(system.component, motions)
+    for start, letter in zip((0, system.nodal_size - 6), ends, strict=True):
         for k in HELD[letter]:
             if k < len(motions):
-                kept[6 * node + motions[k]] = False
-    K, M = (beam.in_rod_axes(found, matrix.toarray()) for matrix in (found.stiffness, found.mass))
-    K, M = (beam.in_rod_axes(found, matrix.T).T for matrix in (K, M))
-    return K[np.ix_(kept, kept)], M[np.ix_(kept, kept)]
+                remain[start + motions[k]] = False
+    return remain
+
+
+def held_system(rod: xr.Dataset, motions: tuple[int, ...], ends: str) -> tuple[np.ndarray, np.ndarray]:
+    """Dense stiffness and mass of some motions of the section, ends held as the two letters say."""
+    system = beam.assemble(rod)
+    rows = held_rows(system, motions, ends)
+    K, M = (beam.in_rod_axes(system, matrix.toarray()) for matrix in (system.stiffness, system.mass))
+    K, M = (beam.in_rod_axes(system, matrix.T).T for matrix in (K, M))
+    return K[np.ix_(rows, rows)], M[np.ix_(rows, rows)]
 
 
 def frequencies(rod: xr.Dataset, motions: tuple[int, ...], ends: str, count: int) -> np.ndarray:
@@ -56,6 +60,17 @@ def frequencies(rod: xr.Dataset, motions: tuple[int, ...], ends: str, count: int
     rigid = RIGID.get(ends, 0) if len(motions) == 2 else int(ends == "FF")
     values = scipy.linalg.eigvalsh(*held_system(rod, motions, ends))
     return np.sqrt(values[rigid : rigid + count]) / (2.0 * np.pi)
+
+
+def lowest(rod: xr.Dataset, start: str, end: str, count: int | None) -> np.ndarray:
+    """The lowest elastic frequencies [Hz] of all motions together, dofs at both ends held by their digits (of
+    ux uy uz rx ry rz); all frequencies without a count."""
+    system = beam.assemble(rod)
+    held = [int(d) for d in start] + [system.nodal_size - 6 + int(d) for d in end]
+    free = np.setdiff1d(np.arange(system.size), held)
+    K, M = (matrix.toarray()[np.ix_(free, free)] for matrix in (system.stiffness, system.mass))
+    rigid = 0 if held else 6
+    return np.sqrt(scipy.linalg.eigvalsh(K, M)[rigid:][:count]) / (2.0 * np.pi)
 
 
 def order(elements: list[int], errors: np.ndarray) -> np.ndarray:

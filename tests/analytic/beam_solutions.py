@@ -1,7 +1,5 @@
 """Exact solutions of uniform rods, written down independently of the package's own closed forms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -46,8 +44,7 @@ def rayleigh_frequencies(rod: Rod, ends: str, count: int) -> np.ndarray:
     ends: two letters, one per end: C clamped, F free, P pinned.  Solution: v = a cos + b sin + c cosh + d sinh
     with E I v'''' + rho I w^2 v'' - rho A w^2 v = 0, shear force E I v''' + rho I w^2 v'.
     """
-    root = _scan(lambda omega: _determinant(rod, ends, omega), _start(rod), count)
-    return np.array(root) / (2.0 * np.pi)
+    return scan(lambda omega: _determinant(rod, ends, omega), _start(rod), count) / (2.0 * np.pi)
 
 
 def _start(rod: Rod) -> float:
@@ -56,7 +53,8 @@ def _start(rod: Rod) -> float:
     return float((1.2 / rod.length) ** 2 * speed)
 
 
-def _scan(function: Callable[[float], float], start: float, count: int) -> list[float]:
+def scan(function: Callable[[float], float], start: float, count: int) -> np.ndarray:
+    """Roots by sign changes, 1 % apart, from `start` on; shape (count,)."""
     roots: list[float] = []
     low = start
     while len(roots) < count:
@@ -64,7 +62,7 @@ def _scan(function: Callable[[float], float], start: float, count: int) -> list[
         if function(low) * function(high) < 0.0:
             roots.append(float(brentq(function, low, high, rtol=1e-14)))
         low = high
-    return roots
+    return np.array(roots)
 
 
 def _determinant(rod: Rod, ends: str, omega: float) -> float:

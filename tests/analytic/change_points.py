@@ -4,8 +4,6 @@ Each has a closed form: of the four-bar the loop equation, whose elbow changes i
 which all bars lie in one line; of the in-line slider-crank (Scott-Russell's) x = 2 r cos(crank).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.integrate import solve_ivp
 

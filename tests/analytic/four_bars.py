@@ -3,8 +3,6 @@
 `python -m tests.analytic.four_bars` writes the scenes again.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

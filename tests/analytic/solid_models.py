@@ -1,7 +1,5 @@
 """Recipes of small solids for the tests."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -6,8 +6,6 @@ is the number of negative eigenvalues of the whole, as long as no piece resonate
 pieces do not (Wittrick & Williams 1971, Q. J. Mech. Appl. Math. 24, 263-284).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

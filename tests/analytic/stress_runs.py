@@ -1,7 +1,5 @@
 """Runs with recorded section forces, straight from the engine."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import xarray as xr

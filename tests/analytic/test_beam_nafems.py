@@ -1,18 +1,17 @@
 """Published benchmarks of beams, NAFEMS FV4 and FV5, from the recipes in meshes/checks; FV2 is with the turned rods."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
-import scipy.linalg
+import xarray as xr
 
 from flexclear.pipeline.structure.closed_form import frequencies as closed_form
 from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.kinds import kind
+from tests.analytic.beam_models import lowest
 from tests.analytic.stepped_rods import Lump, Piece, frequencies
 
 CHECKS = Path(__file__).parents[2] / "meshes" / "checks"
@@ -46,17 +45,12 @@ FV5_AXIAL, FV5_TORSION = 125.0, (71.20190684568453, 213.60572053705363)
 FV5_TARGET = (42.65, 42.65, 71.2, 125.0, 148.15, 148.15, 213.61, 283.47, 283.47)
 
 
-def lowest(recipe: dict[str, object], start: str, end: str, count: int | None) -> np.ndarray:
-    """Frequencies [Hz] with dofs held at both ends, by their digits; all of them without a count."""
-    found = beam.assemble(kind.build(recipe))
-    held = [int(d) for d in start] + [found.nodal_size - 6 + int(d) for d in end]
-    free = np.setdiff1d(np.arange(found.size), held)
-    K, M = (matrix.toarray()[np.ix_(free, free)] for matrix in (found.stiffness, found.mass))
-    return np.sqrt(scipy.linalg.eigvalsh(K, M)[:count]) / (2.0 * np.pi)
+def fv4(**changes: object) -> xr.Dataset:
+    return kind.build(read_recipe(CHECKS / "nafems_fv4.toml") | changes)
 
 
-def fv4(**changes: object) -> dict[str, object]:
-    return read_recipe(CHECKS / "nafems_fv4.toml") | changes
+def fv5(**changes: object) -> xr.Dataset:
+    return kind.build(read_recipe(CHECKS / "nafems_fv5.toml") | changes)
 
 
 def fv4_exact(theory: str) -> np.ndarray:
@@ -71,7 +65,7 @@ def fv4_exact(theory: str) -> np.ndarray:
 
 
 def test_fv4_five_elements_meet_the_published_targets() -> None:
-    found = lowest(read_recipe(CHECKS / "nafems_fv4.toml"), "012345", "", 6)
+    found = lowest(fv4(), "012345", "", 6)
     np.testing.assert_allclose(found, FV4_TARGET, rtol=0.01)
 
 
@@ -105,12 +99,12 @@ def test_fv4_is_exact_to_a_hundredth_of_a_percent(theory: str) -> None:
 
 
 def test_fv5_deep_beam_has_the_exact_frequencies() -> None:
-    found = lowest(read_recipe(CHECKS / "nafems_fv5.toml"), "0123", "12", 9)
+    found = lowest(fv5(), "0123", "12", 9)
     expected = np.sort(np.concatenate([np.repeat(FV5_BENDING, 2), [FV5_AXIAL], FV5_TORSION]))
     # St. Venant's constant has four digits there; the third mode of 8 elements is (3 pi / 8)^4 / 1440 = 1.3e-3 high
     # without shear and less with it
     np.testing.assert_allclose(found, expected, rtol=1e-3)
-    fine = lowest(read_recipe(CHECKS / "nafems_fv5.toml") | {"elements": 24}, "0123", "12", 9)
+    fine = lowest(fv5(elements=24), "0123", "12", 9)
     np.testing.assert_allclose(fine, expected, rtol=1e-4)
     # the published targets are up to 0.4 % above the exact values
     np.testing.assert_allclose(fine, FV5_TARGET, rtol=0.005)

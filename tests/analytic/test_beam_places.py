@@ -1,7 +1,5 @@
 """A rod is the same rod wherever it lies: poses, far from the origin, and rods joined to a frame."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Recipes of beams that are wrong: one clear message each, with the place and what to do."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import pytest

@@ -1,22 +1,18 @@
 """Tapered rods against the closed forms of cones and wedges, whose sections the elements must not make a staircase."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.optimize import brentq
 from scipy.special import iv, jv, kv, yv
 
 from flexclear.pipeline.structure.fe import beam
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes.solution import solve
 from tests.analytic.beam_models import BENDING, BENDING_Z, EXTENSION, RECIPE, TORSION, frequencies, order
-from tests.analytic.beam_solutions import PAPER_ROD
+from tests.analytic.beam_solutions import PAPER_ROD, scan
 
 E, G, RHO, L = PAPER_ROD.youngs_modulus, PAPER_ROD.shear_modulus, PAPER_ROD.density, PAPER_ROD.length
 #: thick and thin end [m]
@@ -33,18 +29,6 @@ WEDGE = (
 
 def taper(sections: tuple[dict[str, Any], dict[str, Any]], elements: int, **changes: Any) -> xr.Dataset:
     return kind.build(RECIPE | {"elements": elements, "section": sections[0], "end_section": sections[1]} | changes)
-
-
-def lowest_roots(function: Callable[[float], float], start: float, count: int) -> np.ndarray:
-    """Roots in omega by sign changes, 1 % apart."""
-    roots: list[float] = []
-    low = start
-    while len(roots) < count:
-        high = 1.01 * low
-        if function(low) * function(high) < 0.0:
-            roots.append(float(brentq(function, low, high, rtol=1e-13)))
-        low = high
-    return np.array(roots)
 
 
 def bending(n: int, ratio: float, ends: str, count: int) -> np.ndarray:
@@ -65,7 +49,7 @@ def bending(n: int, ratio: float, ends: str, count: int) -> np.ndarray:
         matrix /= np.abs(matrix).max(axis=0)
         return float(np.linalg.det(matrix / np.abs(matrix).max(axis=1)[:, None]))
 
-    return lowest_roots(determinant, 0.3 * math.sqrt(ratio) * NEAR / L**2, count) / (2.0 * np.pi)
+    return scan(determinant, 0.3 * math.sqrt(ratio) * NEAR / L**2, count) / (2.0 * np.pi)
 
 
 def _derivative(n: int, m: int, k: float, x: float) -> np.ndarray:
@@ -89,7 +73,7 @@ def waves(p: float, speed: float, ends: str, count: int) -> np.ndarray:
             rows.append([jv(p + step, q * x), yv(p + step, q * x)])
         return float(np.linalg.det(np.array(rows)))
 
-    return lowest_roots(determinant, 0.2 * speed / L, count) / (2.0 * np.pi)
+    return scan(determinant, 0.2 * speed / L, count) / (2.0 * np.pi)
 
 
 @pytest.mark.parametrize("ends", ["CF", "FC", "CC", "PP", "FF"])

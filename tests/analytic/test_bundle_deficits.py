@@ -1,7 +1,5 @@
 """What a bundle says that it lacks: shares, bounds and warnings against direct solutions of the full model."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Bushings against closed forms: coupled plane motion, natural frequencies, and torque as the slope of the energy."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -10,9 +8,8 @@ from scipy.linalg import expm
 
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
-from tests.analytic.linear_runs import frequencies
-from tests.analytic.mechanism_runs import run
-from tests.properties.mechanisms import scene, simulate
+from tests.analytic.mechanism_runs import frequencies, run
+from tests.properties.mechanisms import rigid, scene, simulate
 
 K = np.array([[2000.0, 300.0, 10.0], [300.0, 1500.0, -20.0], [10.0, -20.0, 4.0]])
 C = np.diag([8.0, 6.0, 0.02])
@@ -89,11 +86,8 @@ def turning(speed: list[float], stiffness: list[float], end: float, **more: obje
     mount = {"type": "bushing", "between": ["ground.o", "b.o"], "stiffness": stiffness, **more}
     bodies = {
         "ground": {"type": "ground", "frames": {"o": {}}},
-        "b": {
-            "type": "rigid", "mass": 1.0, "inertia": [0.01] * 3, "pose": {}, "angular_velocity": speed,
-            "frames": {"o": {}},
-        },
-    }  # fmt: skip
+        "b": rigid(1.0, 0.01, {"o": {}}, pose={}, angular_velocity=speed),
+    }
     return scene(bodies, {}, end, load={"mount": mount})
 
 

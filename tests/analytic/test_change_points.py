@@ -3,8 +3,6 @@
 Compared with the smooth branch of the loop equations, and for free motion with energy and with one equation of motion.
 """
 
-from __future__ import annotations
-
 import re
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Diagnostics of chaos on systems of known nature: maps, a flow with a published exponent, a linear oscillator."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

@@ -1,7 +1,5 @@
 """Sarrus' and Bennett's linkages, Watt's governor, a flexible slider-crank: against derivations of their own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

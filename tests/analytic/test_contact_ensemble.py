@@ -1,7 +1,5 @@
 """Ensembles from scene to statistics: members that start a known distance apart, falling in closed form."""
 
-from __future__ import annotations
-
 import itertools
 import threading
 from functools import cache
@@ -27,6 +25,8 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engines
 from flexclear.pipeline.post import derive
 from tests.analytic.mechanism_runs import TREE, run
+from tests.properties.mechanisms import joint, rigid
+from tests.properties.mechanisms import scene as written
 from tests.reference import contact_solutions as exact
 
 END, SEPARATION, MEMBERS = 0.3, 1e-6, 4
@@ -169,30 +169,17 @@ def test_statistics_of_the_members_are_in_the_post_artifact() -> None:
 def carried(**path: Any) -> Scene:
     """A ball in the socket of a block that swings along a rail on a path, for which the rail's force is asked."""
     swing = {"type": "harmonic", "amplitude": 0.01, "frequency": 10.0}
-    return Scene.model_validate(
-        {
-            "title": "carried ball",
-            "time": {"end": 0.06},
-            "output": {"interval": 1e-3},
-            "ensemble": {"members": 2, "perturbation": 1e-9},
-            "body": {
-                "ground": {"type": "ground", "frames": {"rail": ALONG_X}},
-                "block": {"type": "rigid", "mass": 1.0, "inertia": [1e-3] * 3, "frames": {"rail": ALONG_X, "cup": {}}},
-                "ball": {"type": "rigid", "mass": 0.1, "inertia": [1e-5] * 3, "frames": {"centre": {}}},
-            },
-            "joint": {
-                "rail": {"type": "prismatic", "between": ["ground.rail", "block.rail"]},
-                "cup": {
-                    "type": "clearance-spherical",
-                    "between": ["block.cup", "ball.centre"],
-                    "clearance": 1e-3,
-                    "ball_radius": 0.01,
-                    "normal": {"law": "lankarani-nikravesh", "restitution": 0.9, "stiffness": 1e9},
-                },
-            },
-            "drive": {"path": {"frame": "block.cup", "position": {"x": swing}} | path},
-        }
-    )
+    bodies = {
+        "ground": {"type": "ground", "frames": {"rail": ALONG_X}},
+        "block": rigid(1.0, 1e-3, {"rail": ALONG_X, "cup": {}}),
+        "ball": rigid(0.1, 1e-5, {"centre": {}}),
+    }
+    normal = {"law": "lankarani-nikravesh", "restitution": 0.9, "stiffness": 1e9}
+    cup = joint("clearance-spherical", "block.cup", "ball.centre", clearance=1e-3, ball_radius=0.01, normal=normal)
+    more = {"output": {"interval": 1e-3}, "solver": {}, "ensemble": {"members": 2, "perturbation": 1e-9}}
+    more["drive"] = {"path": {"frame": "block.cup", "position": {"x": swing}} | path}
+    joints = {"rail": joint("prismatic", "ground.rail", "block.rail"), "cup": cup}
+    return Scene.model_validate(written(bodies, joints, 0.06, **more))
 
 
 def test_members_of_an_actuated_scene_are_driven_like_its_run() -> None:

@@ -1,7 +1,5 @@
 """Events that are easily missed: grazing, simultaneous and resting contacts, short stops of the sliding."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,14 +8,10 @@ import xarray as xr
 
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.dynamics import simulate
-from tests.analytic.mechanism_runs import Overrides, run
+from tests.analytic.mechanism_runs import Overrides, of_kind, run
 
 BOUNCE, ROLLING = "checks/bounce", "checks/socket_rolling"
 CLEARANCE, GRAVITY, MASS, STIFFNESS = 0.1, 9.81, 1.0, 1e8
-
-
-def of_kind(dataset: xr.Dataset, kind: str) -> np.ndarray:
-    return np.flatnonzero(dataset.event_kind.values == kind)
 
 
 def thrown_up(beyond: float) -> xr.Dataset:

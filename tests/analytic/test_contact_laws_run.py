@@ -1,18 +1,15 @@
 """Normal laws and their events in the engine: a ball thrown at the wall of a wide socket."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
-import xarray as xr
 from pydantic import TypeAdapter
 
 from flexclear.pipeline.core.scene.solver import Solver
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics.run.ledger import usual
-from tests.analytic.mechanism_runs import Overrides, impacts, run
+from tests.analytic.mechanism_runs import Overrides, impacts, of_kind, run
 from tests.reference import contact_solutions as exact
 
 BOUNCE = "checks/bounce"
@@ -35,10 +32,6 @@ KNOWN = [
 
 def normal(**law: object) -> Overrides:
     return (*FREE, ("joint.contact.normal", (("stiffness", STIFFNESS), *law.items())))
-
-
-def of_kind(dataset: xr.Dataset, kind: str) -> np.ndarray:
-    return np.flatnonzero(dataset.event_kind.values == kind)
 
 
 def test_falling_ball_bounces_as_the_reference_says() -> None:
@@ -150,23 +143,6 @@ def test_linear_law_rebounds_as_asked_and_never_pulls(asked: float) -> None:
     known = SPEED * math.sqrt(MASS / STIFFNESS) * math.sqrt(asked)
     assert np.nanmax(dataset.event_peak_penetration) == pytest.approx(known, rel=1e-7)
     assert abs(float(dataset.energy_error[-1])) <= 1e-9
-
-
-def test_impulse_of_an_impact_is_the_change_of_momentum() -> None:
-    overrides = (*FREE[:2], ("time.end", "0.146 s"), ("output.interval", "0.2 us"), ("time.start", "0.0 s"))
-    dataset = run(BOUNCE, (*overrides, ("joint.contact.normal.restitution", 0.9)))
-    time, force = dataset.time.values, dataset.contact_force.values[:, 0]
-    impulse = np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(time)[:, None], axis=0)
-    momentum = MASS * dataset.velocity.sel(body="ball").values
-    # between two steps of a pulse of 2.2 ms the force comes from the dense output, whose order is one less: 2e-6
-    assert momentum[-1] - momentum[0] == pytest.approx(impulse, abs=1e-5 * SPEED)
-
-
-@pytest.mark.parametrize("floor", ["1e-9 m/s", "1e-8 m/s", "1e-7 m/s"])
-def test_rate_floor_changes_nothing(floor: str) -> None:
-    same, known = run(BOUNCE, (("joint.contact.floor", floor),)), run(BOUNCE)
-    assert impacts(same)["separation"] == pytest.approx(impacts(known)["separation"], rel=1e-12)
-    assert same.position.values[-1] == pytest.approx(known.position.values[-1], abs=1e-13)
 
 
 def test_a_ledger_that_does_not_close_is_no_result() -> None:

@@ -1,7 +1,5 @@
 """Releases, locks and switches against closed forms; what no event changes goes on as if there were none."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -3,8 +3,6 @@
 Runs are at rtol 1e-12; what is compared is of order 1 to 10, and differs from closed forms by less than 1e-11.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

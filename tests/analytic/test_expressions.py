@@ -1,7 +1,5 @@
 """Loads and laws by expressions against closed forms, and against the loads and laws that they imitate."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

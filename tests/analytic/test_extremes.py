@@ -1,7 +1,5 @@
 """Extremes lie inside impacts, which are shorter than the output interval: every located event is recorded."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """A ball that slides down a slope through the speeds at which its friction law bends, against its one equation."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

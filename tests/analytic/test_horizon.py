@@ -1,7 +1,5 @@
 """The predictability horizon: growth of a small perturbation of the start."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -14,8 +12,9 @@ from flexclear.pipeline.dynamics.run.evaluation.observation import frames
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of, observed
 from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.post.single_run.horizon import horizon
+from flexclear.pipeline.post.single_run.series import horizon
 from tests.analytic.mechanism_runs import TREE, run
+from tests.properties.mechanisms import ground, joint, rigid, scene
 
 
 def test_rigid_clearance_converges_over_the_whole_stroke():
@@ -71,42 +70,34 @@ def test_the_horizon_is_one_of_the_mechanism_and_hardly_of_the_tolerance():
 
 def four_bar(**changes: object) -> Scene:
     """A rigid four-bar with a loose pin between coupler and rocker, which turns about the ground as the crank does."""
-    pin = {
-        "type": "clearance-revolute",
-        "between": ["coupler.B", "rocker.B"],
-        "clearance": 2e-4,
-        "pin_radius": 8e-3,
-        "length": 16e-3,
-        "normal": {"law": "flores", "restitution": 0.8},
-        **{end: {"youngs_modulus": 207e9, "poisson": 0.29} for end in ("journal_material", "pin_material")},
+    steel = {"youngs_modulus": 207e9, "poisson": 0.29}
+    pin = joint("clearance-revolute", "coupler.B", "rocker.B", clearance=2e-4, pin_radius=8e-3, length=16e-3)
+    pin |= {"normal": {"law": "flores", "restitution": 0.8}, "journal_material": steel, "pin_material": steel}
+    bodies = {
+        "ground": ground(O1=(0, 0, 0), O2=(0.2, 0, 0)),
+        "crank": bar(0.3, 0.025, [1e-5, 1e-4, 1e-4], O=0.0, A=0.05),
+        "coupler": bar(0.8, 0.09, [1e-4, 3e-3, 3e-3], A=0.0, B=0.18),
+        "rocker": bar(0.4, 0.06, [1e-4, 6e-4, 6e-4], O=0.0, B=0.12),
+    }
+    joints = {
+        "main": joint("revolute", "ground.O1", "crank.O"),
+        "A": joint("revolute", "crank.A", "coupler.A"),
+        "O2": joint("revolute", "ground.O2", "rocker.O"),
+        "B": pin,
     }
     data = {
-        "title": "a four-bar with a loose pin",
-        "time": {"end": 0.5},
         "output": {"interval": 5e-4},
         "solver": {"integrator": "radau", "rtol": 1e-8},
-        "body": {
-            "ground": {"type": "ground", "frames": {"O1": {}, "O2": {"position": [0.2, 0, 0]}}},
-            "crank": bar(0.3, 0.025, [1e-5, 1e-4, 1e-4], O=0.0, A=0.05),
-            "coupler": bar(0.8, 0.09, [1e-4, 3e-3, 3e-3], A=0.0, B=0.18),
-            "rocker": bar(0.4, 0.06, [1e-4, 6e-4, 6e-4], O=0.0, B=0.12),
-        },
-        "joint": {
-            "main": {"type": "revolute", "between": ["ground.O1", "crank.O"]},
-            "A": {"type": "revolute", "between": ["crank.A", "coupler.A"]},
-            "O2": {"type": "revolute", "between": ["ground.O2", "rocker.O"]},
-            "B": pin,
-        },
         "drive": {"motor": {"joint": "main", "law": {"type": "polynomial", "coefficients": [0, 10.0 * np.pi]}}},
         "load": {"gravity": {"type": "gravity", "acceleration": [0, -9.81, 0]}},
         "start": {"at": "ideal", "joint": {"O2": {"near": np.deg2rad(110.0)}}},
     }
-    return Scene.model_validate(data | changes)
+    return Scene.model_validate(scene(bodies, joints, 0.5, **data | changes))
 
 
 def bar(mass: float, com: float, inertia: list[float], **ends: float) -> dict[str, object]:
     frames = {name: {"position": [x, 0, 0]} for name, x in ends.items()}
-    return {"type": "rigid", "mass": mass, "com": [com, 0, 0], "inertia": inertia, "frames": frames}
+    return rigid(mass, inertia, frames, com=[com, 0, 0])
 
 
 def test_bodies_that_only_turn_about_fixed_points_are_compared_as_well():
@@ -121,34 +112,26 @@ def test_bodies_that_only_turn_about_fixed_points_are_compared_as_well():
 
 def test_a_perturbation_that_dies_out_ends_no_horizon():
     """Loose, with a rtol at which integration errs by more than the perturbation, and without an impact."""
-    scene = four_bar(load={"gravity": {"type": "gravity", "acceleration": [0, -981.0, 0]}})
-    pressed = dynamics.simulate(edited(scene, {"solver.rtol": 1e-5, "time.end": 0.05}), {}, silent)
+    heavy = four_bar(load={"gravity": {"type": "gravity", "acceleration": [0, -981.0, 0]}})
+    pressed = dynamics.simulate(edited(heavy, {"solver.rtol": 1e-5, "time.end": 0.05}), {}, silent)
     assert float(pressed.horizon) == 0.05
 
 
 @pytest.mark.parametrize("what", ["stop", "ball"])
 def test_without_a_free_coordinate_nothing_can_separate(what: str):
-    guide = {"type": "prismatic", "between": ["ground.rail", "slide.rail"]}
-    data = {
-        "title": "a driven slide",
-        "time": {"end": 0.2},
-        "body": {
-            "ground": {"type": "ground", "frames": {"rail": {}, "floor": {"position": [0, 0, 0.006]}}},
-            "slide": {"type": "rigid", "mass": 1.0, "inertia": [1e-3] * 3, "frames": {"rail": {}}},
-        },
-        "joint": {"guide": guide},
-        "drive": {"push": {"joint": "guide", "law": {"type": "polynomial", "coefficients": [0.02, -0.05]}}},
-    }
+    law = {"type": "polynomial", "coefficients": [0.02, -0.05]}
+    data = scene(
+        {"ground": ground(rail=(0, 0, 0), floor=(0, 0, 0.006)), "slide": rigid(1.0, 1e-3, {"rail": {}})},
+        {"guide": joint("prismatic", "ground.rail", "slide.rail")},
+        drive={"push": {"joint": "guide", "law": law}},
+        output={},
+        solver={},
+    )
     normal = {"law": "hertz", "stiffness": 1e5, "exponent": 1.5}
     if what == "stop":
         data["stop"] = {"end": {"joint": "guide", "lower": 0.015, "normal": normal}}
     else:
-        data["joint"]["floor"] = {
-            "type": "ball-on-plane",
-            "between": ["ground.floor", "slide.rail"],
-            "ball_radius": 5e-3,
-            "normal": normal,
-        }
+        data["joint"]["floor"] = joint("ball-on-plane", "ground.floor", "slide.rail", ball_radius=5e-3, normal=normal)
     held = dynamics.simulate(Scene.model_validate(data), {}, silent)
     assert float(held.contact_normal_force.max()) > 0.0
     assert float(held.horizon) == 0.2

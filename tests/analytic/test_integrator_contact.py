@@ -1,11 +1,16 @@
 """Contacts under every integrator: a bouncing ball against one dimension, the mechanism against itself."""
 
-from __future__ import annotations
+from functools import cache
 
 import numpy as np
 import pytest
+import xarray as xr
 
-from tests.analytic.mechanism_runs import Overrides, impacts, run
+from flexclear import load_scene
+from flexclear.pipeline import dynamics
+from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.progress import silent
+from tests.analytic.mechanism_runs import TREE, Overrides, bundles, impacts, run
 from tests.reference import contact_solutions as exact
 
 BOUNCE, CSJ = "checks/bounce", "sps4/csj"
@@ -96,3 +101,46 @@ def test_the_papers_predictor_corrector_without_location_finds_other_impacts() -
     times = np.round(np.arange(0.0, 0.18, 1e-3), 9)
     speeds = [d.sel(body="platform").sel(time=times, method="nearest").velocity.values for d in (paper, known)]
     assert 1e-3 < np.abs(speeds[0] - speeds[1]).max() < 2e-2
+
+
+# A rod that rings in a lasting contact: `exponential` follows modes exactly and the contact by steps ----------------
+
+#: sixteen impacts in 23 ms, then a contact that lasts, in which ball and rod vibrate at some 4 kHz
+PRESSED = TREE / "scenes" / "sps4" / "variants" / "far_csj_cb_damped.toml"
+SHORT = {"time.end": "40 ms", "output.interval": "1 ms"}
+
+
+def without_friction(scene: Scene) -> Scene:
+    loose = {name: joint.model_copy(update={"friction": None}) for name, joint in scene.joint.items() if name == "A1"}
+    return scene.model_copy(update={"joint": scene.joint | loose})
+
+
+@cache
+def pressed_run(integrator: str, rtol: float) -> xr.Dataset:
+    solver = {"integrator": integrator, "rtol": rtol}
+    scene = without_friction(load_scene(PRESSED, {**SHORT, "solver": solver}))
+    return dynamics.simulate(scene, bundles(scene), silent)
+
+
+def velocity_error(integrator: str, rtol: float) -> float:
+    """Largest error of the platform's velocity at the outputs, as a share of the largest velocity."""
+    made, known = (
+        one.velocity.sel(body="platform").values[np.searchsorted(one.time, 1e-3 * np.arange(41) - 1e-9)]
+        for one in (pressed_run(integrator, rtol), pressed_run("dop853", 1e-12))
+    )
+    return float(np.abs(made - known).max() / np.abs(known).max())
+
+
+def test_tighter_tolerances_give_smaller_errors_in_contact() -> None:
+    errors = [velocity_error("exponential", rtol) for rtol in (1e-5, 1e-7, 1e-9)]
+    # an estimate of fourth order: by 100^(4/5) per hundredth, which impacts magnify by chance
+    assert errors[1] < errors[0] / 4.0
+    assert errors[2] < errors[1] / 4.0
+    assert errors[2] < 1e-5
+
+
+def test_impacts_are_those_of_the_explicit_method() -> None:
+    made, known = impacts(pressed_run("exponential", 1e-9), 1e-2), impacts(pressed_run("dop853", 1e-12), 1e-2)
+    # a velocity error of 1e-6 that sixteen impacts have magnified
+    assert np.allclose(made["start"], known["start"], rtol=0.0, atol=1e-7)
+    assert np.allclose(made["peak_force"], known["peak_force"], rtol=1e-4)

@@ -1,6 +1,6 @@
-"""A ball that rolls under friction: an explicit method that crawls is noticed and replaced, a fixed step is told."""
+"""Explicit methods that crawl are noticed and replaced, a fixed step is told; implicit ones step over a stiff mode."""
 
-from __future__ import annotations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,7 +8,10 @@ import xarray as xr
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
+from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics.run import progress_rate, trajectory
+from tests.analytic.integrator_scenes import double_pendulum
+from tests.analytic.integrator_scenes import trajectory as integrated
 from tests.analytic.mechanism_runs import TREE
 
 ROLLING, END = "checks/socket_rolling.toml", "3 ms"
@@ -87,3 +90,46 @@ def test_a_fixed_step_beyond_stability_is_told(step: str, stable: bool) -> None:
     assert ("too long for rk4 to be stable" in made.attrs["warnings"]) is not stable
     assert (made.attrs["stiff_steps"] > 0) is not stable
     assert "switched" not in made.attrs
+
+
+# A mode a thousand times faster than the motion ---------------------------------------------------------------------
+
+STIFFNESS, DAMPING, STEP = 1e6, 400.0, 2e-3
+#: torque over stiffness is some 1e-5 rad; the rest is the second-order method's error at 600 steps
+NEARLY_RIGID = 1e-4
+
+
+def stiff_pendulum() -> dict[str, Any]:
+    """The double pendulum with its second hinge held by a spring: rates of 4500 1/s under a swing of some 1 Hz.
+
+    Damped to about its critical share: what is not damped, an accurate method has to follow.
+    """
+    table = double_pendulum()
+    spring = {"type": "joint-spring", "joint": "Q", "stiffness": STIFFNESS, "damping": DAMPING}
+    table["load"] = {**table["load"], "spring": spring}
+    return table
+
+
+def rigid_pendulum() -> dict[str, Any]:
+    table = double_pendulum()
+    table["joint"]["Q"] = {**table["joint"]["Q"], "type": "fixed"}
+    return table
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("solver", [{"integrator": "generalized-alpha", "step": STEP}, {"integrator": "radau"}])
+def test_implicit_methods_step_over_a_stiff_mode(solver: dict[str, Any]) -> None:
+    made = integrated(stiff_pendulum(), {"rtol": 1e-6, **solver})
+    known = integrated(rigid_pendulum(), {"rtol": 1e-12})
+    angle = np.unwrap(made.rows[:, 1:3], axis=0)
+    # the hinge that is held hardly gives way; the other swings as the rigid pendulum does
+    first = np.argmax(np.ptp(angle, axis=0))
+    assert np.abs(angle[:, 1 - first]).max() < NEARLY_RIGID
+    assert np.abs(angle[:, first] - known.rows[:, 1]).max() < NEARLY_RIGID
+    assert made.counters["evaluations"] < 5_000
+
+
+@pytest.mark.slow
+def test_an_explicit_method_cannot_at_this_step() -> None:
+    with pytest.raises(SolverError, match="too long"):
+        integrated(stiff_pendulum(), {"rtol": 1e-6, "integrator": "rk4", "step": STEP})

@@ -3,8 +3,6 @@
 Mechanisms without loops stand side by side in one scene, so that one set of kernels is compiled for all of them.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -3,8 +3,6 @@
 They stand side by side in one scene, of the kinds of `test_joint_friction`, so that nothing more is compiled.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

@@ -1,15 +1,12 @@
 """Equilibria and natural frequencies with closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
-from tests.analytic.linear_runs import frequencies
-from tests.analytic.mechanism_runs import TREE, bundles
+from tests.analytic.mechanism_runs import TREE, bundles, frequencies
 
 G = 9.81
 #: rounding of some hundred products

@@ -1,7 +1,5 @@
 """Equilibria and vibrations under springs, dampers and forces, against closed forms."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -11,6 +9,7 @@ import xarray as xr
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
 from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.mechanisms import GRAVITY, Table, joint, rigid
 
 G, MASS, STIFFNESS, COUNT, REST = 9.81, 0.4, 900.0, 5, 0.1
 SMOOTH = 1e-12  # rounding of some hundred products
@@ -23,24 +22,16 @@ def frequencies(table: dict[str, Any], time: float = 0.0) -> xr.Dataset:
 
 def chain(damping: float) -> dict[str, Any]:
     """Masses on a vertical rail, each hung from the one above by a spring."""
-    names = [f"m{k}" for k in range(1, COUNT + 1)]
-    body: dict[str, Any] = {"ground": {"type": "ground", "frames": {"top": {}}}}
-    joint: dict[str, Any] = {}
-    load: dict[str, Any] = {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -G]}}
-    for k, name in enumerate(names, start=1):
-        inertia = [1e-3, 1e-3, 1e-3]
-        place = {"position": [0.0, 0.0, -REST * k]}
-        body[name] = {"type": "rigid", "mass": MASS, "inertia": inertia, "pose": place, "frames": {"F": {}}}
-        joint[name] = {"type": "prismatic", "between": ["ground.top", f"{name}.F"]}
+    body: Table = {"ground": {"type": "ground", "frames": {"top": {}}}}
+    joints: Table = {}
+    load = dict(GRAVITY)
+    spring = {"type": "spring-damper", "stiffness": STIFFNESS, "damping": damping, "free_length": REST}
+    for k in range(1, COUNT + 1):
+        body[f"m{k}"] = rigid(MASS, 1e-3, {"F": {}}, pose={"position": [0.0, 0.0, -REST * k]})
+        joints[f"m{k}"] = joint("prismatic", "ground.top", f"m{k}.F")
         above = "ground.top" if k == 1 else f"m{k - 1}.F"
-        load[f"spring{k}"] = {
-            "type": "spring-damper",
-            "between": [above, f"{name}.F"],
-            "stiffness": STIFFNESS,
-            "damping": damping,
-            "free_length": REST,
-        }
-    return {"body": body, "joint": joint, "load": load}
+        load[f"spring{k}"] = spring | {"between": [above, f"m{k}.F"]}
+    return {"body": body, "joint": joints, "load": load}
 
 
 @pytest.mark.parametrize("damping", [0.0, 2.0])
@@ -59,23 +50,11 @@ def test_a_hanging_chain_of_springs(damping: float) -> None:
 
 
 def rotor(rest: str, torque: object = 0.0) -> dict[str, Any]:
-    inertia = [0.2, 0.2, 0.3]
+    spring = {"type": "joint-spring", "joint": "axle", "stiffness": 50.0, "damping": "60 N m s/rad", "rest": rest}
     return {
-        "body": {
-            "ground": {"type": "ground", "frames": {"F": {}}},
-            "rotor": {"type": "rigid", "mass": 1.0, "inertia": inertia, "frames": {"G": {}}},
-        },
-        "joint": {"axle": {"type": "revolute", "between": ["ground.F", "rotor.G"]}},
-        "load": {
-            "spring": {
-                "type": "joint-spring",
-                "joint": "axle",
-                "stiffness": 50.0,
-                "damping": "60 N m s/rad",
-                "rest": rest,
-            },
-            "motor": {"type": "joint-force", "joint": "axle", "force": torque},
-        },
+        "body": {"ground": {"type": "ground", "frames": {"F": {}}}, "rotor": rigid(1.0, [0.2, 0.2, 0.3], {"G": {}})},
+        "joint": {"axle": joint("revolute", "ground.F", "rotor.G")},
+        "load": {"spring": spring, "motor": {"type": "joint-force", "joint": "axle", "force": torque}},
     }
 
 
@@ -97,26 +76,18 @@ def test_loads_are_as_large_as_at_the_time_of_the_pose() -> None:
 def becks_column(load: float) -> xr.Dataset:
     """A clamped beam whose tip is pressed along its own end, in units of E I / L^2."""
     unit = 200e9 * np.pi * 0.002**4 / 4.0
+    beam = {
+        "type": "flexible",
+        "mesh": str(TREE / "meshes" / "checks" / "slender_beam.toml"),
+        "modes": {"reference": "craig-bampton", "count": 20},
+        "stiffening": {},
+    }
+    push = {"type": "point-force", "frame": "beam.tip", "force": [0.0, 0.0, -load * unit], "axes": "frame"}
     return frequencies(
         {
-            "body": {
-                "ground": {"type": "ground", "frames": {"wall": {}}},
-                "beam": {
-                    "type": "flexible",
-                    "mesh": str(TREE / "meshes" / "checks" / "slender_beam.toml"),
-                    "modes": {"reference": "craig-bampton", "count": 20},
-                    "stiffening": {},
-                },
-            },
-            "joint": {"clamp": {"type": "fixed", "between": ["ground.wall", "beam.root"]}},
-            "load": {
-                "push": {
-                    "type": "point-force",
-                    "frame": "beam.tip",
-                    "force": [0.0, 0.0, -load * unit],
-                    "axes": "frame",
-                }
-            },
+            "body": {"ground": {"type": "ground", "frames": {"wall": {}}}, "beam": beam},
+            "joint": {"clamp": joint("fixed", "ground.wall", "beam.root")},
+            "load": {"push": push},
         }
     )
 
@@ -146,14 +117,14 @@ def test_weights_that_balance_leave_no_stiffness_but_rounding(turn: float) -> No
     table: dict[str, Any] = {
         "body": {
             "ground": {"type": "ground", "frames": {"F": {"axes": {"z": [1.0, 2.0, 3.0], "x": [3.0, 0.0, -1.0]}}}},
-            "beam": {"type": "rigid", "mass": 0.3, "inertia": [0.01, 0.01, 0.02], "frames": {"G": {}}},
+            "beam": rigid(0.3, [0.01, 0.01, 0.02], {"G": {}}),
         },
         "joint": {"axle": {"type": "revolute", "between": ["ground.F", "beam.G"]}},
-        "load": {"gravity": {"type": "gravity", "acceleration": [0.0, 0.0, -G]}},
+        "load": GRAVITY,
     }
     for name, mass, end in (("near", 1.1, arm), ("far", 0.7, -1.1 / 0.7 * arm)):
         table["body"]["beam"]["frames"][name] = {"position": end.tolist()}
-        table["body"][name] = {"type": "rigid", "mass": mass, "inertia": [1e-3] * 3, "frames": {"C": {}}}
+        table["body"][name] = rigid(mass, 1e-3, {"C": {}})
         table["joint"][name] = {"type": "fixed", "between": [f"beam.{name}", f"{name}.C"]}
     found = frequencies(table)
     assert found.attrs["motions_without_stiffness"] == 1
@@ -163,7 +134,7 @@ def test_weights_that_balance_leave_no_stiffness_but_rounding(turn: float) -> No
 
 def test_a_spring_of_no_length_holds_in_every_direction() -> None:
     """Its ends meet in the equilibrium, where it has no direction."""
-    body = {"type": "rigid", "mass": MASS, "inertia": [1e-3, 1e-3, 1e-3], "pose": {}, "frames": {"C": {}}}
+    body = rigid(MASS, 1e-3, {"C": {}}, pose={})
     spring = {"type": "spring-damper", "between": ["ground.O", "ball.C"], "stiffness": STIFFNESS, "free_length": 0.0}
     table = {"body": {"ground": {"type": "ground", "frames": {"O": {}}}, "ball": body}, "load": {"s": spring}}
     found = frequencies(table).undamped_frequency.values

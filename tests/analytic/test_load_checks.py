@@ -1,7 +1,5 @@
 """Scenes with springs, dampers, drives and new joints against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

@@ -1,7 +1,5 @@
 """Small rigid scenes with known answers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp

@@ -1,27 +1,12 @@
 """The mechanism with the flexible rod: engine against sums over mass points, and against its own rigid limit."""
 
-from __future__ import annotations
-
-import json
-from functools import cache
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.load import load_scene
-from tests.analytic.mechanism_runs import TREE, Overrides, bundles, impacts, run
-
-REFERENCE = Path(__file__).resolve().parents[1] / "reference"
-
-
-@cache
-def kept(name: str) -> dict[str, np.ndarray]:
-    """Numbers of a second derivation, of the first layout; the files say in their modules how they are made."""
-    return {k: np.array(v) for k, v in json.loads((REFERENCE / f"{name}.json").read_text()).items()}
+from tests.analytic.mechanism_runs import TREE, Overrides, bundles, impacts, platform_deviations, run, second_derivation
 
 
 def at(dataset: xr.Dataset, time: np.ndarray) -> xr.Dataset:
@@ -29,33 +14,23 @@ def at(dataset: xr.Dataset, time: np.ndarray) -> xr.Dataset:
     return dataset.sel(time=time, method="nearest", tolerance=1e-9)
 
 
-def deviation(scene: str) -> tuple[float, float, float]:
-    """Largest deviations of the platform from ideal, first layout: about y0 [rad], height [m], speed [m/s]."""
-    ideal = run("sps4/variants/first").sel(body="platform")
-    other = at(run(scene), ideal.time.values).sel(body="platform")
-    tilt = [np.arcsin(quaternion_to_matrix(d["quaternion"].values)[:, 0, 2]) for d in (ideal, other)]
-    place = np.abs(ideal.position.values - other.position.values)[:, 2]
-    speed = np.abs(ideal.velocity.values - other.velocity.values)[:, 2]
-    return float(np.abs(tilt[0] - tilt[1]).max()), float(place.max()), float(speed.max())
-
-
 def test_ideal_joints_platform_moves_as_in_the_second_derivation() -> None:
     """A millionth of the deviations from ideal, which are 3e-7 m and 0.7 mm/s."""
-    known = kept("far_cb")
+    known = second_derivation("far_cb")
     found = at(run("sps4/variants/first_far_cb"), known["time"]).sel(body="platform")
     assert found.position.values[:, 2] == pytest.approx(known["height"], abs=3e-13)
     assert found.velocity.values[:, 2] == pytest.approx(known["speed"], abs=7e-10)
 
 
 def test_ideal_joints_reaction_at_A1_rings_as_in_the_second_derivation() -> None:
-    known = kept("far_cb")
+    known = second_derivation("far_cb")
     found = at(run("sps4/variants/first_far_cb"), known["time"]).joint_force.sel(joint="A1").values
     assert np.abs(found - known["force"]).max() <= 1e-6 * np.abs(known["force"]).max()
 
 
 def test_clearance_first_impacts_are_those_of_the_second_derivation() -> None:
     """Errors grow a thousandfold in a few impacts without damping; the first two are sharp."""
-    known, found = kept("far_csj_cb"), impacts(run("sps4/variants/first_far_csj_cb"))
+    known, found = second_derivation("far_csj_cb"), impacts(run("sps4/variants/first_far_csj_cb"))
     first = int(np.sum(known["impact_start"] < 0.0095))
     assert first == 2
     # in flight the modes ring at up to 27 kHz, which the default tolerance follows to some 1e-7 m/s
@@ -80,7 +55,7 @@ def test_fixed_fixed_modes_leave_the_mechanism_ideal_in_pose_and_velocity() -> N
 
 
 def test_deviations_from_ideal_have_the_known_magnitudes() -> None:
-    angle, place, speed = deviation("sps4/variants/first_far_cb")
+    angle, place, speed = platform_deviations("sps4/variants/first_far_cb", "sps4/variants/first")
     # 3.48e-6 rad, 3.0e-4 mm, 0.70 mm/s of independent programs; the ringing is not resolved to digits
     assert angle == pytest.approx(3.48e-6, rel=0.03)
     assert place == pytest.approx(3.0e-7, rel=0.03)

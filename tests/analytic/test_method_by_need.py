@@ -1,7 +1,5 @@
 """Scenes that ask for accuracy and name no integrator: which one is chosen, why, and what becomes of a wrong guess."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Reference conditions: complete ones span one space, frequencies are those of theory, wrong ones are refused."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Balls on planes and pins in slots against closed forms: bounces, rolling and sliding, the Scotch yoke."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -16,17 +14,9 @@ PLANE, YOKE = "checks/ball_on_plane", "checks/scotch_yoke"
 G, SLOPE = 9.81, np.radians(30.0)
 
 
-def impacts_of(dataset: xr.Dataset, contact: str) -> dict[str, np.ndarray]:
-    """Impacts of one contact."""
-    kind = dataset.event_kind.values == "closing"
-    strong = kind & (dataset.event_approach_speed.values > 1e-4)
-    mine = dataset.event_contact.values[strong] == contact
-    return {key: values[mine] for key, values in impacts(dataset).items()}
-
-
 def test_a_ball_bounces_on_a_floor_as_in_one_dimension() -> None:
     dataset = run(PLANE)
-    found = impacts_of(dataset, "floor")
+    found = impacts(dataset, contact="floor")
     known = exact.bounces(1.0, 1e8, 0.7, G, 0.05, 0.5)
     assert len(found["start"]) == len(known)
     for name in ("start", "approach"):
@@ -87,7 +77,7 @@ def test_a_scotch_yoke_follows_the_cosine_within_its_clearance() -> None:
 
 def test_a_pin_meets_the_round_ends_of_its_slot() -> None:
     dataset = run(YOKE)
-    found = impacts_of(dataset, "free")
+    found = impacts(dataset, contact="free")
     way, now, speed = 0.051, 0.0, 2.0
     for k, start in enumerate(found["start"]):
         now += (way if k == 0 else 2.0 * way) / speed

@@ -1,7 +1,5 @@
 """One grammar of quantities: what a run holds is had by name everywhere, and equal to what is known."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from functools import cache
@@ -20,7 +18,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import simulate
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.post.overview import comparison
 from flexclear.pipeline.post.overview.curves import curves
@@ -310,7 +308,7 @@ def test_any_quantity_can_be_asked_for_in_accuracy(name: str) -> None:
 
 def test_the_table_of_joint_coordinates_is_that_of_the_joints() -> None:
     for kind in ("revolute", "prismatic", "cylindrical", "planar", "universal", "spherical", "fixed", "free"):
-        declared = {c.name: c.turning for c in joint_class(kind).COORDINATES}
+        declared = {c.name: c.turning for c in joint_type(kind).COORDINATES}
         assert dict(COORDINATES.get(kind, {})) == declared
 
 

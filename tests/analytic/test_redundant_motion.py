@@ -1,7 +1,5 @@
 """Motion of mechanisms whose loops ask for the same thing several times, some of them for nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 
@@ -12,8 +10,7 @@ from scipy.special import ellipj, ellipk
 
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.schema import Scene
-from tests.analytic.linear_runs import frequencies
-from tests.analytic.mechanism_runs import run
+from tests.analytic.mechanism_runs import frequencies, run
 from tests.properties import movable
 from tests.properties.mechanisms import Table, simulate
 from tests.properties.movable import Mechanism, Random, Setting

@@ -1,7 +1,5 @@
 """Blades on a hub with a radius, at steady speed: their frequencies, and what counts as steady."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.polynomial import Legendre

@@ -1,7 +1,5 @@
 """Sections of mechanisms whose periodic motion is known otherwise: exponents, contraction, refusals."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

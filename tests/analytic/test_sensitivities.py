@@ -1,7 +1,5 @@
 """Derivatives by numbers of the scene against closed forms, and against differences of converged runs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs that start in a singular pose, and integrators that pass some: two four-bar loops whose rods lie in one line."""
 
-from __future__ import annotations
-
 import tomllib
 
 import numpy as np

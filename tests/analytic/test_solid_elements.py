@@ -1,7 +1,5 @@
 """Solid elements: exact strains and volumes, scikit-fem's matrices, and refusal of cells that are no cells."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from skfem import Basis, ElementHex1, ElementTetP2, ElementVector, MeshHex, MeshTet2

@@ -1,7 +1,5 @@
 """Meshes from files: regions by name in several formats, units as declared, and refusals."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any

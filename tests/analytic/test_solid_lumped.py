@@ -1,7 +1,5 @@
 """Matrices whose mass is lumped at nodes that turn: invariants are those of the mass points that nodes stand for."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

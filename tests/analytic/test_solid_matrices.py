@@ -1,7 +1,5 @@
 """Matrices in and out: a body that went through files is the body that it was, and wrong files are refused."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

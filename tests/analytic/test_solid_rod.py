@@ -1,7 +1,5 @@
 """The paper's rod and a NAFEMS beam as solids, against exact beam theory."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Solids through the stages: artifacts that can be stored and opened elsewhere, and scenes that say how many modes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Runs that begin by joint coordinate, by modes, at the equilibrium, or as their ideal twins: closed forms of each."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

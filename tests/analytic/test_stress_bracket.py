@@ -1,7 +1,5 @@
 """Stresses of the gallery's bracket: against a direct solution by scikit-fem, and the same wherever it is turned."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any

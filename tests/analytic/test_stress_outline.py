@@ -1,7 +1,5 @@
 """Stress maps of sections against closed forms and resultants; what is refused; what absent means."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

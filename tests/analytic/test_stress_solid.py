@@ -1,7 +1,5 @@
 """Stresses of solids: against scikit-fem with the same cells, closed forms, and the full model in motion."""
 
-from __future__ import annotations
-
 import base64
 import json
 from pathlib import Path
@@ -22,7 +20,7 @@ from flexclear.pipeline.core.system.errors import FlexclearError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.post.render import player
 from flexclear.pipeline.post.render.mechanism import mechanism
-from flexclear.pipeline.post.shapes import body_stress
+from flexclear.pipeline.post.shapes import body_shape
 from flexclear.pipeline.post.single_run.series import derive
 from flexclear.pipeline.structure.fe.solid.elements import ELEMENTS
 from flexclear.pipeline.structure.fe.solid.model import solid_of, unknowns_of
@@ -392,7 +390,7 @@ def test_pictures_show_what_is_recorded(tmp_path: Path) -> None:
     bundle, run = cantilever(tmp_path, recipe, CB, load=load, time={"end": 2e-3})
     step = int(np.argmax(run["von_mises_stress"].sel(gauge="part").values))
     drawn = mechanism(run, {"part": bundle}, stressed=True)
-    seen = body_stress.on_surface(run, bundle, "part", step)
+    seen = body_shape.stress_on_surface(run, bundle, "part", step)
     assert seen == pytest.approx(von_mises(everywhere(bundle, run, step)), rel=1e-12)
     assert drawn.stress == pytest.approx(seen.max(), rel=1e-12)
     page = player.motion(drawn)

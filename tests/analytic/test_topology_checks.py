@@ -1,7 +1,5 @@
 """Closed loops with known answers: Andrews' and Bricard's mechanisms, four-bars that pass singular poses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

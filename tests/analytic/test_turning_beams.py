@@ -1,7 +1,5 @@
 """Beams that turn: with geometric stiffening they are right, without it they are the linear theory."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np
@@ -11,8 +9,7 @@ import xarray as xr
 from flexclear.pipeline import dynamics
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import SolverError
-from tests.analytic.linear_runs import frequencies
-from tests.analytic.mechanism_runs import TREE, bundles
+from tests.analytic.mechanism_runs import TREE, bundles, frequencies
 from tests.reference.turning_beams import SPIN_UP, WRIGHT
 
 #: sqrt(E I / (rho A)) / L^2 of meshes/checks/slender_beam.toml [rad/s]

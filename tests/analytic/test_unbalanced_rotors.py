@@ -1,7 +1,5 @@
 """Unbalanced rotors at steady speed: their poses below and above the critical speed, and their stability."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -11,8 +9,8 @@ from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
-from tests.analytic.linear_runs import frequencies
-from tests.properties.mechanisms import GRAVITY, Table, joint, scene
+from tests.analytic.mechanism_runs import frequencies
+from tests.properties.mechanisms import GRAVITY, Table, joint, rigid, scene
 
 #: a disc at the end of a shaft of 0.25 m: mass [kg], inertia across and along [kg m^2]
 MASS, ACROSS, ALONG, ARM = 3.0, 0.02, 0.036, 0.25
@@ -41,16 +39,15 @@ def rotor(
     axes = {"z": R[:, 2].tolist(), "x": R[:, 0].tolist()}
     bodies: Table = {
         "ground": {"type": "ground", "frames": {"o": {"axes": axes}}},
-        "hub": {
-            "type": "rigid", "mass": 1.0, "inertia": [0.01 * size**2] * 3, "pose": {"axes": axes},
-            "frames": {"o": {}, "s": {"position": [0.0, 0.0, ARM * size]}},
-        },
-        "disc": {
-            "type": "rigid", "mass": MASS, "inertia": [ACROSS * size**2, ACROSS * size**2, ALONG * size**2],
-            "com": [unbalance * size, 0.0, 0.0], "frames": {"o": {}},
-            "pose": {"position": (R[:, 2] * ARM * size).tolist(), "axes": axes},
-        },
-    }  # fmt: skip
+        "hub": rigid(1.0, 0.01 * size**2, {"o": {}, "s": {"position": [0.0, 0.0, ARM * size]}}, pose={"axes": axes}),
+        "disc": rigid(
+            MASS,
+            [ACROSS * size**2, ACROSS * size**2, ALONG * size**2],
+            {"o": {}},
+            com=[unbalance * size, 0.0, 0.0],
+            pose={"position": (R[:, 2] * ARM * size).tolist(), "axes": axes},
+        ),
+    }
     mount = {"type": "bushing", "between": ["hub.s", "disc.o"], "stiffness": K.tolist()}
     mount["damping"] = [damping, damping, 0.0, 0.0, 0.0, 0.0]
     return scene(
@@ -186,15 +183,9 @@ def test_an_arm_that_turns_fast_rises_to_its_stable_angle(speed: float) -> None:
     length, inertia = 0.4, 1e-6
     bodies: Table = {
         "ground": {"type": "ground", "frames": {"o": {}}},
-        "hub": {
-            "type": "rigid", "mass": 1.0, "inertia": [1.0] * 3,
-            "frames": {"o": {}, "h": {"axes": {"z": [0.0, 1.0, 0.0], "x": [0.0, 0.0, -1.0]}}},
-        },
-        "bob": {
-            "type": "rigid", "mass": 1.0, "inertia": [inertia] * 3,
-            "frames": {"h": {"position": [-length, 0.0, 0.0]}, "tip": {}},
-        },
-    }  # fmt: skip
+        "hub": rigid(1.0, 1.0, {"o": {}, "h": {"axes": {"z": [0.0, 1.0, 0.0], "x": [0.0, 0.0, -1.0]}}}),
+        "bob": rigid(1.0, inertia, {"h": {"position": [-length, 0.0, 0.0]}, "tip": {}}),
+    }
     table = scene(
         bodies,
         {"axle": joint("revolute", "ground.o", "hub.o"), "hinge": joint("revolute", "hub.h", "bob.h")},

@@ -1,7 +1,5 @@
 """A run says, with amounts and remedies, when it left what its model carries; what means nothing is refused."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -12,7 +10,6 @@ import xarray as xr
 
 from flexclear import load_scene
 from flexclear.pipeline import dynamics
-from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
@@ -20,6 +17,7 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.refusals.validity import BENT, SPIN, doubts, largest
 from flexclear.pipeline.dynamics.run.run import engine_of
 from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.mechanisms import GRAVITY, joint, rigid, scene, simulate
 
 #: first clamped-free frequency of the beam in scenes/checks/spinup_beam.toml [rad/s], as its description has it
 FIRST = 3.798
@@ -114,27 +112,10 @@ def dropped(depth: float) -> xr.Dataset:
 
     m g d = K d^2.5 / 2.5, the fall through the clearance left out.
     """
-    table: dict[str, Any] = {
-        "title": "soft",
-        "body": {
-            "g": {"type": "ground", "frames": {"S": {}}},
-            "ball": {"type": "rigid", "mass": 1.0, "inertia": [1e-3] * 3, "pose": {}, "frames": {"B": {}}},
-        },
-        "joint": {
-            "j": {
-                "type": "clearance-spherical",
-                "between": ["g.S", "ball.B"],
-                "clearance": 1e-4,
-                "ball_radius": 0.02,
-                "normal": {"law": "hertz", "stiffness": 2.5 * 9.81 / depth**1.5},
-            }
-        },
-        "load": {"g": {"type": "gravity", "acceleration": [0.0, 0.0, -9.81]}},
-        "time": {"end": 0.2},
-        "output": {"interval": 1e-3},
-        "solver": {"rtol": 1e-8},
-    }
-    return dynamics.simulate(Scene.model_validate(table), {}, lambda fraction, text: None)
+    bodies = {"g": {"type": "ground", "frames": {"S": {}}}, "ball": rigid(1.0, 1e-3, {"B": {}}, pose={})}
+    normal = {"law": "hertz", "stiffness": 2.5 * 9.81 / depth**1.5}
+    socket = joint("clearance-spherical", "g.S", "ball.B", clearance=1e-4, ball_radius=0.02, normal=normal)
+    return simulate(scene(bodies, {"j": socket}, 0.2, 1e-8, load=GRAVITY, output={"interval": 1e-3}))
 
 
 @pytest.mark.slow

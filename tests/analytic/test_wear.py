@@ -8,7 +8,7 @@ import pytest
 from flexclear.pipeline.core.artifacts.schema import RUN
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.post import derive
-from flexclear.pipeline.post.single_run.wear import PIECES, spread
+from flexclear.pipeline.post.single_run.series import PIECES, spread_over_surface
 from tests.analytic.mechanism_runs import run
 from tests.properties.mechanisms import Table, joint, scene, simulate
 
@@ -84,7 +84,7 @@ def test_a_map_keeps_totals_and_puts_them_where_the_contact_was() -> None:
     """On a sphere in bands of equal height, which have equal areas."""
     angle = np.linspace(0.0, np.pi, 181)
     way = np.stack([np.cos(angle), np.sin(angle), np.full(181, 0.3)], axis=1)
-    found = spread(way, np.stack([angle, angle**2], axis=1), 8, 10)
+    found = spread_over_surface(way, np.stack([angle, angle**2], axis=1), 8, 10)
     assert found.sum(axis=(0, 1)) == pytest.approx([np.pi, np.pi**2], rel=1e-12)  # rounding
     band = int((0.3 / np.hypot(1.0, 0.3) + 1.0) / 2.0 * 10)
     # a step of the way is one degree; its pieces fall to one side of a border

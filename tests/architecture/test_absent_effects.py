@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-import subprocess
-import sys
 from dataclasses import fields, replace
 from functools import cache
 from pathlib import Path
@@ -33,11 +31,12 @@ from flexclear.pipeline.dynamics.effects.effect import PACKAGE
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import bundles
+from tests.processes import printed
 
 DYNAMICS = "flexclear.pipeline.dynamics"
 CONTACT = (
     "flexclear.pipeline.dynamics.contact",
-    "flexclear.pipeline.dynamics.joints.clearance_spherical",
+    "flexclear.pipeline.dynamics.contact.surfaces.clearance_spherical",
     "flexclear.pipeline.dynamics.integrate.contact_events",
     "flexclear.pipeline.dynamics.integrate.contact_phases",
 )
@@ -51,8 +50,8 @@ APPLIED = (
 BODIES = "flexclear.pipeline.dynamics.bodies"
 FLEXIBLE = (f"{BODIES}.flexible", f"{BODIES}.interface", f"{BODIES}.ports", "flexclear.pipeline.structure")
 #: ways over singular poses and out of them, which no run takes that meets none
-RUNS = "flexclear.pipeline.dynamics.run"
-SINGULAR = tuple(f"{RUNS}.{name}" for name in ("collocation", "singular_pass", "singular_start"))
+POSES = "flexclear.pipeline.dynamics.run.singular_poses"
+SINGULAR = tuple(f"{POSES}.{name}" for name in ("collocation", "passing", "beginning"))
 SCHEME = Scheme("dop853")
 CSJ, IDEAL = "sps4/csj", "sps4/ideal"
 
@@ -83,9 +82,7 @@ def path_of(root: Path, scene: str) -> Path:
 
 
 def imported_by_a_run(root: Path, scene: str) -> set[str]:
-    command = [sys.executable, "-c", RUN, str(path_of(root, scene))]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    return set(done.stdout.split())
+    return set(printed(RUN, path_of(root, scene)).split())
 
 
 def below(names: set[str], families: tuple[str, ...]) -> set[str]:
@@ -105,8 +102,7 @@ def code_of_effects(names: set[str]) -> set[str]:
 
 def test_declarations_of_effects_are_read_without_their_code() -> None:
     text = "import sys; from flexclear.pipeline.dynamics import effects; print(*sys.modules)"
-    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
-    names = set(done.stdout.split())
+    names = set(printed(text).split())
     assert {f"{PACKAGE}.{effect.name}.effect" for effect in DECLARED} <= names
     assert code_of_effects(names) == set()
     assert below(names, ("numba", f"{DYNAMICS}.kernels", f"{DYNAMICS}.memory")) == set()
@@ -116,7 +112,7 @@ def test_a_run_imports_the_code_of_no_effect_that_its_scene_lacks(root: Path) ->
     """But for what contacts and closures may be: ends of stops, and gears."""
     kinds = {"stops.model", "gears.model"}
     assert code_of_effects(imported_by_a_run(root, IDEAL)) == kinds
-    assert code_of_effects(imported_by_a_run(root, "checks/bushing")) == {*kinds, "bushings.run"}
+    assert code_of_effects(imported_by_a_run(root, "checks/bushing")) == {*kinds, "bushings.bushing", "bushings.run"}
 
 
 def test_every_function_that_a_declaration_names_is_there() -> None:
@@ -133,15 +129,13 @@ def test_a_run_with_clearance_imports_its_own_laws_only(root: Path) -> None:
     laws = {n for n in below(names, CONTACT) if re.search(r"\.(normal|friction)\.\w+$", n)}
     normal = {"flexclear.pipeline.dynamics.contact.normal.lankarani_nikravesh"}
     friction = "flexclear.pipeline.dynamics.contact.friction"
-    assert laws == normal | {f"{friction}.{n}" for n in ("modified_coulomb", "memoryless")}
+    assert laws == normal | {f"{friction}.{n}" for n in ("law", "modified_coulomb")}
     assert below(names, (*FLEXIBLE, *SINGULAR)) == set()
 
 
 def test_parts_are_built_with_their_scene_and_not_one_by_one(root: Path) -> None:
     """But for those that stand as defaults in others: to build all seventy takes as long as to import NumPy."""
-    command = [sys.executable, "-c", BUILT, str(path_of(root, CSJ))]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    number, *built = done.stdout.split()
+    number, *built = printed(BUILT, path_of(root, CSJ)).split()
     assert int(number) > 70
     assert set(built) == {"Scene", "Limits", "Output", "PlainIntegrator", "Pose"}
 
@@ -165,11 +159,12 @@ def reached(texts: dict[str, str]) -> set[str]:
 
 #: effect -> word that its generated source must have, modules it must reach
 EFFECTS = {
-    "contact": ("clearance_spherical", "flexclear.pipeline.dynamics.joints.clearance_spherical"),
+    "contact": ("clearance_spherical", "flexclear.pipeline.dynamics.contact.surfaces.clearance_spherical"),
     "normal law": ("import hysteretic", "flexclear.pipeline.dynamics.contact.form.hysteretic"),
     "friction": ("modified_coulomb", "flexclear.pipeline.dynamics.contact.friction.modified_coulomb"),
     "flexible bodies": ("flexible_bodies", "flexclear.pipeline.dynamics.bodies.flexible"),
     "closures": ("closures=", "flexclear.pipeline.dynamics.equations.closures"),
+    "singular poses": ("poses=singular_step", "flexclear.pipeline.dynamics.integrate.singular_step"),
     "couplings": ("make_coupled_closing", "flexclear.pipeline.dynamics.effects.gears.equations"),
     "stops": ("make_stops", "flexclear.pipeline.dynamics.effects.stops.contact"),
     "stiffening": ("flexible_bodies(bodies)", "flexclear.pipeline.dynamics.effects.stiffening.bodies"),
@@ -227,6 +222,8 @@ def test_the_entry_names_and_reaches_the_effects_present_and_no_other(case: str)
     found, present = CASES[case]
     texts = generated(found)
     modules, source = reached(texts), "".join(texts.values())
+    if "closures" in present:  # loops alone have singular poses
+        present = present | {"singular poses"}
     for effect, (word, module) in EFFECTS.items():
         assert (word in source) == (effect in present), effect
         assert (module in modules) == (effect in present), effect
@@ -239,10 +236,6 @@ def test_absent_laws_and_joints_are_not_reached(case: str) -> None:
     modules = reached(generated(found))
     requested = {module_of(JOINTS, n) for n in found.joints}
     requested.add("flexclear.pipeline.dynamics.joints.coordinate")  # with which every joint names its freedoms
-    if "contact" in present:
-        requested.add("flexclear.pipeline.dynamics.joints.clearance_spherical")
-    if "joint friction" in present:
-        requested.add("flexclear.pipeline.dynamics.joints.bearings")
     assert below(modules, ("flexclear.pipeline.dynamics.joints",)) == requested
     if not {"contact", "stops", "joint friction"} & present:
         assert below(modules, CONTACT) == set()
@@ -413,7 +406,4 @@ def test_two_topologies_from_the_disk_cache_keep_their_own_code(root: Path, orde
     """Numba names symbols by a counter of each process; the loader takes the first of two that are named alike."""
     paths = [str(path_of(root, name)) for name in order]
     for scenes in ([paths[0]], [paths[1]], paths):  # each compiled by a process of its own, if at all
-        done = subprocess.run(
-            [sys.executable, "-c", BOTH, *scenes], cwd=root, capture_output=True, text=True, check=False
-        )
-        assert done.returncode == 0, done.stderr[-500:]
+        printed(BOTH, *scenes)

@@ -4,13 +4,8 @@ Each is installed in a copy of the sources, a scene that names it runs there fro
 compared with a closed form. Uncompiled, because the scenes take some hundred evaluations, and compiling takes longer.
 """
 
-from __future__ import annotations
-
-import os
 import re
 import shutil
-import subprocess
-import sys
 from math import exp, sinh
 from pathlib import Path
 
@@ -18,6 +13,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.optimize import brentq
+
+from tests.processes import copied, python
 
 #: example -> folder that its module is put in
 PLACES = {
@@ -47,8 +44,7 @@ def edited(text: str, hunk: str) -> str:
 
 def installed(root: Path, tree: Path, name: str) -> Path:
     """A copy of the sources with the example in it."""
-    for package in ("flexclear", "papers", "pipeline", "stages"):
-        shutil.copytree(root / package, tree / package, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
+    copied(tree)
     shutil.copy(examples(root) / f"{name}.py", tree / PLACES[name])
     head, *hunks = (examples(root) / f"{name}.diff").read_text().split("@@\n")
     place = tree / head.removeprefix("--- ").strip()
@@ -60,10 +56,7 @@ def installed(root: Path, tree: Path, name: str) -> Path:
 def flexclear(tree: Path, *arguments: str) -> str:
     own = {"PYTHONPATH": str(tree), "FLEXCLEAR_RESULTS": str(tree / "results"), "NUMBA_DISABLE_JIT": "1"}
     own["FLEXCLEAR_KERNELS"] = str(tree / "kernels")
-    command = [sys.executable, "-m", "flexclear", *arguments]
-    done = subprocess.run(command, cwd=tree, env=os.environ | own, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return python("-m", "flexclear", *arguments, cwd=tree, **own).stdout
 
 
 def ran(root: Path, tree: Path, name: str) -> xr.Dataset:

@@ -1,7 +1,5 @@
 """A scene reaches and compiles its own integrator and stepping, and no other; numbers of the solver are no code."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

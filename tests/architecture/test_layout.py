@@ -1,7 +1,5 @@
 """The shape of the project: where things are, who imports whom, how long a module may be."""
 
-from __future__ import annotations
-
 import ast
 import os
 import re
@@ -14,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from flexclear.commands.__main__ import COMMANDS
+from tests.processes import copied, python
 
 TOP = {"pyproject.toml", "pipeline", "meshes", "stages", "tests", "Makefile"}
 BESIDES = {"README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "constraints.txt", "docs", "scenes", "benchmarks"}
@@ -45,8 +44,8 @@ def test_no_module_is_a_drawer(root: Path):
 
 
 def _lint_imports(folder: Path) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", "from importlinter.cli import lint_imports_command as c; c()", "--no-cache"]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    code = "from importlinter.cli import lint_imports_command as c; c()"
+    return python("-c", code, "--no-cache", cwd=folder, succeeds=False)
 
 
 def test_import_rules_hold(root: Path):
@@ -69,12 +68,9 @@ def test_import_rules_hold(root: Path):
         ("pipeline/structure/fe/model.py", "import flexclear.pipeline.structure.modes.eigen", "no circles"),
     ],
 )
-def test_import_rules_can_be_broken(root: Path, tmp_path: Path, module: str, line: str, broken: str):
+def test_import_rules_can_be_broken(tmp_path: Path, module: str, line: str, broken: str):
     """Each rule notices a violation, so that the test above means something."""
-    for name in ("flexclear", "papers", "pipeline", "stages"):
-        shutil.copytree(root / name, tmp_path / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(root / "pyproject.toml", tmp_path)
-    path = tmp_path / module
+    path = copied(tmp_path) / module
     path.write_text(path.read_text() + f"\n{line}\n")
     done = _lint_imports(tmp_path)
     assert done.returncode != 0

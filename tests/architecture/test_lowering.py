@@ -1,11 +1,5 @@
 """What is taken from inside Numba is a gain of time, and no need: hidden, the same comes out of its public ways."""
 
-from __future__ import annotations
-
-import os
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +8,7 @@ from numba import cfunc
 
 from flexclear.pipeline.dynamics import kernels
 from flexclear.pipeline.dynamics.compile import machine_code
+from tests.processes import printed
 
 RUN = """
 {hide}
@@ -46,12 +41,8 @@ HIDDEN = (
 
 
 @pytest.mark.parametrize("hide", HIDDEN)
-def test_with_another_numba_kernels_are_compiled_as_it_does(root: Path, hide: str) -> None:
-    code = RUN.format(hide=hide)
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=root, env={**os.environ}, capture_output=True, text=True, check=False
-    )
-    assert done.stdout.split("\n")[0] == "(0.0, 0.0, 1.0) False", done.stderr
+def test_with_another_numba_kernels_are_compiled_as_it_does(hide: str) -> None:
+    assert printed(RUN.format(hide=hide)).split("\n")[0] == "(0.0, 0.0, 1.0) False"
 
 
 def test_with_a_release_is_tested_they_are_compiled_in_parts() -> None:

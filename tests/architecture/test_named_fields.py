@@ -1,7 +1,5 @@
 """Named fields: compiled, interpreted and traced kernels read and write what `memory` declares."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numba import njit, types
@@ -25,7 +23,7 @@ def arrays() -> tuple[np.ndarray, ...]:
         sizes[ARRAYS[name]] += ROWS * table.size
     for place in m.STRETCHES.values():
         h[place] = sizes["w"]
-        sizes["w"] += m.N_CONTROLS  # the most named floats that a stretch has
+        sizes["w"] += m.AWAITED_TIME + 1  # the most named floats that a stretch has
     for k, place in enumerate(m.SIZES.values()):
         h[place] = -1 - k
     wiring = np.arange(m.HEADER, sizes["h"]) * 10
@@ -40,7 +38,8 @@ def test_names_are_those_of_memory_and_none_means_two_things() -> None:
     kinds = (m.SIZES, m.STRETCHES, m.REPORTS, m.LISTS, floats, TABLES)
     names = [name for kind in (*kinds, m.INDICES) for name in kind]
     assert len(names) == len(set(names))
-    of_effects = {name for effect in EFFECTS for name in (*effect.sizes, *effect.stretches)} | set(m.OF_EFFECTS)
+    stretches = {one.partition(":")[0] for effect in EFFECTS for one in effect.stretches}
+    of_effects = {name for effect in EFFECTS for name in effect.sizes} | stretches | set(m.OF_EFFECTS)
     for kind in kinds:
         named = set(kind) - of_effects  # those of effects are read by their names alone
         assert {name: getattr(m, name.upper()) for name in named} == {name: kind[name] for name in named}

@@ -1,16 +1,14 @@
 """A new integrator is one module and one line: a copy of the project with Heun's method added, used in every place."""
 
-from __future__ import annotations
-
 import json
-import os
-import shutil
 import subprocess
-import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
+
+from tests import processes
 
 MODULE = '''"""Heun's method of order 2, with Euler's as its error estimate."""
 
@@ -63,9 +61,7 @@ Command = Callable[..., subprocess.CompletedProcess[str]]
 @pytest.fixture(scope="module")
 def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The project with the module and the line, and two scenes of a pendulum."""
-    folder = tmp_path_factory.mktemp("project")
-    for name in ("flexclear", "papers", "pipeline", "stages"):
-        shutil.copytree(root / name, folder / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
+    folder = processes.copied(tmp_path_factory.mktemp("project"))
     (folder / FOLDER / "heun_euler.py").write_text(MODULE)
     before, above, after = (folder / LIST).read_text().partition(ABOVE)
     assert above
@@ -80,14 +76,8 @@ def copy(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def python(copy: Path) -> Command:
     """Runs the copy's modules or code, interpreted: what is compiled is the same."""
     apart = {"FLEXCLEAR_RESULTS": str(copy / "results"), "FLEXCLEAR_KERNELS": str(copy / "kernels")}
-    environment = {**os.environ, **apart, "PYTHONPATH": str(copy), "NUMBA_DISABLE_JIT": "1"}
-
-    def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [sys.executable, *arguments], cwd=copy, env=environment, capture_output=True, text=True, check=False
-        )
-
-    return run
+    interpreted = {"PYTHONPATH": str(copy), "NUMBA_DISABLE_JIT": "1"}
+    return partial(processes.python, cwd=copy, succeeds=False, **apart, **interpreted)
 
 
 def asked(python: Command, code: str) -> object:
@@ -188,7 +178,7 @@ def test_keys_hold_its_module_and_what_goes_on_for_it(python: Command) -> None:
     assert f"{package}.heun_euler" not in own
 
 
-def test_it_makes_no_other_integrator_compile_anew(root: Path, python: Command) -> None:
+def test_it_makes_no_other_integrator_compile_anew(python: Command) -> None:
     code = """
 from flexclear.pipeline.dynamics.compile.functions import digest
 from flexclear.pipeline.dynamics.compile.sources import sources
@@ -196,7 +186,4 @@ from flexclear.pipeline.dynamics.effects import Parts, Scheme
 parts = Parts(("free",), surfaces=("clearance-spherical",), forms=("hysteretic",))
 print(json.dumps({name: digest(text) for name, text in sources(parts, Scheme("dop853")).items()}))
 """
-    here = subprocess.run(
-        [sys.executable, "-c", f"import json\n{code}"], cwd=root, capture_output=True, text=True, check=True
-    )
-    assert asked(python, code) == json.loads(here.stdout)
+    assert asked(python, code) == json.loads(processes.printed(f"import json\n{code}"))

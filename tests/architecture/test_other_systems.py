@@ -22,26 +22,17 @@ from flexclear.pipeline.core.scene.load import scene_name
 from flexclear.pipeline.core.system import file_names, platforms
 from flexclear.pipeline.core.system.errors import InputError
 from tests.architecture import windows_rules as rules
+from tests.processes import python
 
 #: what of `os` and `signal` is not on Windows, or means something else there
 ELSEWHERE = (*rules.MODULES, *rules.FUNCTIONS, "SIGKILL", "link", "kill")
 #: the one module of each tree that may ask for them
-ONES = ("pipeline/core/system/platforms.py", "benchmarks/system.py")
+ONES = ("pipeline/core/system/platforms.py", "benchmarks/processes.py")
 
 
 def run(folder: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, *arguments],
-        cwd=folder,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "1", **variables(folder), **environment},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-
-
-def variables(folder: Path) -> dict[str, str]:
-    return {"PYTHONPATH": str(folder), "FLEXCLEAR_RESULTS": str(folder / "results_of_test")}
+    own = {"PYTHONPATH": str(folder), "FLEXCLEAR_RESULTS": str(folder / "results_of_test"), "NUMBA_DISABLE_JIT": "1"}
+    return python(*arguments, cwd=folder, succeeds=False, **(own | environment))
 
 
 @pytest.fixture(scope="module")

@@ -1,13 +1,12 @@
 """Every part of every family is in the key of the runs that name it, with all that it imports and compiles."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from flexclear.pipeline.core.scene.registry import lookup, module_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.dynamics import effects
@@ -18,31 +17,22 @@ from flexclear.pipeline.dynamics.effects import Parts, Scheme
 BALL = {"type": "rigid", "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "frames": {"F": {}}}
 
 
-def families() -> list[tuple[str, str, str]]:
-    """(package, table, name) of every part that a run can name."""
-    tables = {
-        effects.JOINTS: ("NAMES", "CONTACTS"),
-        **dict.fromkeys((effects.NORMAL_LAWS, effects.FRICTION_LAWS, effects.FORMS), ("NAMES",)),
-        **dict.fromkeys((effects.CONTACTS, effects.LOADS, effects.LAWS, effects.INTEGRATORS), ("NAMES",)),
-    }
-    found = [(package, table) for package, names in tables.items() for table in names]
-    return [(package, table, name) for package, table in found for name in getattr(import_module(package), table)]
+def families() -> list[tuple[str, str]]:
+    """(package, name) of every part that a run can name."""
+    laws = (effects.NORMAL_LAWS, effects.FRICTION_LAWS, effects.FORMS, effects.LAWS)
+    packages = (effects.JOINTS, effects.SURFACES, *laws, effects.LOADS, effects.INTEGRATORS)
+    return [(package, name) for package in packages for name in import_module(package).NAMES]
 
 
-def module_of(package: str, table: str, name: str) -> str:
-    return f"{package}.{getattr(import_module(package), table)[name].partition(':')[0]}"
+@pytest.mark.parametrize("package, name", families())
+def test_a_part_that_is_named_gives_its_module(package: str, name: str) -> None:
+    assert effects.Named(package, name, "here").module == module_of(package, name)
 
 
-@pytest.mark.parametrize("package, table, name", families())
-def test_a_part_that_is_named_gives_its_module(package: str, table: str, name: str) -> None:
-    assert effects.Named(package, name, "here", table).module == module_of(package, table, name)
-
-
-@pytest.mark.parametrize("package, table, name", families())
-def test_what_a_family_lists_is_there(package: str, table: str, name: str) -> None:
+@pytest.mark.parametrize("package, name", families())
+def test_what_a_family_lists_is_there(package: str, name: str) -> None:
     """Lists that follow from what scenes declare name modules and objects that exist."""
-    module, _, made = getattr(import_module(package), table)[name].partition(":")
-    assert hasattr(import_module(f"{package}.{module}"), made)
+    assert lookup(package, name, where="here") is not None
 
 
 def generated(parts: Parts, scheme: Scheme) -> list[str]:
@@ -52,27 +42,26 @@ def generated(parts: Parts, scheme: Scheme) -> list[str]:
 
 #: where a part of a family stands among the parts of the code
 CODE = {
-    (effects.JOINTS, "NAMES"): lambda name: Parts((name,), closures=True),
-    (effects.JOINTS, "CONTACTS"): lambda name: Parts(("free",), surfaces=(name,), forms=("elastic",)),
-    (effects.FORMS, "NAMES"): lambda name: Parts(("free",), surfaces=("clearance-spherical",), forms=(name,)),
-    (effects.FRICTION_LAWS, "NAMES"): lambda name: Parts(
+    effects.JOINTS: lambda name: Parts((name,), closures=True),
+    effects.SURFACES: lambda name: Parts(("free",), surfaces=(name,), forms=("elastic",)),
+    effects.FORMS: lambda name: Parts(("free",), surfaces=("clearance-spherical",), forms=(name,)),
+    effects.FRICTION_LAWS: lambda name: Parts(
         ("free",), surfaces=("clearance-spherical",), forms=("elastic",), frictions=(name,)
     ),
-    (effects.LOADS, "NAMES"): lambda name: Parts(("free",), loads=(name,)),
+    effects.LOADS: lambda name: Parts(("free",), loads=(name,)),
 }
 
 
 #: gravity is a field, not a kernel
-COMPILED = [f for f in families() if f[:2] in CODE and f != (effects.LOADS, "NAMES", "gravity")]
+COMPILED = [f for f in families() if f[0] in CODE and f != (effects.LOADS, "gravity")]
 
 
-@pytest.mark.parametrize("package, table, name", COMPILED)
-def test_what_a_part_compiles_reaches_its_module(package: str, table: str, name: str) -> None:
+@pytest.mark.parametrize("package, name", COMPILED)
+def test_what_a_part_compiles_reaches_its_module(package: str, name: str) -> None:
     """The digest of a compiled function changes with the sources of its parts."""
-    parts = CODE[package, table](name)
-    texts = generated(parts, Scheme("dop853"))
+    texts = generated(CODE[package](name), Scheme("dop853"))
     reached = {found for text in texts for found in functions.reached(text)}
-    assert module_of(package, table, name) in reached
+    assert module_of(package, name) in reached
 
 
 def scene_with(joint: dict[str, Any], **tables: Any) -> Scene:
@@ -97,8 +86,7 @@ def test_the_key_of_a_run_holds_all_modules_that_its_code_can_reach(root: Path, 
     scene = scene_with({"type": name}, solver=solver)
     tree = Sources(root)
     known = tree.closure(["flexclear.stages.simulation", *modules(scene)]).keys()
-    declared = import_module(module_of(effects.JOINTS, "NAMES", name))
-    part = next(value for value in vars(declared).values() if hasattr(value, "COORDINATES"))
+    part = lookup(effects.JOINTS, name, where="here")
     possible = {name, "free", *(() if len(part.COORDINATES) < 2 else {c.part for c in part.COORDINATES} | {"fixed"})}
     for scheme in effects.schemes(scene):
         parts = Parts(tuple(sorted(possible)), closures=True)
@@ -110,8 +98,7 @@ def test_a_joint_with_several_named_freedoms_may_become_a_chain() -> None:
     """The list of joints that stay one link is right, and the chain's parts are listed."""
     joints = import_module(effects.JOINTS)
     for name in joints.NAMES:
-        declared = import_module(module_of(effects.JOINTS, "NAMES", name))
-        part = next(value for value in vars(declared).values() if hasattr(value, "COORDINATES"))
+        part = lookup(effects.JOINTS, name, where="here")
         if len(part.COORDINATES) > 1:
             assert name not in joints.WHOLE
             assert {coordinate.part for coordinate in part.COORDINATES} <= set(joints.CHAIN)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,6 +13,7 @@ from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.workflow.fingerprint import TREE, Sources
 from flexclear.pipeline.core.workflow.task import Task, facts, in_order, key
 from flexclear.stages.workplace import Workplace
+from tests.processes import printed, python
 
 #: what such a command may import: its own code, and what checks scenes
 ALLOWED = {"flexclear", "pydantic", "pydantic_core", "annotated_types", "typing_extensions"}
@@ -31,30 +30,21 @@ sys.exit(code)"""
 
 def imported(*arguments: str, results: Path) -> set[str]:
     """Top-level names of what a command imports, the standard library left out."""
-    done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", COMMAND, *arguments],
-        cwd=TREE,
-        env={**os.environ, "FLEXCLEAR_RESULTS": str(results)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = python("-W", "ignore", "-c", COMMAND, *arguments, FLEXCLEAR_RESULTS=str(results))
     names = {name.partition(".")[0] for name in done.stderr.splitlines()[-1].split()} - set(sys.stdlib_module_names)
     # the interpreter's own: its configuration, whose name tells the machine, and what its site loads at every start
-    own = subprocess.run(
-        [sys.executable, "-c", "import sys; print(*sys.modules)"], capture_output=True, text=True, check=True
-    )
-    return {name for name in names - set(own.stdout.split()) if not name.startswith(("_sysconfigdata", "__"))}
+    own = printed("import sys; print(*sys.modules)").split()
+    return {name for name in names - set(own) if not name.startswith(("_sysconfigdata", "__"))}
 
 
-def stand_in(tasks: Iterable[Task], place: Workplace) -> dict[int, Record]:
+def stand_in(tasks: Iterable[Task], place: Workplace) -> dict[Task, Record]:
     """Records of tasks and all their inputs, by identity: in the store is what their keys ask for, and not a result."""
-    found: dict[int, Record] = {}
+    found: dict[Task, Record] = {}
     for task in in_order(list(tasks)):
-        known = facts(task, {name: found[id(above)].digest for name, above in task.inputs.items()}, place.sources)
+        known = facts(task, {name: found[above].digest for name, above in task.inputs.items()}, place.sources)
         name = key(known)
         record = place.store.find(task.stage, name)
-        found[id(task)] = record or place.store.put(task.stage, name, {"nc": name.encode()}, known)
+        found[task] = record or place.store.put(task.stage, name, {"nc": name.encode()}, known)
     return found
 
 
@@ -66,7 +56,7 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
     scenes = report.Scenes()
     tasks = [*report.figure_tasks(place, scenes), *scenes.graph(report.HEADLINE).of("render").values()]
     records = stand_in(tasks, place)
-    graphs = [graph for graph in scenes.graphs.values() if id(graph.simulate) in records]
+    graphs = [graph for graph in scenes.graphs.values() if graph.simulate in records]
     stand_in([report.page_task(place, records, graphs)], place)
     return root
 

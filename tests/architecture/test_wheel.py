@@ -1,7 +1,5 @@
 """What a wheel of this project holds, as setuptools finds it; nothing is built, downloaded or written."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Made-up artifacts for all figures and tables, under the references that these ask for."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

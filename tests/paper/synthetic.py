@@ -5,8 +5,6 @@ Contact forces are bursts at regular times.  Nothing here is physics; only names
 of magnitude are those of the mechanism.
 """
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flexclear.papers.wang_wang_2019 import figures
-from flexclear.papers.wang_wang_2019.figures import fig06
+from flexclear.papers.wang_wang_2019.figures import joint
 from flexclear.pipeline.core.system.progress import silent
 from tests.paper.material import everything
 
@@ -69,12 +69,12 @@ def test_friction_curve_goes_through_its_corners_and_is_odd():
     law = (2e-4, 1e-2, 0.15, 0.1)
     v = np.array([-1.0, -1e-2, -2e-4, 0.0, 2e-4, 1e-2, 1.0])
     # corners of the law, exact up to rounding
-    np.testing.assert_allclose(fig06.coefficient(v, *law), [-0.1, -0.1, -0.15, 0.0, 0.15, 0.1, 0.1], atol=1e-15)
+    np.testing.assert_allclose(joint.coefficient(v, *law), [-0.1, -0.1, -0.15, 0.0, 0.15, 0.1, 0.1], atol=1e-15)
 
 
 def test_observed_friction_is_read_from_force_and_power():
     run = everything()["sps4/csj:run"].sel(contact="A1")
-    speed, mu = fig06.observed(run)
+    speed, mu = joint.observed(run)
     # the made-up run slides at 20 mm/s with a tangential force of a tenth of the normal one
     np.testing.assert_allclose(mu, 0.1, rtol=1e-9)
     np.testing.assert_allclose(speed, 0.02, rtol=1e-9)

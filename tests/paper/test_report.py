@@ -9,9 +9,9 @@ from itertools import pairwise
 import pytest
 
 from flexclear.papers.wang_wang_2019 import figures, report
-from flexclear.papers.wang_wang_2019.discrepancies import DISCREPANCIES
+from flexclear.papers.wang_wang_2019.published import DISCREPANCIES
 from flexclear.pipeline.core.system.progress import silent
-from flexclear.pipeline.post.overview.page import in_folder
+from flexclear.pipeline.post.pages import in_folder
 from tests.paper.material import everything
 
 RENDERED = "sps4/far_csj_cb"
@@ -44,7 +44,7 @@ def content(results):
 
 def test_everything_that_the_page_shows_is_in_it(content):
     """Its scripts are its own, and its images and films are written out."""
-    page = report.page(content).decode()
+    page = report.html_page(content)
     links = [link[:40] for link in re.findall(r"(?:src|href)='([^'#][^']*)'", page)]
     assert links
     assert [link for link in links if not link.startswith("data:")] == []
@@ -54,21 +54,21 @@ def test_everything_that_the_page_shows_is_in_it(content):
 
 
 def test_the_same_page_as_a_folder_has_its_pictures_as_files(content):
-    found = in_folder(report.page(content))
+    found = in_folder(report.html_page(content).encode())
     named = re.findall(rb"src='(files/[^']+)'", found["index.html"])
     assert {name.decode() for name in named} == set(found) - {"index.html"}
     assert b"data:image/png" not in found["index.html"]
 
 
 def test_page_shows_figures_tables_film_assumptions_and_discrepancies(content):
-    page = report.page(content).decode()
+    page = report.html_page(content)
     assert page.count("<video") == 1
     for text in ("Figure 8", "Table 8", "Table 10", "not printed in the paper", DISCREPANCIES[0][0]):
         assert text in page
 
 
 def test_an_empty_results_folder_gives_a_page_without_figures(tmp_path):
-    page = report.page(report.collect(tmp_path, {}, RENDERED)).decode()
+    page = report.html_page(report.collect(tmp_path, {}, RENDERED))
     assert "<img" not in page
     assert "Discrepancies" in page
 

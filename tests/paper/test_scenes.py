@@ -1,7 +1,5 @@
 """The scene files load, fit together at the start, and hold the paper's data and the declared assumptions."""
 
-from __future__ import annotations
-
 import tomllib
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The tables say what the runs say, in the paper's units, beside the paper's own numbers."""
 
-from __future__ import annotations
-
 import csv
 import io
 
@@ -11,7 +9,7 @@ import xarray as xr
 
 from flexclear.papers.wang_wang_2019.figures import figure, table10, table_verdicts
 from flexclear.papers.wang_wang_2019.figures.errors import number
-from flexclear.papers.wang_wang_2019.figures.frequencies import euler_bernoulli_ratio
+from flexclear.papers.wang_wang_2019.figures.given import euler_bernoulli_ratio
 from flexclear.pipeline.post.plotting.table import Table, as_csv, as_html, as_markdown, from_markdown
 from tests.paper import synthetic
 from tests.paper.material import WOBBLE, everything

@@ -1,13 +1,12 @@
 """Kernels called from Python."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 from numba import njit
 
+import flexclear.pipeline.dynamics.field_types  # noqa: F401  (Numba knows named fields before kernels are compiled)
 from flexclear.pipeline.dynamics.fields import data
 
 

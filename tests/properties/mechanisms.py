@@ -1,7 +1,5 @@
 """Small mechanisms for tests, as scenes in tables of SI numbers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -32,6 +30,12 @@ def body(position: Any, mass: float = 1.0, frames: Table | None = None, **more: 
     }
 
 
+def rigid(mass: float, inertia: float | list[float], frames: Table, **more: Any) -> Table:
+    """A rigid body; inertia: one number [kg m^2] where it is alike about all axes."""
+    moments = [inertia] * 3 if isinstance(inertia, float) else inertia
+    return {"type": "rigid", "mass": mass, "inertia": moments, "frames": frames, **more}
+
+
 def ground(**frames: Any) -> Table:
     return {"type": "ground", "frames": {name: {"position": list(p)} for name, p in frames.items()}}
 
@@ -53,8 +57,8 @@ def scene(bodies: Table, joints: Table, end: float = 0.2, rtol: float = 1e-12, *
     }
 
 
-def joint(kind: str, first: str, second: str) -> Table:
-    return {"type": kind, "between": [first, second]}
+def joint(kind: str, first: str, second: str, **more: Any) -> Table:
+    return {"type": kind, "between": [first, second], **more}
 
 
 def turned(R: np.ndarray, vector: Any) -> list[float]:

@@ -5,8 +5,6 @@ world at the start; `scene` may give every body a frame of its own, so that roun
 the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Planar mechanisms in space of known mobility: closed loops, parallel cranks, lazy tongs, Peaucellier's inversor."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

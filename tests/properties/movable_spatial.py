@@ -1,7 +1,5 @@
 """Spatial mechanisms whose mobility is known: doors, Sarrus', Bennett's and Bricard's linkages, parallel platforms."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

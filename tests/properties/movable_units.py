@@ -1,7 +1,5 @@
 """All units of known mobility by name, each with its random geometry."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Scenes and recipes as no user writes them: seeded mutations of sound ones."""
 
-from __future__ import annotations
-
 import random
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Articulated inertias give what the mass matrix gives, in linear time and without its loss of digits."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Assembly from joints alone, on either branch, and what ``[start]`` may not say; nothing is compiled for that."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -15,7 +13,7 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import Table, body, frame, joint, scene
-from tests.properties.test_dynamics_start import CRANK, GROUND, angles, driven, start_of
+from tests.properties.test_dynamics_start import angles, driven, start_of
 
 
 def loose(crank: float, **start: Any) -> Table:
@@ -37,13 +35,7 @@ def turned(mechanism: Mechanism) -> dict[str, float]:
 
 
 def other_branch(crank: float) -> tuple[float, float, float]:
-    """Angles with the pin of coupler and rocker on the other side of the line from the crank's pin to the pivot."""
-    pin, pivot = CRANK * np.array([np.cos(crank), np.sin(crank)]), np.array([GROUND, 0.0])
-    e = (pivot - pin) / np.linalg.norm(pivot - pin)
-    mirror = 2.0 * np.outer(e, e) - np.eye(2)
-    _, coupler, rocker = angles(crank)
-    ways = [mirror @ [np.cos(angle), np.sin(angle)] for angle in (coupler, rocker)]
-    return crank, *(float(np.arctan2(y, x)) for x, y in ways)  # type: ignore[return-value]
+    return angles(crank, -1.0)
 
 
 @pytest.mark.parametrize("crank", [0.9, 2.5, -1.2])

@@ -1,7 +1,5 @@
 """What kernels do with closure rows in threes is what dense algebra does with all of them at once."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Ensembles of chaotic runs: how well they know their means, from made-up members."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -11,7 +11,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.post.cost import causes, page, price, split, work_precision
+from flexclear.pipeline.post.cost import answer, causes, work_precision
 from flexclear.pipeline.post.cost.study import Point, assemble, resolved
 
 POSITION = Quantity("slider", "position")
@@ -120,17 +120,17 @@ def test_a_different_number_of_impacts_is_an_infinite_error_and_never_the_cheape
     runs["d2"] = run(0.0, impacts=2, evaluations=1)
     again = assemble(points, runs, [POSITION, TIMES])
     assert np.isinf(again.error_by_tolerance.sel(rtol=1e-9, quantity="pin.impact_times")).all()
-    chosen = price.cheapest(again, 1e-3)
+    chosen = answer.cheapest(again, 1e-3)
     assert chosen is not None
     assert chosen.evaluations > 1
 
 
 def test_the_cheapest_way_to_each_accuracy():
     found, *_ = study()
-    assert price.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
-    assert price.cheapest(found, 1e-4).name == "dop853, rtol 1e-06"
-    assert price.cheapest(found, 1e-12) is None
-    rows = price.price_list(found, "t").rows
+    assert answer.cheapest(found, 1e-3).name == "rk4, step 0.001 s"
+    assert answer.cheapest(found, 1e-4).name == "dop853, rtol 1e-06"
+    assert answer.cheapest(found, 1e-12) is None
+    rows = answer.price_list(found, "t").rows
     assert rows[2][1] == "cannot be had"
     # 1e-7 s of 0.6 s, and the 1e-8 s by which the reference and its confirmation differ
     assert "1.8e-07 at best" in rows[2][4]
@@ -138,7 +138,7 @@ def test_the_cheapest_way_to_each_accuracy():
 
 def test_each_quantity_has_a_price_of_its_own():
     found, *_ = study()
-    rows = {row[0]: row for row in price.by_quantity(found, "t").rows}
+    rows = {row[0]: row for row in answer.by_quantity(found, "t").rows}
     # 1e-7 m of 2 m and 1e-7 s of 0.6 s, each with the reference's uncertainty of a tenth of it
     assert [rows[name][-1] for name in ("slider.position", "pin.impact_times")] == ["5.5e-08", "1.8e-07"]
     assert rows["slider.position"][2] == "dop853, rtol 1e-09 (0.2 s)"  # 5e-6 at 1e-6 is not enough
@@ -147,13 +147,13 @@ def test_each_quantity_has_a_price_of_its_own():
 
 def test_an_error_below_the_references_uncertainty_is_not_claimed():
     found, *_ = study(uncertainty=1e-5)
-    assert price.cheapest(found, 1e-6) is None
+    assert answer.cheapest(found, 1e-6) is None
 
 
 def test_a_study_of_which_every_run_is_refused_says_so():
     _, points, runs = study()
     refused = {p.key: xr.Dataset(attrs={"refused": "no"}) for p in points if p.group not in ("reference",)}
-    table = price.price_list(assemble(points, runs | refused, [POSITION, TIMES]), "t")
+    table = answer.price_list(assemble(points, runs | refused, [POSITION, TIMES]), "t")
     assert all(row[1] == "cannot be had" for row in table.rows)
     assert any("Not confirmed: other was refused" in note for note in table.notes)
     assert any("every run is refused" in note for note in table.notes)
@@ -168,12 +168,12 @@ def test_a_study_without_its_reference_is_refused_with_the_reason():
 
 def test_what_cannot_be_had_is_explained():
     rounded, *_ = study(uncertainty=1e-7)
-    assert any("rounding errors" in note for note in price.price_list(rounded, "t").notes)
+    assert any("rounding errors" in note for note in answer.price_list(rounded, "t").notes)
     coarse, *_ = study(uncertainty=1e-12)
-    assert any("best setting that was tried reaches" in note for note in price.price_list(coarse, "t").notes)
+    assert any("best setting that was tried reaches" in note for note in answer.price_list(coarse, "t").notes)
     _, points, runs = study()
     runs["other"] = run(0.0, impacts=2)
-    other = price.price_list(assemble(points, runs, [POSITION, TIMES]), "t")
+    other = answer.price_list(assemble(points, runs, [POSITION, TIMES]), "t")
     assert any("do not agree on the number of impacts" in note for note in other.notes)
 
 
@@ -181,7 +181,7 @@ def test_a_scene_that_is_refused_as_it_stands_has_no_causes():
     _, points, runs = study()
     points.append(Point("as it is", "sampling", {"interval": 0.1}))
     runs["as it is"] = xr.Dataset(attrs={"refused": "no"})
-    found = split.causes_of(POSITION, points, runs, located=1e-12)
+    found = causes.causes_of(POSITION, points, runs, located=1e-12)
     assert np.isnan(found["time integration"])
     assert causes.dominant(found) == "–"
 
@@ -195,11 +195,11 @@ def test_the_spread_of_an_ensemble_is_a_cause():
         "standard_error": (("quantity",), [0.01]),
     }
     ensemble = xr.Dataset(data, {"contact": ["pin"], "quantity": ["slider.position"]})
-    found = split.causes_of(POSITION, points, runs, 1e-12, ensemble)
+    found = causes.causes_of(POSITION, points, runs, 1e-12, ensemble)
     assert found["ensemble spread"] == pytest.approx(1.96 * 0.01 / SIZE)
-    assert np.isnan(split.causes_of(TIMES, points, runs, 1e-12, ensemble)["ensemble spread"])
+    assert np.isnan(causes.causes_of(TIMES, points, runs, 1e-12, ensemble)["ensemble spread"])
     runs["best"]["event_peak_force"] = (("event",), np.full(3, 100.0))
-    peak = split.causes_of(Quantity("pin", "peak_force"), points, runs, 1e-12, ensemble)["ensemble spread"]
+    peak = causes.causes_of(Quantity("pin", "peak_force"), points, runs, 1e-12, ensemble)["ensemble spread"]
     assert peak == pytest.approx(1.96 * 0.05 / np.sqrt(members), rel=0.5)
 
 
@@ -224,13 +224,13 @@ def test_causes_come_from_pairs_that_differ_in_one_thing():
     for (key, factors), error in zip(variants.items(), (0.0, 3e-4, 2e-3), strict=True):
         points.append(Point(key, "model", factors))
         runs[key] = run(error)
-    found = split.causes_of(POSITION, points, runs, located=1e-12)
+    found = causes.causes_of(POSITION, points, runs, located=1e-12)
     assert found["time integration"] == pytest.approx(1e-5 / SIZE)
     assert found["mesh"] == pytest.approx(3e-4 / SIZE)
     assert found["beam theory"] == pytest.approx(2e-3 / SIZE)
     assert found["modal truncation"] == 0.0
     assert causes.dominant(found) == "beam theory"
-    located = split.causes_of(TIMES, points, runs, located=1e-12)["event location"]
+    located = causes.causes_of(TIMES, points, runs, located=1e-12)["event location"]
     assert located == pytest.approx(1e-12 * 1e-3 / 0.5 / 0.6)  # share of the clearance, over speed, over the span
 
 
@@ -257,8 +257,8 @@ def test_contacts_beyond_the_horizon_do_not_count():
 
 def written(found: xr.Dataset, tables: tuple[str, ...] = (), pictures: Mapping[str, str] | None = None) -> str:
     """The page of one scene."""
-    said = page.Studied("a/scene", page.advice(found, tables), tables, pictures or {})
-    return page.markdown((said,), "docs/accuracy.md")
+    said = answer.Studied("a/scene", answer.advice(found, tables), tables, pictures or {})
+    return answer.markdown((said,), "docs/accuracy.md")
 
 
 def test_the_page_says_what_each_digit_costs():
@@ -304,4 +304,4 @@ def test_other_programs_are_drawn_beside_ours_relative_to_the_same_size():
     assert curve.error[:, 0] == pytest.approx([1e-3 / SIZE, 1e-4 / SIZE])
     assert np.isnan(curve.error[:, 1]).all()  # it says nothing of impact times
     assert set(work_precision.make("w", found, "t", (), [curve])) == {"w.png", "w.svg"}
-    assert price.price_list(found, "t", ("said",)).notes[-1] == "said"
+    assert answer.price_list(found, "t", ("said",)).notes[-1] == "said"

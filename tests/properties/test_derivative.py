@@ -1,7 +1,5 @@
 """Tangents of tapes are the derivatives of what the tapes compute, to rounding."""
 
-from __future__ import annotations
-
 import operator
 from pathlib import Path
 from typing import Any

@@ -1,9 +1,6 @@
 """Forces of a clearance joint on the two bodies that it joins, at any relative motion, for every pair of laws."""
 
-from __future__ import annotations
-
 from functools import cache
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -12,12 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
-from flexclear.pipeline.core.scene.registry import module_of
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import joints
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.contact import forces, friction
 from flexclear.pipeline.dynamics.contact import form as forms
+from flexclear.pipeline.dynamics.contact import surfaces as surfaces_of_joints
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from tests.properties.kernels import from_arrays, from_python
@@ -64,9 +61,9 @@ def tables_of(laws: Laws) -> Model:
 
 @cache
 def kernel(laws: Laws) -> Any:
-    form = import_module(module_of(forms.__name__, tables_of(laws).laws[0].form))
-    surfaces = import_module(module_of(joints.__name__, laws[2], table="CONTACTS"))
-    frictions = () if laws[1] is None else (import_module(module_of(friction.__name__, laws[1])),)
+    form = lookup(forms.__name__, tables_of(laws).laws[0].form, where="test")
+    surfaces = lookup(surfaces_of_joints.__name__, laws[2], where="test")
+    frictions = () if laws[1] is None else (lookup(friction.__name__, laws[1], where="test"),)
     return from_arrays(forces.make_contacts((surfaces,), (form,), frictions))
 
 
@@ -191,7 +188,7 @@ def test_the_ledger_books_what_the_forces_do(laws: Laws, seed: int, depth: float
     """Power on both bodies = -(rate of the stored energy) - the two losses."""
     touch = Touch(laws, seed, depth, slip)
     law = tables_of(laws).laws[0]
-    form = import_module(module_of(forms.__name__, law.form))
+    form = lookup(forms.__name__, law.form, where="test")
     elastic = float(from_python(form.force)(-touch.touch[m.TOUCH.gap], 0.0, 1.0, law.numbers)[0])
     stored = elastic * touch.touch[m.TOUCH.rate]
     size = np.abs(touch.wrench["ball"]).max() * slip * 20.0

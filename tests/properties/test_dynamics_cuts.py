@@ -1,7 +1,5 @@
 """A joint moves a mechanism alike whether the tree takes it or a loop is closed by it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

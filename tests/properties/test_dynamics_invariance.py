@@ -1,7 +1,5 @@
 """What must not depend on where a mechanism stands, in which order it is written, or which way round."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from typing import Any

@@ -1,9 +1,6 @@
 """Every joint type moves as its pose says."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -44,7 +41,7 @@ def move(name: str, x: np.ndarray, u: np.ndarray, du: np.ndarray) -> Motion:
     """What the joint's kernels say."""
     w, n = np.full(AT_S + 36, np.nan), len(u)  # what the kernel does not write must not be read
     w[AT_X : AT_X + len(x)], w[AT_U : AT_U + n] = x, u
-    kernels = import_module(declared(name).__module__)
+    kernels = declared(name)
     R, p, *bias = from_python(kernels.motion)(w, AT_X, AT_U, AT_S)
     from_python(kernels.position_rate)(w, AT_X, AT_U, AT_RATE)
     S = w[AT_S : AT_S + 6 * n].reshape(n, 6).T

@@ -1,19 +1,16 @@
 """Normal contact laws: what every one must do, whoever adds one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
-from flexclear.pipeline.core.scene.registry import lookup, module_of
+from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.dynamics.contact import form as forms
 from flexclear.pipeline.dynamics.contact import normal
 from flexclear.pipeline.dynamics.contact.law import Resolved
@@ -63,7 +60,7 @@ class Law:
         return NORMAL[self.name][0](float(self.restitution or 0.0))
 
     def parts(self, depth: float, rate: float, impact_rate: float) -> tuple[float, float]:
-        form = import_module(module_of(forms.__name__, self.resolved.form))
+        form = lookup(forms.__name__, self.resolved.form, where="test")
         elastic, damping = from_python(form.force)(depth, rate, impact_rate, self.resolved.numbers)
         return float(elastic), float(damping)
 
@@ -71,7 +68,7 @@ class Law:
         return sum(self.parts(depth, rate, impact_rate))
 
     def stored(self, depth: float) -> float:
-        form = import_module(module_of(forms.__name__, self.resolved.form))
+        form = lookup(forms.__name__, self.resolved.form, where="test")
         return float(from_python(form.stored)(depth, self.resolved.numbers))
 
 
@@ -97,21 +94,13 @@ def test_every_normal_law_is_tried_here() -> None:
 
 @every_law
 @given(stiffness=STIFF, exponent=EXPONENT, depth=DEPTH, rate=RATE, impact=IMPACT)
-def test_normal_force_never_pulls(
+def test_normal_force_never_pulls_and_damping_never_feeds_energy(
     law: Law, stiffness: float, exponent: float, depth: float, rate: float, impact: float
 ) -> None:
     """However fast the surfaces part, far faster than they met included."""
     elastic, damping = Law(law.name, law.restitution, stiffness, exponent).parts(depth, rate, impact)
     assert damping >= -elastic
-
-
-@every_law
-@given(stiffness=STIFF, exponent=EXPONENT, depth=DEPTH, rate=RATE, impact=IMPACT)
-def test_damping_never_feeds_energy(
-    law: Law, stiffness: float, exponent: float, depth: float, rate: float, impact: float
-) -> None:
-    tried = Law(law.name, law.restitution, stiffness, exponent)
-    assert tried.parts(depth, rate, impact)[1] * rate >= 0.0
+    assert damping * rate >= 0.0
 
 
 @pytest.mark.parametrize("law", [law for law in laws() if law.name != "kelvin-voigt"], ids=called)

@@ -1,7 +1,5 @@
 """Loads act as they say: on both sides alike, at the power that the ledger books, whichever way the scene stands."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

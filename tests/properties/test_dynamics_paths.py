@@ -1,7 +1,5 @@
 """Frames on given paths: they go there, and the forces told are those that it takes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Starts: what the scene gives is kept where the joints allow it, and refused where they do not."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 
@@ -16,6 +14,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.assembly import assembled
 from flexclear.pipeline.dynamics.model.given_start import moved
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
+from tests.analytic.change_points import elbow
 from tests.analytic.mechanism_runs import TREE, bundles
 from tests.properties.mechanisms import body, frame, ground, joint, scene, simulate
 from tests.properties.test_dynamics_cuts import two_loops
@@ -94,15 +93,9 @@ def test_velocity_and_spin_of_a_hinged_flexible_rod_agree_about_its_hinge() -> N
 GROUND, CRANK, COUPLER, ROCKER = 0.5, 0.2, 0.4, 0.3
 
 
-def angles(crank: float) -> tuple[float, float, float]:
-    """Angles of crank, coupler and rocker of a four-bar: the pin between the latter two is where two circles meet."""
-    pin, pivot = CRANK * np.array([np.cos(crank), np.sin(crank)]), np.array([GROUND, 0.0])
-    across = pivot - pin
-    d = np.linalg.norm(across)
-    along = (COUPLER**2 - ROCKER**2 + d**2) / (2.0 * d)
-    e = across / d
-    tip = pin + along * e + np.sqrt(COUPLER**2 - along**2) * np.array([-e[1], e[0]])
-    return crank, float(np.arctan2(*(tip - pin)[::-1])), float(np.arctan2(*(tip - pivot)[::-1]))
+def angles(crank: float, side: float = 1.0) -> tuple[float, float, float]:
+    """Angles of crank, coupler and rocker of a four-bar; side: of the elbow of the latter two."""
+    return crank, *elbow(crank, side, (CRANK, COUPLER, ROCKER, GROUND))
 
 
 def driven(given: float, law: float, **crank: Any) -> dict[str, Any]:

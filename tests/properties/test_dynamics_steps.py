@@ -1,7 +1,5 @@
 """What every integrator owes: breaks stepped onto, pauses that change nothing, refusals in words, drift mended."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

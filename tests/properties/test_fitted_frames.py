@@ -1,7 +1,5 @@
 """Frames known to a tolerance, as those of meshed bodies, are moved so that joints fit which nearly do."""
 
-from __future__ import annotations
-
 from random import Random
 
 import numpy as np

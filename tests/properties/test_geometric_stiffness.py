@@ -1,7 +1,5 @@
 """The shortening of a bent beam: forms of the bundle against direct integration, and what loads on its ends do."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

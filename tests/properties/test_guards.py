@@ -1,7 +1,5 @@
 """Guards on which steps end: what a step passes first, in closed form, and what a mechanism's table holds."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexclear.commands import cost_peers, scenes
+from flexclear.commands import cost, scenes
 from flexclear.pipeline.core.artifacts import upkeep
 from flexclear.pipeline.core.artifacts.disk import checked, read_checked, sha256
 from flexclear.pipeline.core.artifacts.store import Store, read_record
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.sweep import read_sweep
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
-from flexclear.pipeline.core.workflow.journal import Journal, State, sealed
+from flexclear.pipeline.core.workflow.journal import Journal, sealed
 from flexclear.pipeline.post.render import forms
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.solid import imported
@@ -208,7 +208,7 @@ def test_a_packed_matrix_is_not_read_beyond_what_its_header_says(tmp_path: Path)
 def test_runs_of_other_programs_are_numbers(text: str, tmp_path: Path) -> None:
     (tmp_path / "p.json").write_text(text)
     with refused("--peer"):
-        cost_peers.read(tmp_path / "p.json")
+        cost.read_peers(tmp_path / "p.json")
 
 
 # Folders of results that somebody else sent ----------------------------------------------------------------------
@@ -274,12 +274,13 @@ def test_strange_tables_with_right_sums_are_read_as_texts(tmp_path: Path) -> Non
 def test_unfinished_work_of_somebody_else_is_not_gone_on_with(tmp_path: Path) -> None:
     """What a work space holds decides where compiled code writes; its sum can only be made by its user."""
     kept = Journal(tmp_path, "key")
-    kept.write("piece", State({"w": np.ones(3)}, {"done": False}, np.ones((2, 2))))
+    kept.store("piece", lambda: {"w": np.ones(3)})
+    kept.write()
     assert Journal(tmp_path, "key").find("piece") is not None
-    for path in tmp_path.glob("*.part"):
-        content = path.read_bytes().partition(b"\n")[2]
-        assert path.read_bytes().startswith(sealed(content).encode())
-        path.write_bytes(sha256(content).encode() + b"\n" + content)
+    (path,) = tmp_path.glob("*.part")
+    content = path.read_bytes().partition(b"\n")[2]
+    assert path.read_bytes().startswith(sealed(content).encode())
+    path.write_bytes(sha256(content).encode() + b"\n" + content)
     assert Journal(tmp_path, "key").find("piece") is None
 
 

@@ -1,7 +1,5 @@
 """Scene files of the worst kind: each refused in words, with place and remedy, and never by a traceback."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +11,7 @@ from flexclear.pipeline.core.scene import units
 from flexclear.pipeline.core.scene.fields import Inertia, Position
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.units import UNITS, quantity, unit
-from flexclear.pipeline.core.system.errors import InputError, ResourceError
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.assembly import assembled
 from flexclear.pipeline.dynamics.model.mechanism import build
 
@@ -54,24 +52,21 @@ HOSTILE: dict[str, tuple[str, ...]] = {
     "body = [1, 2]": ("[body]", "expected a table", "[body.NAME]"),
     "body = 3": ("[body]", "expected a table"),
     BASE.replace("crank.A", "crankA"): ("[joint.A.between.1]", "body.FRAME"),
-    BASE.replace('"ground.O", ', ""): ("[joint.A.between]", "has 1 entry, and needs at least 2"),
-    BASE.replace("mass = 1.0", "mass = nan"): ("[body.crank.mass]", "not a finite number"),
     BASE.replace("mass = 1.0", "mass = 1e300"): ("[body.crank.mass]", "beyond what can be computed with"),
-    BASE.replace("mass = 1.0", "mas = 1.0"): ("[body.crank.mas]", "unknown key", "did you mean 'mass'?"),
     BASE.replace("[0.1, 0.1, 0.1]", "[[0.1], [0.1, 1], 0.1]"): ("[body.crank.inertia]", "3x3 matrix"),
-    BASE.replace('"revolute"', '"revolut"'): ("[joint.A.type]", "no such type", "did you mean 'revolute'?"),
-    BASE.replace('type = "revolute"\n', ""): ("[joint.A.type]", "is missing", "one of: spherical"),
-    BASE.replace("time.end", "tme.end"): ("[tme]", "unknown key", "did you mean 'time'?"),
     BASE + '[body."../up"]\ntype = "ground"': ("[body.../up]", "is no name"),
     BASE + "[joint.B]\nbetween = 5": ("[joint.B.type]",),
     BASE + "[load.f]\ntype = 'point-force'\nframe = 'crank.P'\nforce = 5": ("[load.f.force]", "expected a list"),
+    BASE + '[solver]\nintegrator = "rk4"': ("[solver]", "rk4 has no error estimate", "give step"),
+    BASE + '[solver]\nintegrator = "rk4"\nstep = "-1 us"': ("[solver.step]", "greater than 0"),
+    BASE + '[solver]\nstep = "1 mm"': ("[solver.step]", "'1 mm' is a length"),
+    BASE + '[solver]\nevents = "at step ends"': ("[solver]", "needs fixed steps", "give step"),
+    BASE + '[solver]\nintegrator = "generalized-alpha"\nrho_inf = 1.5': ("[solver.rho_inf]", "less than or equal to 1"),
+    BASE + "[solver]\nrho_inf = 0.5": ("[solver]", "rho_inf belongs to generalized-alpha"),
     BASE + "[solver]\nrtol = -1e-9": ("[solver.rtol]", "must be greater than"),
     BASE + "[solver]\nevaluations = 99999999999999999999999": ("[solver.evaluations]", "less than or equal to"),
-    BASE + "[output]\ninterval = 0": ("[output.interval]", "must be greater than 0"),
     "x = " + "[" * 3000 + "]" * 3000: ("too deeply",),
-    "title = \n": ("is not TOML", "line 1"),
     "[body.kürbel]": ("is not TOML", "quotation marks"),
-    'extends = "SELF"': ("extends itself",),
     'extends = ["sound.toml"]': ("[extends]", "one file"),
     'extends = "."': ("cannot be read",),
     'extends = "sound.toml"\nreplace = [1]': ("[replace]", "expected a table"),
@@ -86,20 +81,12 @@ HOSTILE: dict[str, tuple[str, ...]] = {
 def test_a_hostile_file_is_refused_in_words(text: str, tmp_path: Path) -> None:
     (tmp_path / "sound.toml").write_text(BASE)
     path = tmp_path / "hostile.toml"
-    path.write_text(text.replace("SELF", path.name))
+    path.write_text(text)
     with pytest.raises(InputError) as error:
         load_scene(path)
     assert error.value.exit_code == 2
     for word in HOSTILE[text]:
         assert word in str(error.value)
-
-
-def test_what_is_right_but_too_much_is_refused_as_a_limit(tmp_path: Path) -> None:
-    path = tmp_path / "hostile.toml"
-    path.write_text(BASE + "[output]\ninterval = 1e-12")
-    with pytest.raises(ResourceError, match=r"\[output.interval\]: .*1e\+12 rows") as error:
-        load_scene(path)
-    assert error.value.exit_code == 4
 
 
 def test_files_that_are_no_text_are_refused(tmp_path: Path) -> None:

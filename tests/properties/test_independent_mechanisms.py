@@ -1,7 +1,5 @@
 """Mechanisms that share no force are each as accurate as alone, however different their sizes are."""
 
-from __future__ import annotations
-
 from random import Random
 from typing import Any
 
@@ -14,6 +12,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics.model.mechanism import build
+from tests.properties.mechanisms import joint, rigid, scene
 
 STIFFNESS, FREQUENCY = 400.0, 20.0
 
@@ -27,39 +26,16 @@ def pair(amplitude: float, reach: float, random: Random, **changes: Any) -> tupl
     x, y, z = turn.T
     axes = {"x": x.tolist(), "z": z.tolist()}
     at = turn @ [0.1, 0.0, 0.0]
-    stage = {
-        "type": "rigid",
-        "mass": 1.0,
-        "inertia": [0.01, 0.01, 0.01],
-        "pose": {"position": (at + amplitude * z).tolist(), "axes": axes},
-        "frames": {"o": {}},
-    }
-    crane = {
-        "type": "rigid",
-        "mass": 1000.0,
-        "com": [reach, 0.0, 0.0],
-        "inertia": [10.0 * reach**2] * 3,
-        "pose": {"axes": axes},
-        "frames": {"o": {}},
-    }
+    stage = rigid(1.0, 0.01, {"o": {}}, pose={"position": (at + amplitude * z).tolist(), "axes": axes})
+    crane = rigid(1000.0, 10.0 * reach**2, {"o": {}}, com=[reach, 0.0, 0.0], pose={"axes": axes})
     bodies = [("stage", stage), ("crane", crane)]
     random.shuffle(bodies)
     frames = {"o": {"axes": axes}, "q": {"position": at.tolist(), "axes": axes}}
-    table: dict[str, Any] = {
-        "title": "small and large",
-        "time": {"end": 2.0},
-        "output": {"interval": 0.05},
-        "body": {"ground": {"type": "ground", "frames": frames}} | dict(bodies),
-        "joint": {
-            "p": {"type": "prismatic", "between": ["ground.q", "stage.o"]},
-            "h": {"type": "revolute", "between": ["ground.o", "crane.o"]},
-        },
-        "load": {
-            "g": {"type": "gravity", "acceleration": (-9.81 * y).tolist()},
-            "s": {"type": "joint-spring", "joint": "p", "stiffness": STIFFNESS},
-        },
-    }
-    return table | changes, z
+    load = {"g": {"type": "gravity", "acceleration": (-9.81 * y).tolist()}}
+    load["s"] = {"type": "joint-spring", "joint": "p", "stiffness": STIFFNESS}
+    joints = {"p": joint("prismatic", "ground.q", "stage.o"), "h": joint("revolute", "ground.o", "crane.o")}
+    bodies.append(("ground", {"type": "ground", "frames": frames}))
+    return scene(dict(bodies), joints, 2.0, load=load, **{"output": {"interval": 0.05}, "solver": {}} | changes), z
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -1,7 +1,5 @@
 """Shapes that move no frame are eliminated for themselves; accelerations are those of eigenmodes all coupled."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 
@@ -18,6 +16,8 @@ from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
 from flexclear.pipeline.dynamics.specialise.trace import Trace
 from tests.analytic.mechanism_runs import TREE, bundles
+from tests.properties.mechanisms import joint, rigid
+from tests.properties.mechanisms import scene as written
 
 MODES = "body.rod1.modes"
 
@@ -56,31 +56,19 @@ def chain() -> Scene:
     modes = {"reference": "craig-bampton", "count": 24, "interfaces": ["bottom", "top"]}
     rod: dict[str, Any] = {"type": "flexible", "mesh": str(TREE / "meshes/actuated_rod.toml"), "modes": modes}
     along = {"z": [1.0, 0.0, 0.0], "x": [0.0, 1.0, 0.0]}  # the rods lie along x
-    return Scene.model_validate(
-        {
-            "title": "two rods",
-            "time": {"end": 0.01},
-            "output": {"interval": 0.01},
-            "body": {
-                "ground": {"type": "ground", "frames": {"base": {"axes": along}}},
-                "lower": rod | {"pose": {}},
-                "upper": rod | {"pose": {"position": [0.24, 0.0, 0.0]}},
-                "block": {
-                    "type": "rigid",
-                    "mass": 2.0,
-                    "inertia": [1e-3, 2e-3, 3e-3],
-                    "pose": {"position": [0.48, 0.0, 0.0]},
-                    "frames": {"under": {"axes": along}},
-                },
-            },
-            "joint": {
-                "foot": {"type": "fixed", "between": ["ground.base", "lower.bottom"]},
-                "knee": {"type": "universal", "between": ["lower.top", "upper.bottom"]},
-                "top": {"type": "fixed", "between": ["upper.top", "block.under"]},
-            },
-            "load": {"gravity": {"type": "gravity", "acceleration": [1.0, 2.0, -9.81]}},
-        }
-    )
+    bodies = {
+        "ground": {"type": "ground", "frames": {"base": {"axes": along}}},
+        "lower": rod | {"pose": {}},
+        "upper": rod | {"pose": {"position": [0.24, 0.0, 0.0]}},
+        "block": rigid(2.0, [1e-3, 2e-3, 3e-3], {"under": {"axes": along}}, pose={"position": [0.48, 0.0, 0.0]}),
+    }
+    joints = {
+        "foot": joint("fixed", "ground.base", "lower.bottom"),
+        "knee": joint("universal", "lower.top", "upper.bottom"),
+        "top": joint("fixed", "upper.top", "block.under"),
+    }
+    load = {"gravity": {"type": "gravity", "acceleration": [1.0, 2.0, -9.81]}}
+    return Scene.model_validate(written(bodies, joints, 0.01, load=load, output={"interval": 0.01}, solver={}))
 
 
 @cache

@@ -1,7 +1,5 @@
 """Who leads the steppers of a lane group: one thread at a time, whatever becomes of it."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Exact changes of forces, against differences of the compiled right-hand side over several steps."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Which effects matter: from made-up points whose differences and scatter are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

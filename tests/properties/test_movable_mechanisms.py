@@ -1,7 +1,5 @@
 """No mechanism that moves is refused: mobility and rank of a family in which they are known by construction."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

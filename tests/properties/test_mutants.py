@@ -1,7 +1,5 @@
 """Whatever stands in a scene or a recipe: taken, or refused in words, without endless work and in little memory."""
 
-from __future__ import annotations
-
 import os
 import resource
 import time

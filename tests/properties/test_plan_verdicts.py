@@ -1,7 +1,5 @@
 """Verdicts on plans: what is met, missed and not decided, before and beyond the horizon, and with how many members."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -17,13 +17,11 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.post.render import forms, gl, joint_view, pace, player, surfaces, vibrations
-from flexclear.pipeline.post.render.forms import Seat, equivalent
+from flexclear.pipeline.post.render.forms import Seat, equivalent, wheels
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism, placed
 from flexclear.pipeline.post.render.pictures import Shown, make
 from flexclear.pipeline.post.render.vibrations import Vibrations
-from flexclear.pipeline.post.render.wheels import wheels
-from flexclear.pipeline.post.shapes.body_shape import surface
-from flexclear.pipeline.post.shapes.rod_shape import AROUND, PER_CELL
+from flexclear.pipeline.post.shapes.body_shape import AROUND, PER_CELL, surface
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes.rigid import drawn
 from flexclear.stages import rendering, simulation
@@ -294,13 +292,13 @@ def test_a_vibrating_pendulum_turns_about_its_pin_and_is_not_drawn_too_far(swing
 
 @needs_gl
 def test_a_film_of_vibrations_goes_through_whole_periods(swinging: tuple[Mechanism, Vibrations]):
-    from flexclear.pipeline.post.render import vibration_film
+    from flexclear.pipeline.post.render import vibrations
 
-    pictures = np.array(list(vibration_film.frames(*swinging, 8)))
+    pictures = np.array(list(vibrations.frames(*swinging, 8)))
     assert pictures.shape == (12, 540, 960, 3)  # 1.5 s of 8 pictures
     np.testing.assert_array_equal(pictures[:6], pictures[6:])
     assert np.abs(pictures[3].astype(int) - pictures[0]).max() > 50  # of 255: the other side half a period later
-    assert vibration_film.sheet(*swinging).shape == (360, 480, 3)
+    assert vibrations.sheet(*swinging).shape == (360, 480, 3)
 
 
 @pytest.mark.parametrize("what, kind", [("joint", "gltf"), ("vibrations", "pvd")])
@@ -338,8 +336,7 @@ def test_a_ring_and_a_tube_are_seen_from_outside():
     turn = np.linspace(0.0, 2.0 * np.pi, 129)
     torus = surfaces.tube(np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn]), 0.1, corners=12)
     for shape in (torus, *(forms.wheel_of_gear(where, 1.0, 1.0, inner=inner) for inner in (True, False))):
-        a, b, c = np.moveaxis(shape.points[shape.triangles], 1, 0)
-        assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0.0
+        assert volume(shape) > 0.0
 
 
 def test_a_rectangular_rod_is_drawn_with_its_sides(root: Path):

@@ -1,7 +1,5 @@
 """What is recorded of a row: the same whatever rows stand beside it, and as independent formulas have it."""
 
-from __future__ import annotations
-
 from dataclasses import fields, replace
 
 import numpy as np

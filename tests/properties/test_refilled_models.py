@@ -1,7 +1,5 @@
 """A model that is refilled with the numbers of an edited scene is the one that would be made from scratch."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path

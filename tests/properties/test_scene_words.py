@@ -56,15 +56,6 @@ def mistakes(tmp_path: Path, text: str) -> list[str]:
 
 COULOMB = 'law = "modified-coulomb", static = 0.2, dynamic = 0.1, v_static = 1e-4, v_dynamic = 1e-3'
 SAID = {
-    SOCKET.replace("WORDS", COULOMB.replace("1e-4", "2e-4").replace("1e-3", "1e-5")): (
-        "[joint.c.friction]",
-        "v_static must be below v_dynamic",
-        "v_static = 0.0002 m/s, v_dynamic = 1e-05 m/s",
-    ),
-    SOCKET.replace("WORDS", COULOMB.replace("coulomb", "culomb")): (
-        "[joint.c.friction.law]",
-        "did you mean 'modified-coulomb'?",
-    ),
     SOCKET.replace("WORDS", "static = 0.2"): ("[joint.c.friction.law]", "is missing", "modified-coulomb, ambrosio"),
     SOCKET.replace("WORDS", COULOMB.replace("1e-4", "0")): (
         "[joint.c.friction.v_static]",
@@ -74,10 +65,8 @@ SAID = {
         "v0 must be below v1",
         "v0 = 1 m/s, v1 = 0.5 m/s",
     ),
-    BEAM.replace("WORDS", "count = -1"): ("[body.f.modes.count]", "must be greater than or equal to 0 (got -1)"),
     BEAM.replace("WORDS", 'count = "al"'): ("[body.f.modes.count]", "expected a whole number or 'all' (got 'al')"),
     BEAM.replace("WORDS", "count = 1") + "damping = -1": ("[body.f.damping]", "must be greater than 0 (got -1)"),
-    "[solver]\nrtol = 1": ("[solver.rtol]", "must be less than or equal to 0.01 (got 1)"),
 }
 
 
@@ -197,16 +186,11 @@ def test_an_axis_stands_alone(other: str) -> None:
         Pose.model_validate({"axis": [0, 0, 1], other: value})
 
 
-def test_an_axis_of_no_length_is_refused() -> None:
-    with pytest.raises(ValidationError, match="must not have the length zero"):
-        Pose(axis=(0, 0, 0))
-
-
 def test_frames_of_recipes_take_an_axis_too() -> None:
     across = TypeAdapter(NodeFrame).validate_python({"x": "10 mm", "axis": [0, 0, 1]})
     assert across.orientation() == pytest.approx(np.eye(3), abs=0.0)
     upright = TypeAdapter(TurnedFrame).validate_python({"axis": [1, 0, 0]})
-    assert quaternion_to_matrix(upright.orientation().as_quaternion())[:, 2] == pytest.approx([1, 0, 0], abs=1e-15)
+    assert upright.orientation()[:, 2] == pytest.approx([1, 0, 0], abs=1e-15)
     for model, more in ((NodeFrame, {"x": 0.0}), (TurnedFrame, {})):
         with pytest.raises(ValidationError, match="an orientation is given once"):
             model.model_validate({"axis": [0, 0, 1], "axes": {"z": [0, 0, 1], "x": [1, 0, 0]}, **more})

@@ -1,7 +1,5 @@
 """Straight code for one wiring computes what the kernels do, with any numbers, and is made again for no number."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from itertools import pairwise
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Is a run stable: each check against a made-up run that fails just that one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import xarray as xr

@@ -1,7 +1,5 @@
 """Effects of a scene by name, scenes without some of them, and these as files that say only what differs."""
 
-from __future__ import annotations
-
 import tomllib
 from itertools import combinations
 from pathlib import Path

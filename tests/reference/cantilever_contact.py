@@ -5,8 +5,6 @@ bending in the plane and stretch, shapes scaled to unit modal mass; the pin adds
 journal's centre is where the tip's is at rest.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

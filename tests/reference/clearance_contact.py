@@ -4,8 +4,6 @@ Wang & Wang (2019), eqs. (21)-(29): both forces act at one point on the line of 
 ball's surface; friction acts against the sliding of the material points there.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

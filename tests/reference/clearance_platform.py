@@ -5,8 +5,6 @@ fix the platform.  Its six balances are linear in :math:`\ddot\lambda`, three ax
 two horizontal forces at C.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From contact to contact: runs with one clearance joint, events located, nothing shared with the engine."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

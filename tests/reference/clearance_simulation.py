@@ -9,8 +9,6 @@ about B1 and M the moment of the contact force there,
           \qquad I_a\,\dot\sigma = M\cdot u .
 """
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

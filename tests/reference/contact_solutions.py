@@ -5,8 +5,6 @@ Free impact of a mass m: :math:`m\ddot\delta = -K\delta^n(1 + a\dot\delta/\dot\d
 :math:`w = -e` obeys :math:`\ln[(1+a)/(1-ae)] = a(1+e)` for every K, n, m and speed.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -102,33 +100,6 @@ def vertical_frequency(mass: float, stiffness: float, gravity: float, exponent: 
     return math.sqrt(exponent * stiffness * depth ** (exponent - 1.0) / mass) / (2.0 * math.pi)
 
 
-def lateral_frequency(clearance: float, depth: float, gravity: float) -> float:
-    """Frequency [Hz] of small swings on the floor of a smooth socket: a pendulum of length clearance + depth."""
-    return math.sqrt(gravity / (clearance + depth)) / (2.0 * math.pi)
-
-
 def swing_period(clearance: float, depth: float, gravity: float, amplitude: float) -> float:
     """Period [s] of a swing of any amplitude [rad] on a smooth floor so stiff that `depth` hardly changes."""
     return float(4.0 * math.sqrt((clearance + depth) / gravity) * ellipk(math.sin(amplitude / 2.0) ** 2))
-
-
-@dataclass(frozen=True)
-class Conical:
-    """Steady circling on the socket's floor: depth [m], rate [rad/s], radius and height [m], speed [m/s], force [N]."""
-
-    depth: float
-    rate: float
-    radius: float
-    height: float
-    speed: float
-    force: float
-
-
-def conical(mass: float, stiffness: float, clearance: float, gravity: float, half_angle: float) -> Conical:
-    """A ball circling at a constant angle [rad] from the vertical without friction."""
-    force = mass * gravity / math.cos(half_angle)
-    depth = (force / stiffness) ** (2.0 / 3.0)
-    reach = clearance + depth
-    rate = math.sqrt(gravity / (reach * math.cos(half_angle)))
-    radius = reach * math.sin(half_angle)
-    return Conical(depth, rate, radius, -reach * math.cos(half_angle), rate * radius, force)

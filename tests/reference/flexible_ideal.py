@@ -5,8 +5,6 @@ from B1, the axial forces of legs 2, 3, 4, the horizontal forces at C and the fo
 leg's equations, the platform's six balances, and that ball and socket accelerate alike.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 

@@ -11,8 +11,6 @@ the frame and the upper ball on the rod's end, this gives the 3 + n equations of
 platform is `clearance_platform`.
 """
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 

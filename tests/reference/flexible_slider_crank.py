@@ -5,8 +5,6 @@ mass points and of the slider, with the crank's rotation given and the slider's 
 reduced by projection on the motions that the constraint leaves free.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

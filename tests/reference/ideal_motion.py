@@ -5,8 +5,6 @@ rotation R.  With :math:`d_k = z e_z + R a_k - B_k`, each leg says :math:`d_k\cd
 its first and second time derivatives are linear in speeds and accelerations.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

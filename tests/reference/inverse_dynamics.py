@@ -7,8 +7,6 @@ leg of the force at A; the platform's six balances then give the four axial forc
 horizontal forces at C, the vertical one there being fixed by the sliding central chain.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -10,8 +10,6 @@ solved densely; nothing holds the rows but that they start satisfied, which suff
 follow from others at the start, as those of planar loops in space do, are left out.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

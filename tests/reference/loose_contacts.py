@@ -1,7 +1,5 @@
 """Contacts of loose bodies, between events that SciPy locates: the first impacts of a scene, found a second time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

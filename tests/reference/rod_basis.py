@@ -6,8 +6,6 @@ point of an element, placed so that they have the section's area and second mome
 term of the moving rod is a sum over them, without shape integrals.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

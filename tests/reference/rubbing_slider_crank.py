@@ -5,8 +5,6 @@ found by repeating the linear solution with the reactions of the one before unti
 coefficients are small enough for that. Integrations end where friction bends, so that the motion is known to 1e-12.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache

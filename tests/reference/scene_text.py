@@ -1,7 +1,5 @@
 """A scene file as plain numbers, read with nothing of the program: TOML, units, poses."""
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib

@@ -135,7 +135,6 @@ class Contact:
         return replace(self, **values)
 
 
-BREAKS = (0.0, 0.09, 0.18)
 STROKE = 0.06
 
 

@@ -8,8 +8,6 @@ SPIN_UP: tip of a cantilever that is spun up, by assumed modes (6 bending, 6 axi
 integrated to 1e-11: time [s], deflection across the undeformed axis [m], stretch of the axis [m], foreshortening [m].
 """
 
-from __future__ import annotations
-
 #: Gamma -> (flapping, lagging)
 WRIGHT = {
     0: (

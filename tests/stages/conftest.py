@@ -4,21 +4,20 @@ The copy's `simulated` and `derived` make little datasets, and log each call to 
 there is a file of the name HELD_BY.
 """
 
-from __future__ import annotations
-
 import os
-import shutil
 import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
+from flexclear.commands.__main__ import main
 from flexclear.stages.sweeps import sweep_engine
+from tests.processes import copied
 
 #: a process that is silent for so long hangs, however slow or busy the machine is [s]
 PATIENCE = 600.0
@@ -117,13 +116,18 @@ class Project:
         return self.folder / "results"
 
     def environment(self, **more: str) -> dict[str, str]:
-        kept = {name: value for name, value in os.environ.items() if name != "FLEXCLEAR_RESULTS"}
+        """Whatever is said of other places, the copy keeps its compiled modules: without them a start takes twice."""
+        elsewhere = ("FLEXCLEAR_RESULTS", "PYTHONDONTWRITEBYTECODE")
+        kept = {name: value for name, value in os.environ.items() if name not in elsewhere}
         return {**kept, "CALLS": str(self.folder / "calls"), "PYTHONWARNINGS": "ignore", **more}
 
     def start(self, *arguments: str, **environment: str) -> subprocess.Popen[str]:
         """The command, running."""
+        return self._started("-m", "flexclear", *arguments, **environment)
+
+    def _started(self, *arguments: str, **environment: str) -> subprocess.Popen[str]:
         process = subprocess.Popen(
-            [sys.executable, "-m", "flexclear", *arguments],
+            [sys.executable, *arguments],
             cwd=self.folder,
             env=self.environment(**environment),
             stdout=subprocess.PIPE,
@@ -136,7 +140,11 @@ class Project:
 
     def run(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
         """The command, done."""
-        with self.start(*arguments, **environment) as process:
+        return self.python("-m", "flexclear", *arguments, **environment)
+
+    def python(self, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
+        """Python in the copy, done."""
+        with self._started(*arguments, **environment) as process:
             out, err = process.communicate(timeout=PATIENCE)
         return subprocess.CompletedProcess(arguments, process.returncode, out, err)
 
@@ -156,9 +164,10 @@ class Project:
 
     def edit(self, file: str, old: str, new: str) -> None:
         path = self.folder / file
-        text = path.read_text()
+        text, changed = path.read_text(), path.stat().st_mtime
         assert old in text
         path.write_text(text.replace(old, new))
+        os.utime(path, (changed + 2.0, changed + 2.0))  # Python tells modules from compiled ones by whole seconds
 
     def artifact(self, stage: str) -> Path:
         """The only dataset of a stage in the cache."""
@@ -167,13 +176,9 @@ class Project:
 
 
 @pytest.fixture
-def project(tmp_path: Path, root: Path) -> Iterator[Project]:
+def project(tmp_path: Path) -> Iterator[Project]:
     """A fresh copy with small engines and two scenes: tiny/ideal and tiny/contact."""
-    folder = tmp_path / "project"
-    folder.mkdir()
-    for name in ("flexclear", "papers", "pipeline", "stages"):
-        shutil.copytree(root / name, folder / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copy(root / "pyproject.toml", folder)
+    folder = copied(tmp_path / "project")
     (folder / "pipeline" / "dynamics" / "__init__.py").write_text(ENGINE)
     (folder / "pipeline" / "post" / "__init__.py").write_text(POST)
     scenes = folder / "scenes" / "tiny"
@@ -201,6 +206,30 @@ def fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder of results."""
     monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     return tmp_path / "results"
+
+
+class Printed(NamedTuple):
+    out: str
+    err: str
+
+
+Command = Callable[..., Printed]
+
+
+@pytest.fixture
+def command(capsys: pytest.CaptureFixture[str]) -> Command:
+    """Run the command in this process, which has to end with the code; what it printed."""
+
+    def run(*arguments: str | Path, code: int = 0) -> Printed:
+        try:
+            ended = main([str(argument) for argument in arguments])
+        except SystemExit as end:
+            ended = int(end.code or 0)
+        printed = Printed(*capsys.readouterr())
+        assert ended == code, printed.err
+        return printed
+
+    return run
 
 
 @pytest.fixture

@@ -7,8 +7,8 @@ import signal
 import time
 from collections.abc import Callable
 
+from benchmarks.atlas import Parameters
 from benchmarks.family import FINISHED, Record
-from benchmarks.stability.scenes import Parameters
 
 
 def work(parameters: Parameters, compiled: Callable[[], None]) -> Record:

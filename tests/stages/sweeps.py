@@ -1,7 +1,5 @@
 """Sweeps of a pendulum's length, run by the command in a process of its own."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The benchmarks as families: one entry, one log, pages that follow from the log alone."""
 
-from __future__ import annotations
-
 import io
 import json
 import sys
@@ -250,11 +248,10 @@ def counted(calls: list[str], fails: list[str], **more: Any) -> Family:
 
 
 def test_what_was_interrupted_goes_on_where_it_stopped_and_times_are_then_measured_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh: Path
 ):
     calls: list[str] = []
     fails = ["b"]
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     monkeypatch.setattr(page, "named", lambda name: counted(calls, fails))
     monkeypatch.setattr(page, "write", lambda *places: tmp_path)
     command = ["growth", "--into", str(tmp_path)]

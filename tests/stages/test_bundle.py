@@ -1,7 +1,5 @@
 """One file repeats elsewhere what a scene does here, and tells nothing of this machine."""
 
-from __future__ import annotations
-
 import io
 import json
 import shutil
@@ -11,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from flexclear.commands import reproduction
-from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.system.errors import InputError
+from tests.stages.conftest import Command
 
 ROD = """
 title = "A rod"
@@ -40,10 +38,10 @@ def scene(tmp_path: Path, root: Path) -> Path:
 
 
 def test_a_failure_is_repeated_from_one_file_without_a_path_of_this_machine(
-    scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    scene: Path, tmp_path: Path, command: Command
 ) -> None:
     path = tmp_path / "bundle.zip"
-    assert main(["doctor", "--bundle", str(scene), "--set", "time.end='2 ms'", "--out", str(path)]) == 0
+    command("doctor", "--bundle", scene, "--set", "time.end='2 ms'", "--out", path)
     with zipfile.ZipFile(path) as archive:
         names = set(archive.namelist())
         whole = b"".join(archive.read(name) for name in names)
@@ -54,22 +52,19 @@ def test_a_failure_is_repeated_from_one_file_without_a_path_of_this_machine(
     assert facts["exit_code"] == 2
     assert facts["settings"] == ["time.end='2 ms'"]
     shutil.rmtree(scene.parent)
-    capsys.readouterr()
-    assert main(["doctor", "--repeat", str(path)]) == 0
-    said = capsys.readouterr().out
+    said = command("doctor", "--repeat", path).out
     assert "here it ended with 2, there with 2" in said
     assert "no such joint" in said
 
 
-def test_a_run_that_ends_otherwise_is_told(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_that_ends_otherwise_is_told(scene: Path, tmp_path: Path, command: Command) -> None:
     path = reproduction.make(str(scene), [], ["numpy"], tmp_path / "bundle.zip")
     with zipfile.ZipFile(path) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}
     facts = json.loads(content["facts.json"])
     facts |= {"exit_code": 0, "libraries": {"numpy": "1.0"}}
     path.write_bytes(reproduction._packed({**content, "facts.json": json.dumps(facts).encode()}))
-    assert main(["doctor", "--repeat", str(path)]) == 4
-    told = capsys.readouterr()
+    told = command("doctor", "--repeat", path, code=4)
     assert "there with 0" in told.out
     assert "here, 1.0 there" in told.out
 
@@ -94,16 +89,14 @@ def test_what_is_no_such_file_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_run_that_is_repeated_is_compared_to_the_last_bit(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ) -> None:
     monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
     scene = Path(shutil.copy(root / "scenes" / "checks" / "pendulum.toml", tmp_path))
     path = reproduction.make(str(scene), ["time.end='20 ms'"], ["numpy"], tmp_path / "bundle.zip")
-    assert main(["doctor", "--repeat", str(path)]) == 0
-    assert "the run is the same to the last bit" in capsys.readouterr().out
+    assert "the run is the same to the last bit" in command("doctor", "--repeat", path).out
     with zipfile.ZipFile(path) as archive:
         content = {name: archive.read(name) for name in archive.namelist()}
     facts = json.loads(content["facts.json"]) | {"settings": ["time.end='30 ms'"]}
     path.write_bytes(reproduction._packed({**content, "facts.json": json.dumps(facts).encode()}))
-    assert main(["doctor", "--repeat", str(path)]) == 0
-    assert "the run is not the same to the last bit" in capsys.readouterr().out
+    assert "the run is not the same to the last bit" in command("doctor", "--repeat", path).out

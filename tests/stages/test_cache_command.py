@@ -1,24 +1,22 @@
 """``flexclear cache``: tells what is kept and whether it is whole, and removes nothing that is shown or needed."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
 import pytest
 
+import flexclear as fc
 from flexclear.commands import why
-from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.artifacts.disk import checked
 from flexclear.pipeline.core.artifacts.store import Record, Store
 from flexclear.pipeline.core.system import machine
+from tests.stages.conftest import Command
 
 
 @pytest.fixture
-def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Store:
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+def store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh: Path) -> Store:
     monkeypatch.setenv("FLEXCLEAR_KERNELS", str(tmp_path / "kernels"))
-    return Store(tmp_path / "results")
+    return Store(fresh)
 
 
 def put(store: Store, letter: str, stage: str = "simulate", **facts: str) -> Record:
@@ -27,40 +25,35 @@ def put(store: Store, letter: str, stage: str = "simulate", **facts: str) -> Rec
     return made
 
 
-def test_damage_is_told_and_removed(store: Store, capsys: pytest.CaptureFixture[str]):
+def test_damage_is_told_and_removed(store: Store, command: Command):
     for letter in "abc":
         store.show(put(store, letter), f"runs/{letter}", {}, "simulate")
-    assert main(["cache", "check"]) == 0
-    assert "3 artifacts, 0 faults" in capsys.readouterr().out
+    assert "3 artifacts, 0 faults" in command("cache", "check").out
     store.path("simulate", "a" * 32, "nc").write_bytes(b"b" * 1000)
     path = store.path("simulate", "b" * 32, "json")
     path.write_bytes(path.read_bytes().replace(b'"b"', b'"d"'))
-    assert main(["cache", "check"]) == 4
-    told = capsys.readouterr()
+    told = command("cache", "check", code=4)
     assert f"{'a' * 32}.nc is corrupt" in told.out
     assert f"{'b' * 32}.json is no record, or damaged" in told.out
     assert "never used" in told.err
     os.utime(store.path("simulate", "b" * 32, "nc"), (0.0, 0.0))
-    assert main(["cache", "prune"]) == 0
+    command("cache", "prune")
     assert sorted(p.name[0] for p in (store.root / "cache" / "simulate").glob("*")) == ["c", "c"]
-    assert main(["cache", "check"]) == 0
+    command("cache", "check")
 
 
-def test_what_is_no_record_is_not_taken_for_a_damaged_one(store: Store, capsys: pytest.CaptureFixture[str]):
+def test_what_is_no_record_is_not_taken_for_a_damaged_one(store: Store, command: Command):
     """Memos of commands, and files of artifacts that end alike."""
     made = store.put("figures", "a" * 32, {"index.json": b"{}"}, {})
     memo = store.root / "cache" / "imports.json"
     memo.write_bytes(checked({}))
-    assert main(["cache", "check"]) == 0
-    assert "1 artifacts, 0 faults, 0 files" in capsys.readouterr().out
-    assert main(["cache", "prune"]) == 0
+    assert "1 artifacts, 0 faults, 0 files" in command("cache", "check").out
+    command("cache", "prune")
     assert store.fault(made) is None
     assert memo.is_file()
 
 
-def test_pruning_keeps_what_is_shown_what_that_was_made_from_and_what_is_young(
-    store: Store, capsys: pytest.CaptureFixture[str]
-):
+def test_pruning_keeps_what_is_shown_what_that_was_made_from_and_what_is_young(store: Store, command: Command):
     below = put(store, "a")
     store.show(put(store, "b", **{"input run": below.digest}), "runs/x", {}, "post")
     put(store, "c")
@@ -68,55 +61,48 @@ def test_pruning_keeps_what_is_shown_what_that_was_made_from_and_what_is_young(
     left = store.path("simulate", "e" * 32, "nc")
     left.write_bytes(b"its record was never written")
     os.utime(left, (0.0, 0.0))
-    assert main(["cache", "prune", "--dry-run"]) == 0
-    assert "would remove 1 artifacts and 1 files without a record" in capsys.readouterr().out
+    assert "would remove 1 artifacts and 1 files without a record" in command("cache", "prune", "--dry-run").out
     assert left.exists()
-    assert main(["cache", "prune"]) == 0
+    command("cache", "prune")
     assert sorted(p.name[0] for p in (store.root / "cache" / "simulate").glob("*.nc")) == ["a", "b", "d"]
-    assert main(["cache", "prune", "--days", "0"]) == 0
+    command("cache", "prune", "--days", "0")
     assert sorted(p.name[0] for p in (store.root / "cache" / "simulate").glob("*.nc")) == ["a", "b"]
-    assert main(["cache", "prune", "--days", "-1"]) == 2
+    command("cache", "prune", "--days", "-1", code=2)
 
 
-def test_points_of_sweeps_are_looked_at_as_well(store: Store, capsys: pytest.CaptureFixture[str]):
+def test_points_of_sweeps_are_looked_at_as_well(store: Store, command: Command):
     """All batches of a family that a sweep shows stay, with the bundle that they were run with; others grow old."""
     bundle, other = put(store, "a", "bundle"), put(store, "b", "bundle")
     for letter, family, one in (("c", "x", bundle), ("d", "x", bundle), ("e", "y", other)):
         put(store, letter, f"sweep/{family}", **{"input rod": one.digest})
     store.show_families("sweeps/clearance", {"sweep/y": {}})
     store.show_families("sweeps/clearance", {"sweep/x": {"input rod": bundle.digest}})
-    assert main(["cache", "size"]) == 0
-    assert "sweep             3 artifacts" in capsys.readouterr().out
-    assert main(["cache", "prune"]) == 0
+    assert "sweep             3 artifacts" in command("cache", "size").out
+    command("cache", "prune")
     assert sorted(path.name[0] for path in (store.root / "cache").rglob("*.nc")) == ["a", "c", "d"]
-    assert main(["cache", "check"]) == 0
-    assert "3 artifacts, 0 faults" in capsys.readouterr().out
+    assert "3 artifacts, 0 faults" in command("cache", "check").out
     store.path("sweep/x", "d" * 32, "nc").write_bytes(b"e" * 1000)
-    assert main(["cache", "check"]) == 4
-    assert f"sweep/x/{'d' * 32}.nc is corrupt" in capsys.readouterr().out
+    assert f"sweep/x/{'d' * 32}.nc is corrupt" in command("cache", "check", code=4).out
 
 
-def test_what_an_artifact_was_made_from_is_told(store: Store, capsys: pytest.CaptureFixture[str]):
+def test_what_an_artifact_was_made_from_is_told(store: Store, command: Command):
     store.show(put(store, "a"), "runs/x", {"nc": "run.nc"}, "simulate")
     for what in (str(store.root / "runs" / "x" / "run.nc"), "aaaa"):
-        assert main(["cache", "explain", what]) == 0
-        told = capsys.readouterr().out
+        told = command("cache", "explain", what).out
         assert f"simulate {'a' * 32}" in told
         assert "parameter c: a" in told
-    assert main(["cache", "explain", "b"]) == 2
-    assert main(["cache", "size"]) == 0
-    assert "simulate          1 artifacts" in capsys.readouterr().out
+    command("cache", "explain", "b", code=2)
+    assert "simulate          1 artifacts" in command("cache", "size").out
 
 
-def test_kernels_of_another_build_are_told_and_are_no_damage(store: Store, capsys: pytest.CaptureFixture[str]):
+def test_kernels_of_another_build_are_told_and_are_no_damage(store: Store, command: Command):
     """Their sums name other files than source and code; one of this build whose code is another's is damaged."""
     folder = store.root.parent / "kernels" / "abc"
     folder.mkdir(parents=True)
     for name, ends in (("old", (".py", ".nbi")), ("bad", (".py", ".code"))):
         (folder / f"flexclear_{name}.py").write_text("")
         (folder / f"flexclear_{name}.sum").write_bytes(checked({f"flexclear_{name}{end}": "1" for end in ends}))
-    assert main(["cache", "check"]) == 4
-    told = capsys.readouterr().out
+    told = command("cache", "check", code=4).out
     assert "2 compiled kernels, 1 of another build" in told
     assert "flexclear_bad.py is damaged" in told
     assert "flexclear_old.py is damaged" not in told
@@ -137,11 +123,57 @@ def test_results_of_another_processor_are_reported_and_are_fresh():
     assert why.elsewhere("simulate", Record("simulate", "a" * 32, {"nc": "b"}, {})) == []
 
 
-def test_the_record_of_a_run_names_its_processor(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path))
-    assert main(["run", "checks/pendulum", "-q", "--jobs", "1"]) == 0
-    capsys.readouterr()
-    assert main(["cache", "explain", str(tmp_path / "runs" / "checks" / "pendulum" / "run.nc")]) == 0
-    assert f"computed by processor: {machine.instruction_set()['processor']}" in capsys.readouterr().out
+# Files that are shown below results/runs ----------------------------------------------------------------------------
+
+SCENE = "checks/pendulum"
+
+
+@pytest.fixture
+def shown(fresh: Path, command: Command) -> Path:
+    command("run", SCENE, "-q", "--jobs", "1")
+    return fresh / "runs" / SCENE / "run.nc"
+
+
+def rot(path: Path) -> None:
+    """One byte changed, size and time as before."""
+    status = path.stat()
+    path.chmod(0o644)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(bytes(content))
+    os.utime(path, ns=(status.st_atime_ns, status.st_mtime_ns))
+    path.chmod(0o444)
+
+
+def test_the_record_of_a_run_names_its_processor(shown: Path, command: Command):
+    said = command("cache", "explain", shown).out
+    assert f"computed by processor: {machine.instruction_set()['processor']}" in said
+
+
+def test_bit_rot_in_a_shown_file_is_found_and_run_shows_it_again(shown: Path, command: Command):
+    good = shown.read_bytes()
+    command("cache", "check")
+    rot(shown)
+    assert "run.nc differs from what was shown" in command("cache", "check", code=4).out
+    with pytest.raises(fc.ResourceError, match="flexclear run checks/pendulum"):
+        fc.open(SCENE)
+    command("run", SCENE, "-q", "--jobs", "1")
+    assert shown.read_bytes() == good
+    assert "run" in fc.open(SCENE)
+
+
+@pytest.mark.parametrize("kind", ["shown", "artifact", "record", "lock"])
+def test_a_folder_in_the_place_of_a_file_is_renamed(shown: Path, fresh: Path, command: Command, kind: str):
+    artifact = next((fresh / "cache" / "simulate").glob("*.nc"))
+    places = {"shown": shown, "artifact": artifact}
+    places |= {"record": artifact.with_suffix(".json"), "lock": artifact.with_suffix(".lock")}
+    place, good = places[kind], shown.read_bytes()
+    place.unlink(missing_ok=True)
+    place.mkdir()
+    (place / "somebody's").write_text("kept")
+    if kind == "lock":
+        artifact.with_suffix(".json").unlink()
+    command("run", SCENE, "-q", "--jobs", "1")
+    assert shown.read_bytes() == good
+    assert [path.read_text() for path in fresh.rglob("somebody's")] == ["kept"]
+    command("cache", "prune")

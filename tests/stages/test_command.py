@@ -1,35 +1,14 @@
 """What the command says to a user who made a mistake: place, value, rule, remedy, and the exit code."""
 
-from __future__ import annotations
-
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from flexclear.commands.__main__ import main, parser
+from flexclear.commands.__main__ import parser
 from flexclear.stages.graph import STAGES
-from tests.stages.conftest import CONTACT, JOINT, SCENE
-
-Said = Callable[..., tuple[int, str, str]]
-
-
-@pytest.fixture
-def command(capsys: pytest.CaptureFixture[str]) -> Said:
-    """Run the command here; exit code, stdout, stderr."""
-
-    def run(*arguments: str) -> tuple[int, str, str]:
-        try:
-            code = main(list(arguments))
-        except SystemExit as end:
-            code = int(end.code or 0)
-        told = capsys.readouterr()
-        return code, told.out, told.err
-
-    return run
-
+from tests.stages.conftest import CONTACT, JOINT, SCENE, Command
 
 ROD = """
 [body.rod]
@@ -40,19 +19,12 @@ modes = { reference = "free-free", count = 7 }
 
 WRONG = {
     "unknown key": (SCENE + JOINT + "\n[body.ball.colour]\nred = 1\n", ["body.ball", "colour", "unknown key"]),
-    "unit of another dimension": (
-        SCENE.replace('"1 kg"', '"1 mm"') + JOINT,
-        ["body.ball", "mass", "'1 mm' is a length"],
-    ),
-    "unknown unit": (SCENE.replace('"1 kg"', '"1 stone"') + JOINT, ["unknown unit 'stone'", "kg"]),
-    "negative mass": (SCENE.replace('"1 kg"', "-1") + JOINT, ["body.ball", "mass", "greater than 0"]),
     "not TOML": ("title = \n", ["is not TOML", "line 1"]),
     "no body": ('title = "a"\n[time]\nend = 1\n', ["body", "is missing"]),
     "extends nothing": (
         'extends = "idea.toml"\ntitle = "a"\n',
         ["idea.toml", "no such file", "did you mean 'ideal.toml'"],
     ),
-    "extends itself": ('extends = "scene.toml"\ntitle = "a"\n', ["extends itself", "break the circle"]),
     "replaces nothing": (
         'extends = "ideal.toml"\ntitle = "a"\n[replace.joint.K]\ntype = "fixed"\n',
         ["replace.joint.K", "no joint called 'K'"],
@@ -61,41 +33,9 @@ WRONG = {
         CONTACT.replace("lankarani-nikravesh", "lankarani"),
         ["joint.J.normal", "did you mean 'lankarani-nikravesh'"],
     ),
-    "unknown integrator": (
-        SCENE + JOINT + '\n[solver]\nintegrator = "rk5"\n',
-        ["[solver]", "no integrator is called 'rk5'", "did you mean 'rk4'"],
-    ),
-    "fixed steps of no length": (
-        SCENE + JOINT + '\n[solver]\nintegrator = "rk4"\n',
-        ["[solver]", "rk4 has no error estimate", "give step"],
-    ),
-    "negative step": (
-        SCENE + JOINT + '\n[solver]\nintegrator = "rk4"\nstep = "-1 us"\n',
-        ["[solver.step]", "greater than 0"],
-    ),
-    "step of another dimension": (
-        SCENE + JOINT + '\n[solver]\nstep = "1 mm"\n',
-        ["[solver.step]", "'1 mm' is a length"],
-    ),
-    "unlocated events of chosen steps": (
-        SCENE + JOINT + '\n[solver]\nevents = "at step ends"\n',
-        ["[solver]", "needs fixed steps", "give step"],
-    ),
-    "spectral radius above one": (
-        SCENE + JOINT + '\n[solver]\nintegrator = "generalized-alpha"\nrho_inf = 1.5\n',
-        ["[solver.rho_inf]", "less than or equal to 1", "1.5"],
-    ),
-    "spectral radius of a method without one": (
-        SCENE + JOINT + "\n[solver]\nrho_inf = 0.5\n",
-        ["[solver]", "rho_inf belongs to generalized-alpha"],
-    ),
     "no such recipe": (
         SCENE + ROD,
         ["rod.toml", "no such file"],
-    ),
-    "unknown reference condition": (
-        SCENE + ROD.replace("rod.toml", "{root}/meshes/actuated_rod.toml").replace("free-free", "fre"),
-        ["body.rod.modes", "fre", "free-free"],
     ),
 }
 
@@ -103,25 +43,23 @@ WRONG = {
 @pytest.mark.parametrize("verb", ["run", "why"])
 @pytest.mark.parametrize("text, told", WRONG.values(), ids=WRONG.keys())
 def test_wrong_scenes_are_refused_before_anything_runs(
-    command: Said, tmp_path: Path, root: Path, verb: str, text: str, told: list[str]
+    command: Command, tmp_path: Path, root: Path, verb: str, text: str, told: list[str]
 ):
     (tmp_path / "ideal.toml").write_text(SCENE + JOINT)
     path = tmp_path / "scene.toml"
     path.write_text(text.replace("{root}", str(root)))
-    code, out, err = command(verb, str(path))
-    assert code == 2
-    assert out == ""
-    assert err.startswith("flexclear: ")
-    assert "Traceback" not in err
+    said = command(verb, path, code=2)
+    assert said.out == ""
+    assert said.err.startswith("flexclear: ")
+    assert "Traceback" not in said.err
     for part in told:
-        assert part in err
+        assert part in said.err
 
 
-def test_all_mistakes_of_all_scenes_are_told_at_once(command: Said, tmp_path: Path):
+def test_all_mistakes_of_all_scenes_are_told_at_once(command: Command, tmp_path: Path):
     for name in ("one", "two"):
         (tmp_path / f"{name}.toml").write_text(SCENE.replace('"1 kg"', "-1").replace('"1 s"', '"1 kg"') + JOINT)
-    code, _, err = command("run", str(tmp_path / "one.toml"), str(tmp_path / "two.toml"), "sps4/nothing")
-    assert code == 2
+    err = command("run", tmp_path / "one.toml", tmp_path / "two.toml", "sps4/nothing", code=2).err
     assert err.count("one.toml [body.ball.mass]") == err.count("two.toml [time.end]") == 1
     assert "sps4/nothing" in err
 
@@ -129,16 +67,14 @@ def test_all_mistakes_of_all_scenes_are_told_at_once(command: Said, tmp_path: Pa
 @pytest.mark.parametrize(
     "name, told", [("sps4/csk", "did you mean 'sps4/csj'"), ("nowhere/a.toml", "no such file"), (".", "is neither")]
 )
-def test_scenes_that_are_not_there(command: Said, name: str, told: str):
-    code, _, err = command("run", name)
-    assert code == 2
-    assert told in err
+def test_scenes_that_are_not_there(command: Command, name: str, told: str):
+    assert told in command("run", name, code=2).err
 
 
-def test_scenes_are_named_by_file_or_by_name(command: Said, root: Path):
-    by_name, by_file = command("why", "sps4/ideal"), command("why", str(root / "scenes" / "sps4" / "ideal.toml"))
+def test_scenes_are_named_by_file_or_by_name(command: Command, root: Path):
+    by_name, by_file = command("why", "sps4/ideal"), command("why", root / "scenes" / "sps4" / "ideal.toml")
     assert by_name == by_file
-    assert by_name[1].splitlines()[0] == "sps4/ideal"
+    assert by_name.out.splitlines()[0] == "sps4/ideal"
 
 
 @pytest.mark.parametrize(
@@ -151,51 +87,45 @@ def test_scenes_are_named_by_file_or_by_name(command: Said, root: Path):
         (["sweep", "a", "--workes=3"], "--workes: there is no such option\n  hint: did you mean '--workers'?"),
     ],
 )
-def test_a_misspelt_command_or_option_gets_the_nearest_one(command: Said, arguments: list[str], said: str):
-    code, _, err = command(*arguments)
-    assert code == 2
-    assert err.startswith(f"flexclear: {said}")
+def test_a_misspelt_command_or_option_gets_the_nearest_one(command: Command, arguments: list[str], said: str):
+    assert command(*arguments, code=2).err.startswith(f"flexclear: {said}")
 
 
 @pytest.mark.parametrize("arguments", [[], ["run"], ["run", "sps4/ideal", "--to", "moon"]])
-def test_usage_mistakes_end_with_2(command: Said, arguments: list[str]):
-    code, _, err = command(*arguments)
-    assert code == 2
-    assert "usage: flexclear" in err
+def test_usage_mistakes_end_with_2(command: Command, arguments: list[str]):
+    assert "usage: flexclear" in command(*arguments, code=2).err
 
 
-def test_help_names_every_stage(command: Said):
-    code, out, _ = command("run", "--help")
-    assert code == 0
-    assert all(stage in out for stage in STAGES)
+def test_help_names_every_stage(command: Command):
+    said = command("run", "--help").out
+    assert all(stage in said for stage in STAGES)
     assert parser([]).prog == "flexclear"
 
 
-def test_schema_is_json_and_knows_the_parts(command: Said):
-    code, out, _ = command("schema")
-    assert code == 0
-    assert {"body", "joint", "drive", "load", "time"} <= json.loads(out)["properties"].keys()
+def test_schema_is_json_and_knows_the_parts(command: Command):
+    schema = json.loads(command("schema").out)
+    assert {"body", "joint", "drive", "load", "time"} <= schema["properties"].keys()
 
 
-def test_cite_names_methods_that_are_used_and_no_others(command: Said):
-    _, contact, _ = command("cite", "sps4/csj")
-    _, ideal, _ = command("cite", "sps4/ideal")
+def test_cite_names_methods_that_are_used_and_no_others(command: Command):
+    contact = command("cite", "sps4/csj").out
+    ideal = command("cite", "sps4/ideal").out
     assert "Lankarani & Nikravesh (1990)" in contact
     assert "Lankarani" not in ideal
     assert "Hairer" in ideal
     assert "Table 1" in ideal
-    _, pendulum, _ = command("cite", "checks/pendulum")
+    pendulum = command("cite", "checks/pendulum").out
     assert "Hairer" in pendulum
     assert "PID" not in pendulum
     assert "dynamics.contact" not in pendulum
-    _, controlled, _ = command("cite", "checks/controllers")
+    controlled = command("cite", "checks/controllers").out
     assert "PID" in controlled
 
 
 @pytest.mark.parametrize("scene", ["sps4/csj", "sps4/far_csj_cb"])
-def test_cite_tells_the_methods_of_every_run_from_those_that_only_some_need(command: Said, scene: str):
+def test_cite_tells_the_methods_of_every_run_from_those_that_only_some_need(command: Command, scene: str):
     """All were in one list, with Lyapunov exponents, LU factors and the registers of the processor."""
-    _, said, _ = command("cite", scene)
+    said = command("cite", scene).out
     always, _, rest = said.partition("Methods that are used where a run or a command needs them\n")
     some, _, _ = rest.partition("Data of")
     for module in ("integrate.dop853", "contact.normal.lankarani_nikravesh", "drives.step"):
@@ -212,10 +142,9 @@ def test_cite_tells_the_methods_of_every_run_from_those_that_only_some_need(comm
     assert "dynamics.compile" not in said
 
 
-def test_report_lists_only_commands_that_do_something(command: Said):
+def test_report_lists_only_commands_that_do_something(command: Command):
     """Each verb of the help has its own help, and a function behind it."""
-    _, out, _ = command("--help")
-    verbs = re.findall(r"^ {4}([a-z]+)", out, re.MULTILINE)  # deeper lines are texts
+    verbs = re.findall(r"^ {4}([a-z]+)", command("--help").out, re.MULTILINE)  # deeper lines are texts
     assert {"run", "why", "render", "report", "schema", "cite"} <= set(verbs)
     for verb in verbs:
-        assert command(verb, "--help")[0] == 0
+        command(verb, "--help")

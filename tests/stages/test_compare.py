@@ -15,7 +15,8 @@ from flexclear.pipeline.core.scene.parts import MeshedRigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.variants import ideal
 from flexclear.pipeline.core.system.errors import InputError
-from flexclear.pipeline.post.overview import comparison, curves, figures, overlay, page
+from flexclear.pipeline.post import pages
+from flexclear.pipeline.post.overview import comparison, curves, figures
 from flexclear.pipeline.structure.fe.recipe import read_recipe
 from flexclear.pipeline.structure.kinds import kind
 from flexclear.pipeline.structure.modes import rigid
@@ -175,10 +176,10 @@ def test_figures_of_any_run_and_a_page_with_all_inside():
     runs = pair()
     files = figures.make(runs["loose"], QUANTITIES)
     assert {"motion.png", "reactions.png", "contacts.png", "energy.png"} <= set(files)
-    beside = overlay.make("compare", runs, QUANTITIES)
+    beside = comparison.make("compare", runs, QUANTITIES)
     assert {"compare.png", "compare_contacts.png"} <= set(beside)
-    part = page.Part("a", "A", page.media("compare.png", beside["compare.png"], "side by side"))
-    text = page.page("Title", "lead", [part, page.Part("b", "Empty", "")]).decode()
+    part = pages.Part("a", "A", pages.media("compare.png", beside["compare.png"], "side by side"))
+    text = pages.page("Title", "lead", [part, pages.Part("b", "Empty", "")]).decode()
     assert "data:image/png;base64," in text
     assert "src='http" not in text
     assert "Empty" not in text

@@ -217,9 +217,9 @@ def test_workers_have_no_second_process() -> None:
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
         assert not pool.submit(compiler_process.requested).result()
     assert compiler_process.requested()
-    cores.tell(others_idle=False)
+    cores.set_idle(others_idle=False)
     assert not compiler_process.requested()
-    cores.tell(others_idle=True)
+    cores.set_idle(others_idle=True)
     assert compiler_process.requested()
 
 

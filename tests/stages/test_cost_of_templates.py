@@ -39,13 +39,12 @@ def _spent() -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_the_first_answer_comes_soon_and_its_errors_are_those_of_a_converged_run_of_another_method(
-    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    kind: str, tmp_path: Path, fresh: Path
 ):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     scene, workplace = load_scene(write(kind, tmp_path)[0]), open_workplace()
     workplace = Workplace(workplace.store, workplace.sources, jobs=1)
     begun, first = _spent(), list[float]()
-    study, _ = cost.bring(scene, workplace, answered=lambda folder: first.append(_spent() - begun))
+    study = cost.bring(scene, workplace, answered=lambda made: first.append(_spent() - begun)).dataset()
     print(f"{kind}: first answer after {first[0]:.1f} s of processor time, done after {_spent() - begun:.1f} s")
     assert first[0] <= FIRST
     assert _spent() - begun <= ALL
@@ -70,6 +69,6 @@ def _run(scene: Scene, workplace: Workplace, solver: dict[str, Any]) -> xr.Datas
     variant = edited(scene, {"solver": solver, "accuracy": None, "ensemble": None})
     bodies = Graph(variant, shown=False).bodies()
     outcome = workplace.bring(list(bodies.values()))
-    inputs = {name: workplace.store.load(outcome.records[id(task)]) for name, task in bodies.items()}
+    inputs = {name: workplace.store.load(outcome.records[task]) for name, task in bodies.items()}
     filled = simulation.rebuild(simulation.params(variant), inputs)
     return dynamics.simulate(filled, simulation.bundles(inputs), silent)

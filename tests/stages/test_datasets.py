@@ -13,7 +13,8 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
-from benchmarks.site import datasets, keys
+from benchmarks.site import keys
+from benchmarks.site import reference as datasets
 from benchmarks.site.__main__ import stale
 from flexclear.commands.__main__ import main
 from flexclear.commands.new import write
@@ -171,9 +172,10 @@ def test_the_import_name_offers_all_functions_of_the_pipeline() -> None:
     assert all(getattr(fc, name) is getattr(fc.public, name) for name in fc.__all__)
 
 
-def test_a_tree_leaves_out_what_is_derived_from_another_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tree_leaves_out_what_is_derived_from_another_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh: Path
+) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     scene, *_ = write("pendulum", tmp_path)
     scene.write_text(re.sub('(?m)^end = "2 s"', 'end = "4 ms"', scene.read_text()))
     assert main(["run", "-q", str(scene)]) == 0

@@ -1,74 +1,61 @@
 """``flexclear doctor`` tells what is there, computes something with a known answer, and says when it does not."""
 
-from __future__ import annotations
-
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from flexclear.commands import doctor, new
-from flexclear.commands.__main__ import main
 from flexclear.pipeline.dynamics.compile import files
 from flexclear.pipeline.post.render import gl
+from tests.processes import printed, python
+from tests.stages.conftest import Command
 
 
-def test_the_doctor_finds_this_place_well(capsys: pytest.CaptureFixture[str]):
-    assert main(["doctor"]) == 0
-    told = capsys.readouterr().out
+def test_the_doctor_finds_this_place_well(command: Command):
+    told = command("doctor").out
     assert "WRONG" not in told
     assert "a free fall of 0.1 s ends at -0.04905 m" in told
 
 
-def test_the_doctor_says_what_is_wrong(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+def test_the_doctor_says_what_is_wrong(command: Command, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(doctor, "_self_test", lambda: ("it fell upwards", False))
-    assert main(["doctor"]) == 4
-    told = capsys.readouterr()
+    told = command("doctor", code=4)
     assert "WRONG  self-test  it fell upwards" in told.out
     assert "not well: self-test" in told.err
 
 
 @pytest.mark.parametrize("draws, line", [(True, "ok     graphics"), (False, "lacks  graphics")])
 def test_graphics_are_well_only_where_something_was_drawn(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, draws: bool, line: str
+    command: Command, monkeypatch: pytest.MonkeyPatch, draws: bool, line: str
 ):
     """Libraries that load may fail when they draw; they are not needed, so that the machine is well without them."""
     monkeypatch.setattr(gl, "works", lambda: draws)
     monkeypatch.setattr(gl, "state", lambda: "GL: libGL.so.1")
-    assert main(["doctor"]) == 0
-    assert line in capsys.readouterr().out
+    assert line in command("doctor").out
 
 
-def test_threads_that_somebody_asks_for_do_not_change_bytes(root: Path):
+def test_threads_that_somebody_asks_for_do_not_change_bytes():
     """Sums over several threads are added in another order; the libraries read this when they are loaded."""
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS")
     code = f"import os, flexclear; print([os.environ[name] for name in {names}])"
-    environment = {**os.environ, **dict.fromkeys(names, "2")}
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=root, env=environment, capture_output=True, text=True, check=True
-    )
-    assert done.stdout.strip() == "['1', '1']"
+    assert printed(code, **dict.fromkeys(names, "2")).strip() == "['1', '1']"
 
 
 def test_the_usual_kinds_are_compiled_where_no_scene_is_named(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, fresh: Path, command: Command
 ) -> None:
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     monkeypatch.setattr(doctor, "USUAL", ("pendulum",))
-    assert main(["doctor", "--compile"]) == 0
-    assert "compiled: all that runs of pendulum call" in capsys.readouterr().out
-    assert not (tmp_path / "results").exists()
+    assert "compiled: all that runs of pendulum call" in command("doctor", "--compile").out
+    assert not (fresh).exists()
 
 
-def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path, root: Path) -> None:
+def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path) -> None:
     """Also by the methods among which it chooses; in processes of their own, as a user has them."""
     kernels = tmp_path / "kernels"
-    environment = {**os.environ, "FLEXCLEAR_RESULTS": str(tmp_path / "results"), "FLEXCLEAR_KERNELS": str(kernels)}
+    own = {"FLEXCLEAR_RESULTS": str(tmp_path / "results"), "FLEXCLEAR_KERNELS": str(kernels)}
 
     def command(*words: str) -> None:
-        subprocess.run([sys.executable, "-m", "flexclear.commands", *words], cwd=root, env=environment, check=True)
+        python("-m", "flexclear.commands", *words, **own)
 
     def code() -> dict[Path, int]:
         return {path: path.stat().st_mtime_ns for path in kernels.rglob(f"*{files.CODE}")}
@@ -81,11 +68,8 @@ def test_what_was_compiled_before_a_run_is_all_that_it_calls(tmp_path: Path, roo
     assert code() == before
 
 
-def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["doctor", "--compile", str(tmp_path / "none.toml")]) == 2
-    assert "none.toml" in capsys.readouterr().err
+def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(tmp_path: Path, command: Command) -> None:
+    assert "none.toml" in command("doctor", "--compile", tmp_path / "none.toml", code=2).err
 
 
 @pytest.mark.parametrize(
@@ -96,6 +80,5 @@ def test_a_scene_that_is_wrong_is_told_before_anything_is_compiled(
         (("--out", "x.zip"), "--bundle writes, which is not given"),
     ],
 )
-def test_out_is_a_bundle_or_refused(options: tuple[str, ...], words: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["doctor", *options]) == 2
-    assert words in capsys.readouterr().err
+def test_out_is_a_bundle_or_refused(options: tuple[str, ...], words: str, command: Command) -> None:
+    assert words in command("doctor", *options, code=2).err

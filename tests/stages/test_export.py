@@ -1,7 +1,5 @@
 """Datasets written as the file's name says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

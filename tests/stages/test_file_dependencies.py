@@ -259,7 +259,7 @@ def test_a_page_made_twice_in_one_process_depends_on_the_same_files(root: Path, 
         page = Graph(load_scene(root / "scenes" / "checks" / "pendulum.toml")).picture("motion", "html")
         outcome = Workplace(store, sources).bring([page], jobs=1)
         assert not outcome.failures
-        record = outcome.records[id(page)]
+        record = outcome.records[page]
         seen.append((record.key, sorted(path.read_text() for path in store.root.glob("cache/render/*.names"))))
     assert seen[0] == seen[1]
     assert "viewer.js" in str(seen[1])

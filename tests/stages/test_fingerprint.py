@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +10,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.workflow.fingerprint import Sources, library_version
 from flexclear.pipeline.core.workflow.task import STORE, in_order
 from flexclear.stages.graph import Graph
+from tests.processes import printed
 
 #: runs one task in a fresh process and prints the own modules that it loaded
 LOADED = """
@@ -33,8 +32,8 @@ for task in in_order(Graph(load_scene(scene, shortened), shown=False).up_to("pos
             if name.startswith(tuple(f"flexclear.pipeline.{t}" for t in ("structure", "dynamics", "post"))):
                 del sys.modules[name]
         before = {name for name in sys.modules}
-    inputs = {name: records[id(above)] for name, above in task.inputs.items()}
-    records[id(task)] = execute(task, inputs, store, sources, lambda fraction, text: None)
+    inputs = {name: records[above] for name, above in task.inputs.items()}
+    records[task] = execute(task, inputs, store, sources, lambda fraction, text: None)
     if task.label == label:
         print(*sorted(name for name in sys.modules.keys() - before if name.split(".")[0] in ("flexclear",)))
         break
@@ -57,9 +56,7 @@ CASES = [
 @pytest.mark.parametrize("scene, label", CASES)
 def test_every_module_that_runs_is_in_the_key(root: Path, tmp_path: Path, scene: str, label: str):
     path = root / "scenes" / f"{scene}.toml"
-    command = [sys.executable, "-c", LOADED, str(tmp_path / "results"), label, str(path), '{"time.end": 0.001}']
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    loaded = set(done.stdout.split())
+    loaded = set(printed(LOADED, tmp_path / "results", label, path, '{"time.end": 0.001}').split())
     (task,) = (task for task in in_order(Graph(load_scene(path)).up_to("post")) if task.label == label)
     known = Sources(root).closure([task.run.partition(":")[0], STORE, *task.modules]).keys()
     assert len(loaded) > 2

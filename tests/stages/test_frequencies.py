@@ -1,9 +1,5 @@
 """Equilibria and natural frequencies through the stages: what the command prints, what is kept, what is refused."""
 
-from __future__ import annotations
-
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,13 +7,14 @@ import pytest
 import xarray as xr
 
 import flexclear as fc
-from flexclear.commands.__main__ import main
 from flexclear.commands.frequencies import text
 from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.system.errors import FlexclearError, InputError
 from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.task import STORE
 from flexclear.stages.graph import Graph
+from tests.processes import printed
+from tests.stages.conftest import Command
 
 #: makes one equilibrium in a fresh process and prints the own modules that it loaded
 LOADED = """
@@ -37,11 +34,8 @@ def path_of(root: Path, name: str) -> Path:
     return root / "scenes" / "checks" / f"{name}.toml"
 
 
-def test_the_command_prints_pose_residual_and_mobility_then_the_table(
-    root: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    assert main(["frequencies", str(path_of(root, "pendulum")), "--at", "500 ms"]) == 0
-    lines = capsys.readouterr().out.splitlines()
+def test_the_command_prints_pose_residual_and_mobility_then_the_table(root: Path, command: Command) -> None:
+    lines = command("frequencies", str(path_of(root, "pendulum")), "--at", "500 ms").out.splitlines()
     assert lines[0] == "checks/pendulum at t = 0.5 s, drives held"
     assert lines[1].startswith("equilibrium: largest unbalanced force")
     assert lines[2] == "free motions besides the drives: 1"
@@ -69,9 +63,8 @@ def test_what_loops_say_twice_is_told_where_reactions_depend_on_it() -> None:
 @pytest.mark.parametrize(
     "at, said", [("3 kg", "'3 kg' is a mass"), ("soon", "not a number with a unit"), ("11", "0 to 10 s")]
 )
-def test_a_wrong_time_is_refused(root: Path, capsys: pytest.CaptureFixture[str], at: str, said: str) -> None:
-    assert main(["frequencies", str(path_of(root, "pendulum")), "--at", at]) == 2
-    assert said in capsys.readouterr().err
+def test_a_wrong_time_is_refused(root: Path, command: Command, at: str, said: str) -> None:
+    assert said in command("frequencies", str(path_of(root, "pendulum")), "--at", at, code=2).err
 
 
 def test_an_unknown_drive_is_refused(root: Path) -> None:
@@ -93,11 +86,9 @@ def test_an_equilibrium_comes_from_the_cache_and_says_what_its_numbers_mean(root
 
 def test_every_module_that_an_equilibrium_takes_is_in_its_key(root: Path) -> None:
     path = path_of(root, "pendulum")
-    command = [sys.executable, "-c", LOADED, str(path)]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
     task = Graph(load_scene(path)).linear()
     closure = Sources(root).closure((task.run.partition(":")[0], STORE, *task.modules))
-    assert set(done.stdout.split()) <= closure.keys()
+    assert set(printed(LOADED, path).split()) <= closure.keys()
 
 
 def test_only_what_matters_is_in_the_key(root: Path) -> None:

@@ -1,7 +1,5 @@
 """Every mechanism of the gallery runs, and answers what docs/gallery.md says; the site of docs/ builds."""
 
-from __future__ import annotations
-
 import re
 import subprocess
 import sys

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.geometry import identify, kinematics, scenes
-from benchmarks.geometry.identify import DANGLE, DZ
-from benchmarks.geometry.kinematics import Layout, answer, jacobians, poses
+from benchmarks import layouts
+from benchmarks.layouts import DANGLE, DZ, Layout, answer, jacobians, poses
 from flexclear.commands.scenes import find_scene
 from flexclear.papers.wang_wang_2019.published import TABLE8
 from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
@@ -29,7 +28,7 @@ def lengths(layout: Layout, z: float, angle: float) -> np.ndarray:
 
 
 def test_poses_have_the_lengths_of_the_legs() -> None:
-    layout, extensions = identify.fitted(*TAKEN), np.linspace(0.0, 0.06, 7)
+    layout, extensions = layouts.fitted(*TAKEN), np.linspace(0.0, 0.06, 7)
     for extension, z, angle in zip(extensions, *poses(layout, extensions), strict=True):
         requested = layout.leg + np.array([extension, extension, 0.0, 0.0])
         assert lengths(layout, z, angle) == pytest.approx(requested, abs=1e-13)  # rounding of lengths below 0.5 m
@@ -37,7 +36,7 @@ def test_poses_have_the_lengths_of_the_legs() -> None:
 
 def test_the_answer_to_leg_1_is_that_of_finite_changes() -> None:
     """A change of legs 1 and 2 by halves is the symmetric part of one of leg 1: strokes 2 um apart."""
-    layout, step = identify.fitted(*TAKEN), 1e-6
+    layout, step = layouts.fitted(*TAKEN), 1e-6
     for extension in (0.0, 0.03, 0.06):
         (below, above), angles = poses(layout, extension + np.array([-step, step]))
         z, angle = poses(layout, np.array([extension]))
@@ -49,13 +48,13 @@ def test_the_answer_to_leg_1_is_that_of_finite_changes() -> None:
 
 def test_fitted_layouts_have_table_8_s_sensitivities() -> None:
     for numbers in (TAKEN, (0.04, 0.3, 0.24), (0.06, 0.06, 0.36)):
-        told = answer(identify.fitted(*numbers))
-        assert told.dz * identify.CLEARANCE == pytest.approx(1e-3 * TABLE8.displacement, rel=1e-9)
-        assert told.dangle * identify.CLEARANCE == pytest.approx(TABLE8.angle, rel=1e-9)
+        told = answer(layouts.fitted(*numbers))
+        assert told.dz * layouts.CLEARANCE == pytest.approx(1e-3 * TABLE8.displacement, rel=1e-9)
+        assert told.dangle * layouts.CLEARANCE == pytest.approx(TABLE8.angle, rel=1e-9)
 
 
 def test_other_layouts_do_not() -> None:
-    first = answer(identify.FIRST)
+    first = answer(layouts.FIRST)
     assert abs(first.dz / DZ - 1.0) > 0.3
     assert abs(first.dangle / DANGLE - 1.0) < 0.05
 
@@ -64,9 +63,9 @@ def test_crossing_legs_have_no_room() -> None:
     a, b = np.array([[0.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0]])
     up = np.array([[0.0, 0.0, 1.0]])
     below, above = np.array([[0.5, 0.3, -1.0]]), np.array([[0.5, 0.3, 1.0]])
-    assert kinematics._apart(a, b, below, above) == pytest.approx(0.3, abs=1e-12)
+    assert layouts._apart(a, b, below, above) == pytest.approx(0.3, abs=1e-12)
     aside = np.array([[0.4, 0.0, 0.0]])
-    assert kinematics._apart(a, b, b + 0.5 * up + aside, b + up) == pytest.approx(_ends(), abs=1e-12)
+    assert layouts._apart(a, b, b + 0.5 * up + aside, b + up) == pytest.approx(_ends(), abs=1e-12)
 
 
 def _ends() -> float:
@@ -83,7 +82,7 @@ TYPED = 1e-13
 def test_the_scenes_are_of_the_layout_that_the_log_takes() -> None:
     records = [json.loads(line) for line in (TREE / "benchmarks" / "log" / "geometry.jsonl").read_text().splitlines()]
     taken = [r for r in records if r.get("case") == "members"][-1]
-    layout = identify.fitted(taken["ay"], taken["bx"], taken["by"])
+    layout = layouts.fitted(taken["ay"], taken["bx"], taken["by"])
     assert layout.height == pytest.approx(taken["height"], abs=1e-12)
     for name in ("ideal", "csj", "far_free", "far_csj_cb", "variants/prismatic_60mm_far_csj_fixed"):
         same(f"sps4/{name}", layout)
@@ -91,14 +90,14 @@ def test_the_scenes_are_of_the_layout_that_the_log_takes() -> None:
 
 def test_edits_make_the_first_layout_s_scenes() -> None:
     for name in ("first", "first_far_csj_free"):
-        same(f"sps4/variants/{name}", identify.FIRST)
+        same(f"sps4/variants/{name}", layouts.FIRST)
 
 
 def same(name: str, layout: Layout) -> None:
     """That the edits which make this layout out of a scene change nothing but the digits of numbers."""
     plain = load_scene(find_scene(name))
     along = 0.06 if "prismatic_60mm" in name else 0.0
-    places = scenes.edits(layout, flexible="rod1" in plain.flexible(), along=along)
+    places = layouts.edits(layout, flexible="rod1" in plain.flexible(), along=along)
     for (place, one), (_, other) in zip(numbers(plain), numbers(load_scene(find_scene(name), places)), strict=True):
         assert one == pytest.approx(other, abs=TYPED), place
 

@@ -1,7 +1,5 @@
 """Compiled kernels: loaded only if every byte is as it was written, from a folder in which nobody else writes."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import time

@@ -6,7 +6,6 @@ import ast
 import datetime
 import json
 import re
-import shutil
 from pathlib import Path
 
 import pytest
@@ -29,6 +28,7 @@ from flexclear.pipeline.core.workflow.fingerprint import (
 from flexclear.pipeline.core.workflow.task import Task, facts, flatten, in_order, key, reasons
 from flexclear.stages import derived_series, simulation
 from flexclear.stages.graph import Graph
+from tests.processes import copied
 
 LEAVES = (
     st.none() | st.booleans() | st.integers() | st.floats(allow_nan=False, allow_infinity=False) | st.text(max_size=4)
@@ -158,9 +158,9 @@ def keys(graph: Graph, sources: Sources) -> dict[str, str]:
     """Key of each task when every input is as its own key says: no stage is run for that."""
     found: dict[int, str] = {}
     for task in in_order(graph.up_to("post")):
-        above = {name: found[id(t)] for name, t in task.inputs.items()}
-        found[id(task)] = key(facts(task, above, sources))
-    return {task.label: found[id(task)] for task in in_order(graph.up_to("post"))}
+        above = {name: found[t] for name, t in task.inputs.items()}
+        found[task] = key(facts(task, above, sources))
+    return {task.label: found[task] for task in in_order(graph.up_to("post"))}
 
 
 def changed(before: dict[str, str], after: dict[str, str]) -> set[str]:
@@ -175,11 +175,9 @@ def sources(root: Path) -> Sources:
 
 
 @pytest.fixture
-def copy(root: Path, tmp_path: Path) -> Path:
+def copy(tmp_path: Path) -> Path:
     """Source and scenes, to be edited."""
-    for name in ("flexclear", "papers", "pipeline", "stages", "scenes", "meshes"):
-        shutil.copytree(root / name, tmp_path / name, symlinks=True, ignore=shutil.ignore_patterns("__pycache__"))
-    return tmp_path
+    return copied(tmp_path, "scenes", "meshes")
 
 
 RERUN = {
@@ -256,7 +254,7 @@ def test_content_of_the_recipe_counts(root: Path, copy: Path, sources: Sources):
     [
         ("pipeline/dynamics/contact/friction/modified_coulomb.py", {"sps4/csj"}),
         ("pipeline/dynamics/contact/normal/lankarani_nikravesh.py", {"sps4/csj"}),
-        ("pipeline/dynamics/joints/prismatic.py", {"sps4/ideal", "sps4/csj", "sps4/far_cb"}),
+        ("pipeline/dynamics/joints/turn_and_slide.py", {"sps4/ideal", "sps4/csj", "sps4/far_cb"}),
         ("pipeline/structure/modes/reference/craig_bampton.py", {"sps4/far_cb"}),
         ("pipeline/dynamics/loads/gravity.py", set()),
         ("papers/wang_wang_2019/figures/panels.py", set()),
@@ -313,6 +311,7 @@ def test_words_do_not_count_and_code_does(edit: str):
     [
         ("pipeline/core/system/platforms.py", ('"""', '"""More words. ')),
         ("pipeline/core/scene/registry.py", ('"""', '"""More words. ')),
+        ("pipeline/core/scene/clearance.py", ("Young's modulus", "modulus of elasticity")),
         ("pipeline/core/scene/validation_errors.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
         ("pipeline/core/scene/citations.py", ("\n\n\n", "\n\n\nEDITED = 1\n\n\n")),
     ],

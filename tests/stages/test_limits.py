@@ -1,7 +1,5 @@
 """What a machine cannot hold is refused before anything is computed, with exit code 4 and in words."""
 
-from __future__ import annotations
-
 import errno
 import os
 import subprocess
@@ -15,7 +13,6 @@ import numpy as np
 import pytest
 
 from flexclear.commands import cost, sections
-from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.scene.limits import check_cells
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
 from flexclear.pipeline.core.system import machine
@@ -23,7 +20,7 @@ from flexclear.pipeline.core.system.errors import InputError, ResourceError
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.stages import simulation
 from flexclear.stages.graph import Graph
-from tests.stages.conftest import JOINT, SCENE
+from tests.stages.conftest import JOINT, SCENE, Command
 
 
 def written(folder: Path, text: str) -> Path:
@@ -33,16 +30,15 @@ def written(folder: Path, text: str) -> Path:
 
 
 def test_a_run_that_memory_cannot_hold_is_refused_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ):
     """It was simulated to the end before."""
     monkeypatch.setattr(machine, "memory", lambda: 10**9)
     path = written(tmp_path, SCENE.replace('"0.1 ms"', '"1 us"') + JOINT)
     begun = time.monotonic()
-    assert main(["run", str(path)]) == 4
+    told = command("run", path, code=4).err
     # loading and estimating; a run of a million rows takes longer on any machine
     assert time.monotonic() - begun < 60.0
-    told = capsys.readouterr().err
     assert "a run of 1e+06 rows takes about" in told
     assert "of memory, and 800 MB are allowed" in told
 
@@ -58,18 +54,14 @@ def test_limits_of_the_scene_take_the_place_of_the_machines(tmp_path: Path, monk
         load_scene(path, {"limits.memory": "4 stones"})
 
 
-def test_rows_and_members_are_limits_that_a_scene_may_raise(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_rows_and_members_are_limits_that_a_scene_may_raise(tmp_path: Path, fresh: Path, command: Command):
     """What is asked for is right, but too much: exit code 4, as for parts, cells and modes."""
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     path = written(tmp_path, SCENE + JOINT)
     for place, value, told in (
         ("output.interval", "1e-12 s", "more than the 10000000 that limits.rows allows"),
         ("ensemble.members", 200_000, "[ensemble.members]: 200000 are more than the 100000 that limits.members allows"),
     ):
-        assert main(["run", str(path), "--set", f"{place}={value!r}"]) == 4
-        assert told in capsys.readouterr().err
+        assert told in command("run", path, "--set", f"{place}={value!r}", code=4).err
         with pytest.raises(ResourceError, match=r"^.*limited.toml \["):
             load_scene(path, {place: value})
     limits = {"limits.rows": 10**15, "limits.members": 10**6}
@@ -82,8 +74,7 @@ def test_rows_and_members_are_limits_that_a_scene_may_raise(
     (tmp_path / "many.toml").write_text(
         'scene = "limited.toml"\nkeep = ["bob.position.final"]\nmembers = 200_000\nvary."solver.rtol" = [1e-5, 1e-6]\n'
     )
-    assert main(["check", str(tmp_path / "many.toml")]) == 4
-    assert "[members]: 200000 are more than the 100000" in capsys.readouterr().err
+    assert "[members]: 200000 are more than the 100000" in command("check", tmp_path / "many.toml", code=4).err
 
 
 def test_limits_are_no_facts_and_reach_the_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -195,8 +186,7 @@ def test_figures_need_no_home_folder(root: Path, tmp_path: Path) -> None:
     environment = {name: value for name, value in os.environ.items() if name not in removed}
     environment |= {"HOME": str(tmp_path / "file" / "home"), "FLEXCLEAR_RESULTS": str(tmp_path / "results")}
     environment |= {"FLEXCLEAR_KERNELS": str(tmp_path / "kernels")}
-    done = subprocess.run(
-        [sys.executable, "-c", DRAWN], cwd=root, env=environment, capture_output=True, text=True, check=False
-    )
+    command = [sys.executable, "-c", DRAWN]
+    done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, check=False)
     assert done.stdout == "[]\n", done.stderr
     assert list((tmp_path / "results").glob("cache/*/*.json"))

@@ -1,13 +1,10 @@
 """What a process keeps of memory: many runs, as in a notebook, do not make it grow; a command is not given it anew."""
 
-from __future__ import annotations
-
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.processes import printed
 
 #: by how much the memory of the process grows [bytes], once it has all that it keeps
 RUNS = """import os, sys
@@ -26,28 +23,17 @@ print((pages() - before) * os.sysconf("SC_PAGE_SIZE"))
 
 @pytest.mark.slow
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="the system does not tell a process's memory so")
-def test_two_hundred_runs_take_no_more_memory_than_fifty(tmp_path: Path, root: Path) -> None:
+def test_two_hundred_runs_take_no_more_memory_than_fifty(tmp_path: Path) -> None:
     """A dataset of such a run has 0.5 MB; to keep one of each run would be 75 MB. Measured: 2 MB."""
-    done = subprocess.run(
-        [sys.executable, "-c", RUNS],
-        cwd=root,
-        env={**os.environ, "FLEXCLEAR_RESULTS": str(tmp_path)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert int(done.stdout) < 25e6
+    assert int(printed(RUNS, FLEXCLEAR_RESULTS=str(tmp_path))) < 25e6
 
 
-def test_a_command_looks_for_no_garbage_at_its_end(root: Path) -> None:
+def test_a_command_looks_for_no_garbage_at_its_end() -> None:
     """Handlers of the end are called last first: this one after the command's own, which sets all objects aside."""
     code = (
         "import atexit, gc; atexit.register(lambda: print(gc.get_freeze_count())); import flexclear.commands.__main__"
     )
     told = f"{code}; flexclear.commands.__main__.main()"  # ends when it has said the version, and has set nothing aside
-    command = [sys.executable, "-c", told, "--version"]
-    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    assert int(done.stdout.split()[-1]) > 1000  # objects; there are tens of thousands
+    assert int(printed(told, "--version").split()[-1]) > 1000  # objects; there are tens of thousands
     # in somebody else's process nothing is changed
-    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
-    assert int(done.stdout) == 0
+    assert int(printed(code)) == 0

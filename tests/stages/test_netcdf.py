@@ -1,7 +1,5 @@
 """Files of labelled arrays hold what xarray writes into its own and reads, since users meet them with xarray."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from types import ModuleType

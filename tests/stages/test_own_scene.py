@@ -12,9 +12,8 @@ import pytest
 import xarray as xr
 
 from flexclear.commands import scenes
-from flexclear.commands.__main__ import main
-from flexclear.commands.as_json import as_json
 from flexclear.commands.check import examined
+from flexclear.commands.export import as_json
 from flexclear.commands.new import KINDS, TEMPLATES, write
 from flexclear.pipeline.core.artifacts.paths import results_root
 from flexclear.pipeline.core.scene import lines
@@ -23,6 +22,7 @@ from flexclear.pipeline.core.scene.load import load_scene
 from flexclear.pipeline.core.scene.plausibility import implausible
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
+from tests.stages.conftest import Command
 from tests.stages.typical_mistakes import MISTAKES, WARNED
 
 REPORTED = dict(
@@ -36,13 +36,11 @@ RECIPES = sorted((Path(__file__).parents[2] / "meshes").rglob("*.toml"))
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_new_writes_has_no_mistake(kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    assert main(["new", kind, str(tmp_path / "own")]) == 0
+def test_what_new_writes_has_no_mistake(kind: str, tmp_path: Path, command: Command):
+    command("new", kind, tmp_path / "own")
     scene, *_ = sorted((tmp_path / "own").glob("*.toml"), key=lambda path: "[body" not in path.read_text())
-    assert main(["check", str(scene)]) == 0
-    assert "no error" in capsys.readouterr().out
-    assert main(["new", kind, str(tmp_path / "own")]) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "no error" in command("check", scene).out
+    assert "is there already" in command("new", kind, tmp_path / "own", code=2).err
 
 
 def test_all_beginnings_fit_into_one_folder(tmp_path: Path) -> None:
@@ -56,7 +54,7 @@ def test_all_typical_mistakes_are_in_the_table():
 
 
 @pytest.mark.parametrize("name", MISTAKES)
-def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, command: Command):
     file, old, new = MISTAKES[name]
     folder = tmp_path / "own"
     write("slider-crank", folder)
@@ -64,8 +62,8 @@ def test_a_typical_mistake_gets_its_message(name: str, tmp_path: Path, capsys: p
     assert old is None or old in text
     (folder / file).write_text(text + new if old is None else text.replace(old, new, 1))
     code = 4 if name in TOO_MUCH else 0 if name in WARNED else 2
-    assert main(["check", str(folder / "slider_crank.toml")]) == code
-    said = capsys.readouterr().err.replace(f"{folder.resolve()}/", "").replace(f"{folder}/", "")
+    said = command("check", folder / "slider_crank.toml", code=code).err
+    said = said.replace(f"{folder.resolve()}/", "").replace(f"{folder}/", "")
     # lists of all names that there are grow with the program
     assert re.sub(r"(known|one of): .*", r"\1: ...", said).strip() == REPORTED[name].strip()
 
@@ -78,23 +76,19 @@ def test_nothing_that_the_project_ships_is_doubted(path: Path):
     assert [str(warning) for warning in seen.warnings] == []
 
 
-@pytest.mark.parametrize("command", ["check", "show", "why"])
+@pytest.mark.parametrize("verb", ["check", "show", "why"])
 def test_a_value_of_the_command_line_is_doubted_where_it_is_given(
-    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    verb: str, tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch, fresh: Path
 ):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     monkeypatch.chdir(tmp_path)
     scene, _ = write("slider-crank", tmp_path)
-    assert main([command, str(scene), "--set", "joint.pin.clearance=0.2"]) == 0
-    assert "warning: --set joint.pin.clearance: 200 mm is more than the pin's radius, 10 mm" in capsys.readouterr().err
+    said = command(verb, scene, "--set", "joint.pin.clearance=0.2").err
+    assert "warning: --set joint.pin.clearance: 200 mm is more than the pin's radius, 10 mm" in said
 
 
-def test_a_run_from_python_prints_plausibility_warnings(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-):
+def test_a_run_from_python_prints_plausibility_warnings(capsys: pytest.CaptureFixture[str], fresh: Path):
     import flexclear as fc
 
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     scene = fc.load_scene("scenes/checks/pendulum.toml", override={"output.interval": 50.0})
     run = fc.run(scene)
     assert "[output.interval], line" in capsys.readouterr().err
@@ -104,42 +98,36 @@ def test_a_run_from_python_prints_plausibility_warnings(
     assert np.array_equal(table["position bob x [m]"], run["position"].sel(body="bob", axis="x"))
 
 
-def test_run_looks_first_and_computes_nothing_for_a_mistyped_frame(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
+def test_run_looks_first_and_computes_nothing_for_a_mistyped_frame(tmp_path: Path, command: Command, fresh: Path):
     scene, _ = write("slider-crank", tmp_path / "own")
     scene.write_text(scene.read_text().replace('"rod.small_end"', '"rod.smal_end"'))
-    assert main(["run", str(scene)]) == 2
-    said = capsys.readouterr().err
+    said = command("run", scene, code=2).err
     assert "[joint.wrist.between], line" in said
     assert "did you mean 'small_end'?" in said
-    assert not (tmp_path / "results").exists()
+    assert not fresh.exists()
 
 
-def test_mistakes_of_several_files_are_told_together_and_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_mistakes_of_several_files_are_told_together_and_as_json(tmp_path: Path, command: Command):
     scene, rod = write("slider-crank", tmp_path)
     scene.write_text(scene.read_text().replace('"0.8 kg"', "-1").replace('"crank.pin"] ', '"crank.pim"] '))
     rod.write_text(rod.read_text().replace('"7850 kg/m^3"', '"7850 kg"'))
-    assert main(["check", str(scene), "--json"]) == 2
-    found = {(Path(m["file"]).name, m["line"], m["problem"].split()[0]) for m in json.loads(capsys.readouterr().out)}
+    said = json.loads(command("check", scene, "--json", code=2).out)
     text = scene.read_text().splitlines()
     mass = 1 + next(k for k, line in enumerate(text) if line.startswith("mass = -1"))
     between = 1 + next(k for k, line in enumerate(text) if '"crank.pim"' in line and line.startswith("between"))
     density = 1 + next(k for k, line in enumerate(rod.read_text().splitlines()) if line.startswith("density"))
-    assert {(file, line) for file, line, _ in found} == {
+    assert {(Path(m["file"]).name, m["line"]) for m in said} == {
         ("slider_crank.toml", mass),
         ("slider_crank.toml", between),
         ("rod.toml", density),
     }
 
 
-def test_a_mistake_in_an_extended_scene_is_told_in_its_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_mistake_in_an_extended_scene_is_told_in_its_file(tmp_path: Path, command: Command):
     scene, _ = write("slider-crank", tmp_path)
     scene.write_text(scene.read_text().replace('mass = "0.8 kg"', "mass = -1"))
     (tmp_path / "other.toml").write_text('extends = "slider_crank.toml"\n')
-    assert main(["check", str(tmp_path / "other.toml")]) == 2
-    said = capsys.readouterr().err
+    said = command("check", tmp_path / "other.toml", code=2).err
     assert re.search(r"other.toml \[body.crank.mass\], line \d+ of .*slider_crank.toml: must be greater than 0", said)
 
 
@@ -198,32 +186,28 @@ def test_the_schema_refuses_what_is_no_scene(validators):
 
 
 @pytest.mark.parametrize("kind", ["scene", "recipe"])
-def test_schemas_say_what_they_are(kind: str, capsys: pytest.CaptureFixture[str]):
-    assert main(["schema", kind]) == 0
-    schema = json.loads(capsys.readouterr().out)
+def test_schemas_say_what_they_are(kind: str, command: Command):
+    schema = json.loads(command("schema", kind).out)
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     assert schema["$id"] == f"urn:flexclear:schema:{kind}"
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh"])
-def test_completion_knows_every_command_and_its_options(shell: str, capsys: pytest.CaptureFixture[str]):
-    assert main(["completion", shell]) == 0
-    said = capsys.readouterr().out
+def test_completion_knows_every_command_and_its_options(shell: str, command: Command):
+    said = command("completion", shell).out
     assert 'compare) options="-h --help --set --jobs' in said
     assert "--ideal" in said
     assert all(verb in said for verb in ("new", "check", "report"))
 
 
-def test_a_value_is_changed_from_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_value_is_changed_from_the_command_line(tmp_path: Path, command: Command):
     scene, _ = write("slider-crank", tmp_path)
     graph = scenes.graphs([str(scene)], ["joint.pin.clearance=0.3 mm", "solver.rtol=1e-6"])[0]
     assert graph.scene.joint["pin"].clearance == pytest.approx(3e-4, rel=1e-12)
     assert graph.scene.solver.rtol == 1e-6
     assert "joint.pin.clearance=0.3_mm" in graph.simulate.folder  # the results of the file stay
-    assert main(["why", str(scene), "--set", "joint.pin.clearence=1"]) == 2
-    assert "did you mean 'clearance'" in capsys.readouterr().err
-    assert main(["why", str(scene), "--set", "joint"]) == 2
-    assert "is no KEY=VALUE" in capsys.readouterr().err
+    assert "did you mean 'clearance'" in command("why", scene, "--set", "joint.pin.clearence=1", code=2).err
+    assert "is no KEY=VALUE" in command("why", scene, "--set", "joint", code=2).err
 
 
 def test_a_scene_from_a_table_is_that_of_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -243,32 +227,28 @@ def test_every_template_is_a_kind_that_new_knows():
     assert {path.name.replace("_", "-") for path in TEMPLATES.iterdir()} == set(KINDS)
 
 
-def test_check_looks_whether_the_joints_of_flexible_bodies_fit(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_check_looks_whether_the_joints_of_flexible_bodies_fit(tmp_path: Path, command: Command):
     """Without a mode: where nothing is deformed."""
     scene, _ = write("leg", tmp_path)
     text = scene.read_text()
     assert 'position = [0, 0, "260 mm"]' in text
     scene.write_text(text.replace('position = [0, 0, "260 mm"]', 'position = ["20 mm", 0, "260 mm"]'))
-    assert main(["check", str(scene)]) == 2
-    assert re.search(r"\[joint\.\w+", capsys.readouterr().err)
+    assert re.search(r"\[joint\.\w+", command("check", scene, code=2).err)
 
 
-def test_check_looks_at_a_recipe_as_a_recipe(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_check_looks_at_a_recipe_as_a_recipe(tmp_path: Path, command: Command):
     _, rod = write("slider-crank", tmp_path)
-    assert main(["check", str(rod)]) == 0
     # 200 mm x 12 mm x 8 mm of 7850 kg/m^3
-    assert f"{rod}: a mesh recipe, straight-beam, frames: big_end, middle, small_end, mass 0.15072 kg; no error" in (
-        capsys.readouterr().out
-    )
+    told = f"{rod}: a mesh recipe, straight-beam, frames: big_end, middle, small_end, mass 0.15072 kg; no error"
+    assert told in command("check", rod).out
     text = rod.read_text()
     rod.write_text(
         text.replace("elements = 10", "element = 10").replace('small_end = { x = "200 mm"', "small_end = { x = 1")
     )
-    assert main(["check", str(rod), "--json"]) == 2
-    assert {m["place"].partition(" ")[2] for m in json.loads(capsys.readouterr().out)} >= {"[elements]", "[element]"}
+    said = json.loads(command("check", rod, "--json", code=2).out)
+    assert {m["place"].partition(" ")[2] for m in said} >= {"[elements]", "[element]"}
     rod.write_text(text.replace("elements = 10", "elements = 1000000"))
-    assert main(["check", str(rod)]) == 4
-    assert "1e+06 cells are more than the 500000 that limits.cells allows" in capsys.readouterr().err
+    assert "1e+06 cells are more than the 500000 that limits.cells allows" in command("check", rod, code=4).err
 
 
 SWEEP = (
@@ -289,54 +269,44 @@ STRAY = {
 
 @pytest.mark.parametrize("case", STRAY)
 def test_a_file_that_a_command_does_not_take_is_named_with_the_command_that_does(
-    case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    case: str, tmp_path: Path, fresh: Path, command: Command
 ):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     write("slider-crank", tmp_path)
     (tmp_path / "many.toml").write_text(SWEEP)
-    command, name, said, hint = STRAY[case]
+    verb, name, said, hint = STRAY[case]
     path = (tmp_path / f"{name}.toml").resolve()
-    assert main([command, str(path)]) == 2
-    assert capsys.readouterr().err == f"flexclear: {path}: is {said}\n  hint: {hint.format(path, path)}\n"
+    assert command(verb, path, code=2).err == f"flexclear: {path}: is {said}\n  hint: {hint.format(path, path)}\n"
 
 
-def test_a_sweep_or_a_scene_is_no_mesh_of_a_body(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_sweep_or_a_scene_is_no_mesh_of_a_body(tmp_path: Path, command: Command):
     scene, _ = write("slider-crank", tmp_path)
     (tmp_path / "many.toml").write_text(SWEEP)
     text = scene.read_text()
     for other in ("many", "slider_crank"):
         scene.write_text(text.replace('mesh = "rod.toml"', f'mesh = "{other}.toml"'))
-        assert main(["check", str(scene)]) == 2
-        assert "not a mesh recipe" in capsys.readouterr().err
+        assert "not a mesh recipe" in command("check", scene, code=2).err
 
 
-def test_check_looks_at_sweeps_and_at_their_scenes(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_check_looks_at_sweeps_and_at_their_scenes(tmp_path: Path, command: Command):
     scene, _ = write("slider-crank", tmp_path)
     sweep = tmp_path / "many.toml"
     sweep.write_text(
         'scene = "slider_crank.toml"\nkeep = ["wrist.peak_force"]\nvary."joint.wrisst.clearance" = [1e-4]\n'
     )
-    assert main(["check", str(sweep)]) == 2
-    said = capsys.readouterr().err
+    said = command("check", sweep, code=2).err
     assert "there is no 'joint.wrisst'" in said
     assert "did you mean" in said
     scene.write_text(scene.read_text().replace('mass = "0.8 kg"', "mass = -1"))
-    assert main(["check", str(sweep)]) == 2
-    assert "body.crank.mass" in capsys.readouterr().err
+    assert "body.crank.mass" in command("check", sweep, code=2).err
 
 
 @pytest.mark.parametrize("name", ["clearance", "speed"])
-def test_the_sweeps_of_the_project_have_no_mistake(name: str, capsys: pytest.CaptureFixture[str]):
-    assert main(["check", f"sweeps/{name}"]) == 0
-    assert "no error" in capsys.readouterr().out
+def test_the_sweeps_of_the_project_have_no_mistake(name: str, command: Command):
+    assert "no error" in command("check", f"sweeps/{name}").out
 
 
-def test_results_are_printed_as_json_for_scripts(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
-    assert main(["why", "checks/pendulum", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out) == {
+def test_results_are_printed_as_json_for_scripts(command: Command, fresh: Path):
+    assert json.loads(command("why", "checks/pendulum", "--json").out) == {
         "checks/pendulum": {"simulate": ["never run"], "post": ["never run"]}
     }
 
@@ -380,21 +350,17 @@ MISSING = "nothing uses the frames 'a.end' and 'b.start', which start at the sam
 
 
 def test_check_and_run_warn_of_a_forgotten_joint(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, command: Command, monkeypatch: pytest.MonkeyPatch, fresh: Path
 ):
-    monkeypatch.setenv("FLEXCLEAR_RESULTS", str(tmp_path / "results"))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "two.toml").write_text(TWO_BODIES)
-    assert main(["check", "two.toml"]) == 0
-    said = capsys.readouterr()
+    said = command("check", "two.toml")
     assert MISSING in said.err
     assert "free motions besides the drives: 12" in said.out
-    assert main(["run", "two.toml", "--json"]) == 0
-    said = capsys.readouterr()
+    said = command("run", "two.toml", "--json")
     assert MISSING in said.err
     assert MISSING in json.loads(said.out)["two"]["warnings"][0]
-    assert main(["check", "two.toml", "--set", "body.b.frames.start.position=[0, 0, 0]"]) == 0
-    assert MISSING not in capsys.readouterr().err
+    assert MISSING not in command("check", "two.toml", "--set", "body.b.frames.start.position=[0, 0, 0]").err
 
 
 ROLLING = """
@@ -417,10 +383,9 @@ normal = { law = "flores", restitution = 0.3, stiffness = 1e9 }
 """
 
 
-def test_a_ball_that_starts_in_its_plane_is_refused_with_its_depth(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+def test_a_ball_that_starts_in_its_plane_is_refused_with_its_depth(tmp_path: Path, command: Command):
     (tmp_path / "ball.toml").write_text(ROLLING)
-    assert main(["check", str(tmp_path / "ball.toml")]) == 2
-    said = capsys.readouterr().err
+    said = command("check", tmp_path / "ball.toml", code=2).err
     assert "the ball starts 3 mm deep in the plane" in said
     assert "hint: move a body, lower the plane, or declare" in said
     assert "clearance" not in said

@@ -1,7 +1,5 @@
 """What README and the tutorial show can be done as it is there."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

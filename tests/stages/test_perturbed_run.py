@@ -19,7 +19,7 @@ from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.core.workflow import cores, journal, stopping
+from flexclear.pipeline.core.workflow import cores, stopping
 from flexclear.pipeline.dynamics.run import progress_rate, trajectory
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
@@ -76,8 +76,7 @@ def test_whichever_is_ahead_the_bits_are_those_of_one_after_the_other(
         return hear(self, rows)
 
     def late_twin(self: Pair, twin: Any, alive: Progress) -> bool:
-        with self._news:
-            assert self._news.wait_for(lambda: self._ended, PATIENCE)
+        assert self._ended.wait(PATIENCE)
         return enough(self, twin, alive)
 
     if ahead == "twin":
@@ -219,12 +218,9 @@ def test_where_no_thread_is_to_be_had_the_work_is_done_when_its_result_is_asked_
 
 
 @pytest.mark.parametrize("stopped", ["run", "twin"])
-def test_both_are_stopped_in_good_order_and_go_on_to_the_same_bits(
-    stopped: str, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_both_are_stopped_in_good_order(stopped: str, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Asked to stop while the run goes on, or its twin alone: what there is of the run is told."""
     monkeypatch.setattr(trajectory, "SLICE", 100)
-    monkeypatch.setattr(journal, "EVERY", -1.0)
     monkeypatch.setattr(stopping, "_why", "")
     scene = check(root, "bounce", **{"output.interval": 0.05})
     whole = alone(scene, monkeypatch)
@@ -234,23 +230,20 @@ def test_both_are_stopped_in_good_order_and_go_on_to_the_same_bits(
             stopping.request("the time is over")
 
     def late_twin(self: Pair, twin: Any, alive: Progress) -> bool:
-        with self._news:
-            assert self._news.wait_for(lambda: self._ended, PATIENCE)
+        assert self._ended.wait(PATIENCE)
         stopping.request("the time is over")
         return False
 
     with monkeypatch.context() as patch:
         if stopped == "twin":
             patch.setattr(Pair, "_enough", late_twin)
-        with pytest.raises(StoppedError) as told, journal.storage(tmp_path, "key"):
+        with pytest.raises(StoppedError) as told:
             dynamics.simulate(scene, {}, progress)
     stopping._why = ""
     left = told.value.partial
     assert left.attrs["complete"] == 0
     assert left.position.identical(whole.position[: left.sizes["time"]])
     assert (left.sizes["time"] == whole.sizes["time"]) is (stopped == "twin")
-    with journal.storage(tmp_path, "key"):
-        assert dynamics.simulate(scene, {}, silent).identical(whole)
 
 
 def test_what_is_kept_for_comparisons_alone_is_not_in_the_dataset(root: Path) -> None:

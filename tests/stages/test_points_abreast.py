@@ -13,11 +13,10 @@ from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.load import load_scene, with_numbers
 from flexclear.pipeline.core.scene.quantity import parse_recorded
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.dynamics.kernels import INTERPRETED
 from flexclear.pipeline.dynamics.record import point as points_of
 from flexclear.pipeline.dynamics.record.point import Runner
-from flexclear.pipeline.dynamics.run import alike
+from flexclear.pipeline.dynamics.run import run as runs
 from flexclear.pipeline.dynamics.run.evaluation import batched_evaluation
 from flexclear.stages.sweeps import sweep_engine, sweep_points
 
@@ -30,11 +29,11 @@ def runner(scene: Scene, keep: Sequence[str] = BALL, **asked: Any) -> Runner:
 
 def alone(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> list[Point]:
     """Each by a worker that has run nothing else."""
-    return [sweep_points._point(runner(scene, **asked), scene, point, None) for point in points]
+    return [sweep_points._point(runner(scene, **asked), scene, point) for point in points]
 
 
 def abreast(scene: Scene, points: Sequence[Mapping[str, Any]], **asked: Any) -> list[Point]:
-    return sweep_points._abreast(runner(scene, **asked), scene, points, [None] * len(points))
+    return sweep_points._together(runner(scene, **asked), scene, points)
 
 
 def assert_same(found: Sequence[Point], known: Sequence[Point]) -> None:
@@ -113,45 +112,13 @@ def test_sections_and_members_of_points_are_the_same_to_the_last_bit(root: Path)
     assert_same(abreast(ball, points, members=2), known)
 
 
-def test_each_point_keeps_its_unfinished_work_in_a_journal_of_its_own(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What is done of a batch is kept until all of it is; then nothing is left."""
-    ball = load_scene(root / "scenes/checks/bounce.toml", override={"time.end": 0.3})
-    points = [{"joint.contact.normal.restitution": 0.5 + 0.1 * k} for k in range(4)]
-    proper, seen, made = Runner.run, dict[float, str](), runner(ball)
-
-    def noted(self: Runner, scene: Scene, *rest: Any) -> Point:
-        own = journal.current()
-        assert own is not None
-        seen[scene.contacts()["contact"].normal.restitution] = own.key
-        return proper(self, scene, *rest)
-
-    monkeypatch.setattr(Runner, "run", noted)
-    monkeypatch.setattr(sweep_points, "_opened", lambda *_: (ball, made))
-    left = list[set[str]]()
-    remove = journal.remove
-    monkeypatch.setattr(
-        journal, "remove", lambda task: (left.append({p.name[:1] for p in tmp_path.glob("*.part")}), remove(task))
-    )
-    places: list[Path | None] = [tmp_path / str(k) for k in range(4)]
-    found, _ = sweep_points.work("key", b"", points, True, places, abreast=True)
-    assert seen == {
-        with_numbers(ball, p).contacts()["contact"].normal.restitution: str(k) for k, p in enumerate(points)
-    }
-    assert left[0] == {"0", "1", "2", "3"}
-    assert list(tmp_path.glob("*.part")) == []
-    monkeypatch.undo()
-    assert_same(found, alone(ball, points))
-
-
 def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() -> None:
     """Where they take many evaluations and there are many of them; they still end together."""
 
     def handed_out(evaluations: int, count: int = 200) -> tuple[list[int], list[bool], float]:
         busy, sizes, told = [0.0, 0.0], list[int](), list[bool]()
 
-        def submit(family: str, packed: bytes, points: list[Any], alone: bool, journals: Any, abreast: bool) -> Any:
+        def submit(family: str, packed: bytes, points: list[Any], alone: bool, abreast: bool) -> Any:
             from concurrent.futures import Future
 
             seconds = 0.1 * len(points)
@@ -162,15 +129,15 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
             future.set_result(([Point({}, {}, {}, evaluations) for _ in points], seconds))
             return future
 
-        jobs = [sweep_engine.Job(str(n), "family", {}, Path(str(n))) for n in range(count)]
+        jobs = [sweep_engine.Job(str(n), "family", {}) for n in range(count)]
         sweep_engine.Engine(submit, lambda: 2).run(jobs, {"family": b""}, lambda *_: None)
         assert sum(sizes) == count
         return sizes, told, sum(busy) / max(busy)
 
     sizes, told, together = handed_out(evaluations=100_000)
     assert told == [False] + [True] * (len(sizes) - 1)  # the first tells how many it takes
-    assert all(size % sweep_engine.ABREAST == 0 for size in sizes[1:-4])
-    assert max(sizes) >= 4 * sweep_engine.ABREAST
+    assert all(size % sweep_engine.POINTS_TOGETHER == 0 for size in sizes[1:-4])
+    assert max(sizes) >= 4 * sweep_engine.POINTS_TOGETHER
     assert together >= 1.85  # found 2.00
     assert not any(handed_out(evaluations=1_000)[1])
     assert not any(handed_out(evaluations=100_000, count=20)[1])
@@ -180,13 +147,13 @@ def test_points_are_handed_out_as_many_as_step_side_by_side_where_that_pays() ->
 def test_the_run_that_tells_a_points_error_takes_the_model_over(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """One model is made from scratch, for the first run of the first point."""
     paper = load_scene(root / "scenes/sps4/csj.toml", override={"time.end": "2 ms"})
-    proper, made = alike.engines, list[float]()
+    proper, made = runs.engines, list[float]()
 
     def noted(scene: Scene, *rest: Any) -> Any:
         made.append(scene.solver.rtol)
         return proper(scene, *rest)
 
-    monkeypatch.setattr(alike, "engines", noted)
+    monkeypatch.setattr(runs, "engines", noted)
     worker = runner(paper, keep=("platform.velocity.largest",), error=True)
     for clearance in (3e-4, 4e-4):
         assert not worker.run(with_numbers(paper, {"joint.A1.clearance": clearance})).refused

@@ -1,7 +1,5 @@
 """What a user sees while something runs."""
 
-from __future__ import annotations
-
 import io
 import logging
 from collections.abc import Iterator

@@ -6,8 +6,8 @@ import pytest
 
 from benchmarks.families import reference_conditions
 from benchmarks.family import Record as Row
-from benchmarks.geometry.kinematics import Layout
-from benchmarks.reference_conditions import claims, design, figures, layouts
+from benchmarks.layouts import Layout
+from benchmarks.reference_conditions import claims, design
 from benchmarks.reference_conditions.design import CONDITIONS, COUNT, FULL, MOST_COMPLETE, PLACES, RIGID, Case
 
 EFFECT = {"angle": 3e-6, "displacement": 3e-7, "velocity": 7e-4}
@@ -90,7 +90,10 @@ def test_the_page_has_a_part_and_a_figure_per_group() -> None:
     assert isinstance(parts, dict)
     assert parts.keys() == {"short", "claims", "far", "clearance"}
     assert "**Holds** at all three places." in parts["claims"]
-    assert figures.files(records).keys() == {"reference-conditions/far.png", "reference-conditions/clearance.png"}
+    assert reference_conditions.files(records).keys() == {
+        "reference-conditions/far.png",
+        "reference-conditions/clearance.png",
+    }
 
 
 def test_cases_take_the_scene_of_their_place() -> None:
@@ -133,11 +136,11 @@ def layout_rows(layouts: int, **odd: float) -> list[Row]:
 
 
 def test_a_statement_holds_of_the_paper_when_it_holds_for_every_layout() -> None:
-    every = layouts.text(layout_rows(3))
+    every = claims.of_layouts(layout_rows(3))
     assert "| holds | 3 of 3 | **holds** |" in " ".join(every.split())
     assert "hangs on the layout" not in every
     # a rigid rod whose impacts are as soft: the flexible one softens nothing there
-    some = " ".join(layouts.text(layout_rows(3, peak_force=1500.0)).split())
+    some = " ".join(claims.of_layouts(layout_rows(3, peak_force=1500.0)).split())
     assert "| The flexible rod softens the impacts. | holds | 2 of 3 | hangs on the layout |" in some
 
 

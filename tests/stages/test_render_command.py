@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.scene.load import load_scene
-from flexclear.pipeline.post.overview.overlay import colors
+from flexclear.pipeline.post.overview.comparison import colors
 from flexclear.stages.graph import Graph
+from tests.stages.conftest import Command
 
 SCENE = "checks/clamped_rod"
 
@@ -22,13 +22,12 @@ def results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "results"
 
 
-def test_modes_are_shown_without_a_run(results: Path, capsys: pytest.CaptureFixture[str]):
+def test_modes_are_shown_without_a_run(results: Path, command: Command):
     body = next(iter(load_scene(f"scenes/{SCENE}.toml").flexible()))
     for kind, file in (("png", f"modes_{body}.png"), ("html", "modes.html"), ("gltf", f"modes_{body}.glb")):
-        assert main(["render", SCENE, "--what", "modes", "--format", kind, "-q"]) == 0
-        assert file in capsys.readouterr().out
+        assert file in command("render", SCENE, "--what", "modes", "--format", kind, "-q").out
         assert (results / "runs" / SCENE / file).stat().st_size > 1000
-    assert main(["render", SCENE, "--what", "modes", "--format", "pvd", "-q"]) == 0
+    command("render", SCENE, "--what", "modes", "--format", "pvd", "-q")
     assert (results / "runs" / SCENE / "paraview" / f"modes_{body}.pvd").is_file()
     assert not (results / "runs" / SCENE / "run.nc").exists()
 
@@ -41,17 +40,14 @@ def test_modes_are_shown_without_a_run(results: Path, capsys: pytest.CaptureFixt
         (["--what", "vibrations", "--at", "1 kg"], "--at 1 kg"),
     ],
 )
-def test_what_cannot_be_shown_so_is_refused(
-    words: list[str], told: str, results: Path, capsys: pytest.CaptureFixture[str]
-):
-    assert main(["render", SCENE, *words]) == 2
-    assert told in capsys.readouterr().err
+def test_what_cannot_be_shown_so_is_refused(words: list[str], told: str, results: Path, command: Command):
+    assert told in command("render", SCENE, *words, code=2).err
     assert not results.exists()
 
 
-def test_a_scene_without_modes_says_so(results: Path, capsys: pytest.CaptureFixture[str]):
-    assert main(["render", "checks/pendulum", "--what", "modes", "--format", "png", "-q"]) == 2
-    assert "no flexible body" in capsys.readouterr().err
+def test_a_scene_without_modes_says_so(results: Path, command: Command):
+    said = command("render", "checks/pendulum", "--what", "modes", "--format", "png", "-q", code=2)
+    assert "no flexible body" in said.err
 
 
 def test_no_task_of_a_run_sees_what_bodies_look_like():

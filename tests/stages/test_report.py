@@ -1,7 +1,5 @@
 """The report's tasks: every reference of every figure leads to an artifact that a scene has."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import flexclear as fc
-from flexclear.commands.scene_report import publish_page
+from flexclear.commands.report import publish_page
 
 
 def test_a_page_in_a_folder_has_its_files_next_to_it(tmp_path: Path) -> None:

@@ -1,23 +1,19 @@
 """``flexclear show``: the start pose with names, for every scene, without anything that computes or compiles."""
 
-from __future__ import annotations
-
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import flexclear as fc
-from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.workflow.fingerprint import TREE
 from flexclear.pipeline.post.render import gl, surfaces
 from flexclear.pipeline.post.render.ruler import pixels_per_metre, project, round_length
-from flexclear.pipeline.post.render.start_picture import columns, heights
-from flexclear.pipeline.post.render.start_view import AXIS, page_view
+from flexclear.pipeline.post.render.start_view import AXIS, columns, heights, page_view
+from tests.processes import printed
+from tests.stages.conftest import Command
 
 SCENES = sorted(
     path.relative_to(TREE).as_posix()
@@ -49,7 +45,7 @@ def test_nothing_that_compiles_is_imported(root: Path):
         "assert not {'numba', 'llvmlite'} & set(sys.modules), 'something that compiles was imported'"
     )
     scenes = (str(root / name) for name in ("scenes/sps4/csj.toml", "stages/templates/slider_crank/slider_crank.toml"))
-    subprocess.run([sys.executable, "-c", program, *scenes], check=True)
+    printed(program, *scenes)
 
 
 def test_a_loop_that_does_not_close_is_a_gap_of_its_length(root: Path):
@@ -68,34 +64,29 @@ def test_a_loop_that_does_not_close_is_a_gap_of_its_length(root: Path):
 
 
 def test_the_command_writes_where_it_runs(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command
 ):
     monkeypatch.chdir(tmp_path)
-    scene = str(root / "scenes/checks/pendulum.toml")
-    assert main(["show", scene]) == 0
+    said = command("show", root / "scenes/checks/pendulum.toml")
     page = (tmp_path / "pendulum_start.html").read_text(encoding="utf-8")
     told = json.loads(re.search(r"<script type='application/json'>(.*?)</script>", page, re.DOTALL)[1])  # type: ignore[index]
     assert {label["text"] for label in told["labels"]} == {"bob", "hinge"}
     assert (tmp_path / "pendulum_start.png").exists() == gl.works()
-    assert "pendulum_start.html" in capsys.readouterr().out
+    assert "pendulum_start.html" in said.out
 
 
-def test_check_shows_what_it_refuses(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_check_shows_what_it_refuses(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Command):
     monkeypatch.chdir(tmp_path)
     scene = (root / "stages/templates/four_bar/four_bar.toml").read_text(encoding="utf-8")
     moved = re.sub(r"(frames\.D = .*position = \[)[^,]+", r'\g<1>"900 mm"', scene)
     assert moved != scene
     Path("apart.toml").write_text(moved, encoding="utf-8")
-    assert main(["check", "--show", "apart.toml"]) == 2
-    assert "does not fit at the start" in capsys.readouterr().err
+    assert "does not fit at the start" in command("check", "--show", "apart.toml", code=2).err
     assert Path("apart_start.html").exists()
 
 
-def test_a_wrong_scene_is_refused_as_everywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    assert main(["show", str(tmp_path / "nothing.toml")]) == 2
-    assert "nothing.toml" in capsys.readouterr().err
+def test_a_wrong_scene_is_refused_as_everywhere(tmp_path: Path, command: Command):
+    assert "nothing.toml" in command("show", tmp_path / "nothing.toml", code=2).err
 
 
 def test_axes_lie_along_the_joints(root: Path):

@@ -10,12 +10,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from benchmarks import crew, log
+from benchmarks import atlas, log, processes
+from benchmarks.atlas import Parameters, judge, run_case
 from benchmarks.families.stability import FAMILY
 from benchmarks.family import FINISHED, REFUSED, WRONG, Case, Record
-from benchmarks.stability import runs, scenes
-from benchmarks.stability.runs import judge, run_case
-from benchmarks.stability.scenes import Parameters
 from tests.stages import hard_cases
 
 #: ranges that the sweeps must span
@@ -38,7 +36,7 @@ def test_the_sweeps_span_what_they_say_and_there_are_three_hundred_cases():
     assert len(found) >= 300
     assert len({case.name for case in found}) == len(found)
     for name, (low, high) in SPANS.items():
-        values = [getattr(case.of, name) for case in found if scenes.sweep(case.name) == name]
+        values = [getattr(case.of, name) for case in found if atlas.sweep(case.name) == name]
         assert min(values) == pytest.approx(low, rel=1e-12)
         assert max(values) == pytest.approx(high, rel=1e-12)
 
@@ -49,7 +47,7 @@ def condition(p: Parameters) -> float:
     Length scale 0.1 m; the central chain leaves rotation and lift.
     """
     rows = []
-    layout = scenes.layout(p.nearness)
+    layout = atlas.layout(p.nearness)
     for a, b in zip(layout.A, layout.B, strict=True):
         leg = a - b + np.array([0.0, 0.0, layout.height])
         leg /= np.linalg.norm(leg)
@@ -67,9 +65,9 @@ def test_the_nearest_geometry_has_the_condition_of_a_million():
 
 
 def test_a_seed_gives_the_same_random_cases_and_another_one_others():
-    again = [case for case in scenes.cases(7, 20) if scenes.sweep(case.name) == "random"]
-    assert again == [case for case in scenes.cases(7, 20) if scenes.sweep(case.name) == "random"]
-    assert not {case.of for case in again} & {case.of for case in scenes.cases(8, 20)}
+    again = [case for case in atlas.cases(7, 20) if atlas.sweep(case.name) == "random"]
+    assert again == [case for case in atlas.cases(7, 20) if atlas.sweep(case.name) == "random"]
+    assert not {case.of for case in again} & {case.of for case in atlas.cases(8, 20)}
 
 
 def finished_run(**changes: Any) -> xr.Dataset:
@@ -115,7 +113,7 @@ def test_friction_that_feeds_energy_is_wrong():
 
 def test_a_case_that_hangs_and_one_that_dies_are_outcomes_and_the_others_go_on():
     todo = [Case(f"joints {n}", Parameters(joints=n)) for n in (1, 2, 3, 4, 5)]
-    found = {case.of.joints: record for case, record in crew.outcomes(todo, 1, hard_cases.work, limit=2)}
+    found = {case.of.joints: record for case, record in processes.outcomes(todo, 1, hard_cases.work, limit=2)}
     assert {n: record["verdict"] for n, record in found.items()} == {
         1: FINISHED,
         2: WRONG,
@@ -146,7 +144,7 @@ def test_outcomes_are_remembered_until_their_sources_change(tmp_path: Path, monk
 
 def test_an_outcome_depends_on_the_parts_of_its_scene_and_not_on_the_page():
     """Editing a friction law leaves a case without friction alone; what only shows outcomes leaves all alone."""
-    rough, smooth = (runs.modules(Case("friction", Parameters(friction=f))) for f in (0.1, 0.0))
+    rough, smooth = (atlas.modules(Case("friction", Parameters(friction=f))) for f in (0.1, 0.0))
     assert {name for name in rough - smooth if "friction" in name}
     assert not {name for name in rough if name.startswith(("flexclear.pipeline.post", "benchmarks.families"))}
 
@@ -155,11 +153,11 @@ def recorded(case: Case, **outcome: Any) -> Record:
     """A record of a case, with what the page looks at."""
     numbers = {"ledger": 1e-9, "closure": 1e-15, "deviation": None, "horizon_share": 1.0, "evaluations": 9}
     found = {"verdict": FINISHED, "method": "dop853", "switched": "", "seconds": 0.5, **numbers, **outcome}
-    return {"case": case.name, "sweep": scenes.sweep(case.name), "parameters": vars(case.of), **found}
+    return {"case": case.name, "sweep": atlas.sweep(case.name), "parameters": vars(case.of), **found}
 
 
 def test_the_page_counts_refusals_apart_and_quotes_them():
-    made = scenes.cases(7, 6)
+    made = atlas.cases(7, 6)
     records = [recorded(case) for case in made]
     records[0] |= {"verdict": REFUSED, "reason": "at t = 0.1 s: the step shrank"}
     written = FAMILY.show(records)
@@ -176,7 +174,7 @@ def test_the_papers_case_finishes_and_one_without_evaluations_is_refused(monkeyp
     assert (found["verdict"], found["reason"]) == (FINISHED, "")
     assert found["impacts"] == 28  # as docs/integrators.md
     assert found["deviation"] < 1e-4
-    monkeypatch.setattr(scenes, "CAP", 1000)
+    monkeypatch.setattr(atlas, "CAP", 1000)
     refused = run_case(Parameters())
     assert refused["verdict"] == REFUSED
     assert "limit of 1000 evaluations" in refused["reason"]

@@ -1,7 +1,5 @@
 """The store: atomic, checked, deterministic, and honest about full disks."""
 
-from __future__ import annotations
-
 import errno
 import os
 import resource
@@ -17,6 +15,7 @@ from flexclear.pipeline.core.artifacts import disk
 from flexclear.pipeline.core.artifacts.disk import publish
 from flexclear.pipeline.core.artifacts.store import Record, Store, write_dataset
 from flexclear.pipeline.core.system.errors import ResourceError
+from tests.processes import printed, python
 
 KEY = "k" * 32
 
@@ -63,20 +62,11 @@ def test_equal_datasets_give_equal_bytes(tmp_path: Path):
         "from test_store import dataset, write_dataset; print(write_dataset(Path(sys.argv[2]), dataset()))"
     )
     here = str(Path(__file__).parent)
-    printed = [
-        subprocess.run(
-            [sys.executable, "-c", code, here, str(tmp_path / name)],
-            capture_output=True,
-            text=True,
-            check=True,
-            cwd=Path(__file__).parents[2],
-            env={**os.environ, "PYTHONHASHSEED": seed},
-        ).stdout
-        for name, seed in (("one.nc", "1"), ("two.nc", "2"))
-    ]
-    assert printed[0] == printed[1]
+    seeds = {"one.nc": "1", "two.nc": "2"}
+    one, two = (printed(code, here, tmp_path / name, PYTHONHASHSEED=seed) for name, seed in seeds.items())
+    assert one == two
     assert (tmp_path / "one.nc").read_bytes() == (tmp_path / "two.nc").read_bytes()
-    assert write_dataset(tmp_path / "three.nc", dataset(51)) != printed[0].strip()
+    assert write_dataset(tmp_path / "three.nc", dataset(51)) != one.strip()
 
 
 def test_every_flipped_bit_is_found(store: Store, said: list[str]):
@@ -145,11 +135,10 @@ except ResourceError as error:
 
 
 @pytest.mark.parametrize("kind, limit", [("nc", 0), ("nc", 300_000), ("png", 5_000)])
-def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path, root: Path, kind: str, limit: int):
+def test_a_full_disk_is_told_and_leaves_nothing(tmp_path: Path, kind: str, limit: int):
     """A limit on the size of files answers a write as a full disk does: with an error from the system."""
     results = tmp_path / "results"
-    arguments = [sys.executable, "-c", FULL, str(Path(__file__).parent), str(results), str(limit), kind]
-    done = subprocess.run(arguments, capture_output=True, text=True, cwd=root, check=False)
+    done = python("-c", FULL, Path(__file__).parent, results, str(limit), kind, succeeds=False)
     assert done.returncode == ResourceError.exit_code, done.stderr
     assert "disk is full" in done.stdout
     assert [path for path in results.rglob("*") if path.is_file()] == []
@@ -183,11 +172,9 @@ assert (folder / "again.nc").read_bytes() == (folder / "whole.nc").read_bytes()
 
 
 @pytest.mark.parametrize("compressed", [1 << 26, 0])
-def test_the_library_tells_of_every_byte_that_it_cannot_write(tmp_path: Path, root: Path, compressed: int):
+def test_the_library_tells_of_every_byte_that_it_cannot_write(tmp_path: Path, compressed: int):
     """What it writes is not read back: wherever a disk ends, it raises an error."""
-    arguments = [sys.executable, "-c", TOO_SMALL, str(Path(__file__).parent), str(tmp_path), str(compressed)]
-    done = subprocess.run(arguments, capture_output=True, text=True, cwd=root, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
+    printed(TOO_SMALL, Path(__file__).parent, tmp_path, str(compressed))
 
 
 def test_a_disk_that_takes_no_more_when_it_is_forced_leaves_the_old_file(

@@ -1,6 +1,4 @@
-"""Who runs the points of a sweep does not matter, nor who dies meanwhile."""
-
-from __future__ import annotations
+"""Who runs the points of a sweep does not matter, nor who dies meanwhile, nor whether all fit into memory."""
 
 import logging
 import os
@@ -17,11 +15,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import flexclear as fc
 from flexclear.commands import sweep
 from flexclear.commands.__main__ import main
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.system.errors import InputError, ResourceError
-from flexclear.stages.sweeps import sweep_engine, sweep_plan
+from flexclear.stages.sweeps import sweep_engine, sweep_large, sweep_plan
 from flexclear.stages.workplace import open_workplace
 from tests.stages.conftest import PATIENCE
 from tests.stages.sweeps import begun, flexclear, pendulum
@@ -108,7 +107,7 @@ class Mortal:
         self.renewed += 1
 
     def run(self, told: list[int]) -> None:
-        jobs = [sweep_engine.Job(str(n), "family", {"n": n}, Path(str(n))) for n in range(40)]
+        jobs = [sweep_engine.Job(str(n), "family", {"n": n}) for n in range(40)]
         engine = sweep_engine.Engine(self.submit, lambda: 2, renew=self.renew)
         engine.run(jobs, {"family": b""}, lambda found, _: told.extend(point.evaluations for _, point in found))
 
@@ -161,7 +160,7 @@ def test_two_workers_finish_together():
         future.set_result(([Point({}, {}, {}, 0) for _ in points], 0.036 * len(points)))
         return future
 
-    jobs = [sweep_engine.Job(str(n), "family", {}, Path(str(n))) for n in range(80)]
+    jobs = [sweep_engine.Job(str(n), "family", {}) for n in range(80)]
     sweep_engine.Engine(submit, lambda: 2).run(jobs, {"family": b""}, lambda *_: None)
     assert sum(sizes) == 80
     assert sum(busy) / max(busy) >= 1.9  # found 2.00; without the smaller ones at the end 1.86
@@ -188,7 +187,7 @@ def test_a_worker_that_dies_in_the_opening_check_is_not_one_that_lacks_this_prog
         sweep_engine._threads(Cluster({"tcp://b": OSError("Address removed.")}, {}), "there")
     with pytest.raises(InputError, match="tcp://b cannot import flexclear"):
         sweep_engine._threads(Cluster({**fine, "tcp://b": ModuleNotFoundError("flexclear")}), "there")
-    monkeypatch.setattr(sweep_engine, "PATIENCE", 0.3)
+    monkeypatch.setattr(sweep_engine, "SCHEDULER_TIMEOUT", 0.3)
     with pytest.raises(ResourceError, match="tcp://b does not answer"):
         sweep_engine._threads(Cluster({**fine, "tcp://b": OSError("timed out")}), "there")
 
@@ -248,3 +247,64 @@ def _address(place: Path) -> str:
     with Client(scheduler_file=str(place), timeout=PATIENCE, set_as_default=False) as client:
         client.wait_for_workers(2, timeout=PATIENCE)
         return str(client.scheduler.address)
+
+
+# Datasets that are larger than memory: on disk, in slabs, with the same values --------------------------------------
+
+SWEEP = """
+scene = "checks/pendulum"
+keep = ["bob.position.series", "bob.velocity.largest"]
+set = { "time.end" = "0.5 s"LIMITS }
+error = true
+combine = "COMBINE"
+vary."body.bob.com.0" = ["-0.5 m", "-0.7 m", "-1 m", "-1.6 m", "-2 m"]
+vary."solver.evaluations" = [100000, 100, 100001, 100002, 100003]
+"""
+
+
+def _dataset(path: Path, limits: str, combine: str, *arguments: str) -> int:
+    path.write_text(SWEEP.replace("LIMITS", f", {limits}" if limits else "").replace("COMBINE", combine))
+    return main(["sweep", str(path), "--workers=1", *arguments])
+
+
+@pytest.mark.parametrize("combine", ["grid", "list"])
+def test_slabs_have_the_values_of_the_whole(
+    combine: str, tmp_path: Path, fresh: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    pytest.importorskip("zarr")
+    copy = tmp_path / "copy.zarr"
+    assert _dataset(tmp_path / "small.toml", "", combine, f"--out={copy}") == 0
+    monkeypatch.setattr(sweep_large, "SLAB", 1500)
+    monkeypatch.setattr(sweep_large, "BATCHES", 1)
+    assert _dataset(tmp_path / "large.toml", '"limits.memory" = "1 kB"', combine) == 0
+    assert "sweep.zarr" in capsys.readouterr().out
+    place = fresh / "sweeps" / "large" / "sweep.zarr"
+    assert not (place.parent / "sweep.nc").exists()
+    with xr.open_dataset(fresh / "sweeps" / "small" / "sweep.nc", decode_times=False) as whole:
+        for found in (xr.open_zarr(path, chunks=None, consolidated=False) for path in (place, copy)):
+            assert found.attrs["complete"] == 1
+            for name in ("bob.position.series", "bob.velocity.largest.error", "status", "time", "body.bob.com.0"):
+                assert found[name].load().equals(whole[name]), name
+            assert found["reason"].values.tolist() == whole["reason"].values.tolist()
+    assert _dataset(tmp_path / "large.toml", "", combine) == 0
+    assert not place.exists()
+    assert (place.parent / "sweep.nc").exists()
+
+
+def test_what_fits_nowhere_is_refused_before_it_is_run(
+    root: Path,
+    tmp_path: Path,
+    fresh: Path,
+    asked: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+):
+    monkeypatch.setattr(sweep_large, "find_spec", lambda name: None)
+    assert _dataset(tmp_path / "large.toml", '"limits.memory" = "1 kB"', "grid") == 4
+    assert "flexclear[zarr]" in capsys.readouterr().err
+    assert _dataset(tmp_path / "small.toml", "", "grid", f"--out={tmp_path / 'x.zarr'}") == 2
+    few = {"limits.memory": "1 kB"}
+    with pytest.raises(ResourceError, match="keep less"):
+        fc.sweep(root / "scenes/checks/pendulum.toml", {"body.bob.mass": [1.0, 2.0]}, ["bob.position.series"], set=few)
+    monkeypatch.undo()
+    assert asked == []

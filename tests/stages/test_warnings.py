@@ -1,7 +1,5 @@
 """A run says when the modes of a body lack what its joints need."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from flexclear import load_scene

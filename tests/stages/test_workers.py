@@ -20,6 +20,7 @@ from flexclear.pipeline.core.workflow.fingerprint import Sources
 from flexclear.pipeline.core.workflow.progress import Monitor
 from flexclear.pipeline.core.workflow.schedule import bring
 from flexclear.pipeline.core.workflow.task import Task
+from tests.processes import python
 
 
 def one(width: int = 1) -> tuple[int, int]:
@@ -74,7 +75,7 @@ def test_what_failed_in_a_worker_is_the_task_that_was_asked_for(tmp_path: Path) 
     # without the run that it is of, it cannot be done
     tasks = [Task("post", scene, "flexclear.stages.derived_series:run", {"of": scene}, "") for scene in ("a", "b")]
     outcome = bring(tasks, Store(tmp_path), Sources(TREE), Monitor(), 2)
-    assert {id(failure.task) for failure in outcome.failures} == {id(task) for task in tasks}
+    assert {failure.task for failure in outcome.failures} == {task for task in tasks}
 
 
 UNGUARDED = """
@@ -96,10 +97,8 @@ def test_a_script_without_a_guard_is_not_run_again_by_its_helpers(root: Path, tm
     """Python asks for `if __name__ == "__main__"` where processes are spawned; whoever calls this program need not."""
     script = tmp_path / "script.py"
     script.write_text(UNGUARDED, encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(root)}
-    command = [sys.executable, str(script), str(tmp_path / "results")]
-    done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.stdout.split() == ["once", "2"], done.stderr
+    done = python(script, tmp_path / "results", cwd=tmp_path, PYTHONPATH=str(root))
+    assert done.stdout.split() == ["once", "2"]
 
 
 BROKEN = """

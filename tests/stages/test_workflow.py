@@ -1,7 +1,5 @@
 """The command at work on a copy of the project with small engines: what runs, when, and how often."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -133,17 +131,7 @@ def test_a_full_disk_ends_with_4_and_leaves_nothing(project: Project):
         "import resource, sys; from flexclear.commands.__main__ import main;"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY)); sys.exit(main(['run', 'tiny/ideal']))"
     )
-    import subprocess
-    import sys
-
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=project.folder,
-        env=project.environment(CALLS=os.devnull),
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = project.python("-c", code, CALLS=os.devnull)
     assert done.returncode == 4, done.stderr
     assert "the disk is full" in done.stderr
     assert "Traceback" not in done.stderr
@@ -176,8 +164,6 @@ def test_the_ensemble_is_a_stage_of_its_own(project: Project, add_scene: Callabl
 
 
 def test_an_edited_scene_does_not_take_the_place_of_its_file(project: Project):
-    import subprocess
-    import sys
 
     project.run("run", "tiny/contact", "--to", "simulate")
     shown = project.results / "runs" / "tiny" / "contact" / "run.nc"
@@ -188,10 +174,7 @@ def test_an_edited_scene_does_not_take_the_place_of_its_file(project: Project):
         "run = fc.run(scene)\n"
         "print(float(run.time[1]), run.attrs['title'])"
     )
-    command = [sys.executable, "-c", code]
-    done = subprocess.run(
-        command, cwd=project.folder, env=project.environment(), capture_output=True, text=True, check=True
-    )
+    done = project.python("-c", code)
     assert done.stdout == "0.001 Ball in a socket, with clearance\n"
     assert shown.read_bytes() == before
     assert "fresh" in project.run("why", "tiny/contact", "--to", "simulate").stdout

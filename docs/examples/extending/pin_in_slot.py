@@ -20,16 +20,12 @@ def motion(w, x, u, S):
 
 position_rate = rates_are_speeds(2)
 
+POSITIONS, SPEEDS = "tr", "tr"  #: r: rotation [rad or -], t: translation [m]
+TRANSLATIONS: tuple[int, ...] = (1, 2)
+ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
+COORDINATES = (Coordinate("translation", False, axis=0), ROTATION)
 
-class PinInSlot:
-    """The displacement along the slot and the rotation of the pin are free."""
 
-    POSITIONS, SPEEDS = "tr", "tr"  #: r: rotation [rad or -], t: translation [m]
-    TRANSLATIONS: tuple[int, ...] = (1, 2)
-    ROTATIONS: tuple[tuple[int, int], ...] = ((2, 0), (2, 1))
-    COORDINATES = (Coordinate("translation", False, axis=0), ROTATION)
-
-    @staticmethod
-    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Displacement along x [m], angle about z [rad] in (-pi, pi], shape (2,)."""
-        return np.array([p[0], angle_about_z(R)])
+def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Displacement along x [m], angle about z [rad] in (-pi, pi], shape (2,)."""
+    return np.array([p[0], angle_about_z(R)])

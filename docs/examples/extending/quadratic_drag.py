@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.loads import QuadraticDrag as Declared
+from flexclear.pipeline.core.scene.loads import QuadraticDrag
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, number
 from flexclear.pipeline.dynamics.loads.row import Row
@@ -25,12 +25,6 @@ def apply(d, k):
     act(d, k, moment, force, 0.0, 0.0, 0.0, 0.0, -dot(force, v))
 
 
-class QuadraticDrag:
-    """See the module's text."""
-
-    apply = staticmethod(apply)
-
-    @staticmethod
-    def row(load: Declared, place: str) -> Row:
-        """One number: c [kg/m]."""
-        return Row(frames=(load.frame,), numbers=(load.coefficient,))
+def row(load: QuadraticDrag, place: str) -> Row:
+    """One number: c [kg/m]."""
+    return Row(frames=(load.frame,), numbers=(load.coefficient,))

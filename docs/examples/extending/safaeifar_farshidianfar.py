@@ -9,10 +9,4 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
-
-def factor(c_r: float) -> float:
-    """Factor a of the damping for the coefficient of restitution c_r asked for."""
-    return 1.25 * (1.0 - c_r) / c_r
-
-
-LAW = Hysteresis("safaeifar-farshidianfar", factor, valid=(0.6, 1.0))
+LAW = Hysteresis("safaeifar-farshidianfar", lambda c_r: 1.25 * (1.0 - c_r) / c_r, valid=(0.6, 1.0))

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.scene import clearance
-from flexclear.pipeline.dynamics.contact.friction.memoryless import sliding
+from flexclear.pipeline.dynamics.contact.friction.law import Friction, sliding
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
@@ -21,31 +20,4 @@ def coefficient(speed, p):
     return p[0] * np.tanh(speed / p[1])
 
 
-traction = sliding(coefficient)
-
-
-class SmoothCoulomb:
-    """See the module's text."""
-
-    coefficient = staticmethod(coefficient)
-    traction = staticmethod(traction)
-
-    @staticmethod
-    def parameters(law: clearance.SmoothCoulomb) -> tuple[float, ...]:
-        """mu_d [-], v_s [m/s], and four unused numbers."""
-        return (law.dynamic, law.v_smooth, 0.0, 0.0, 0.0, 0.0)
-
-    @staticmethod
-    def stick_speed(law: clearance.SmoothCoulomb) -> float:
-        """The law has no regime of sticking."""
-        return 0.0
-
-    @staticmethod
-    def kinks(law: clearance.SmoothCoulomb) -> tuple[float, float]:
-        """The law is smooth."""
-        return (0.0, 0.0)
-
-    @staticmethod
-    def bristle(law: clearance.SmoothCoulomb) -> float | None:
-        """No memory."""
-        return None
+LAW = Friction(sliding(coefficient), constants=lambda law: (law.dynamic, law.v_smooth))

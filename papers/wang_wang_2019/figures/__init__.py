@@ -18,26 +18,26 @@ if TYPE_CHECKING:
 
 KIND = "figure or table"
 NAMES = {
-    "fig01": "fig01:FIGURE",
-    "fig03": "mode_shapes:FIG03",
-    "fig04": "mode_shapes:FIG04",
-    "fig05": "fig05:FIGURE",
-    "fig06": "fig06:FIGURE",
-    "fig08": "ideal:FIG08",
-    "fig09": "ideal:FIG09",
-    "fig10": "fig10:FIGURE",
+    "fig01": "structure:FIG01",
+    "fig03": "structure:FIG03",
+    "fig04": "structure:FIG04",
+    "fig05": "joint:FIG05",
+    "fig06": "joint:FIG06",
+    "fig08": "panels:FIG08",
+    "fig09": "panels:FIG09",
+    "fig10": "structure:FIG10",
     "fig11": "panels:FIG11",
     "fig12": "panels:FIG12",
     "fig13": "panels:FIG13",
     "fig14": "phase:FIG14",
     "fig15": "phase:FIG15",
     "fig16": "phase:FIG16",
-    "fig17": "fig17:FIGURE",
+    "fig17": "joint:FIG17",
     "table01": "given:TABLE01",
     "table02": "given:TABLE02",
     "table03": "given:TABLE03",
-    "table04": "frequencies:TABLE04",
-    "table05": "frequencies:TABLE05",
+    "table04": "given:TABLE04",
+    "table05": "given:TABLE05",
     "table06": "given:TABLE06",
     "table07": "errors:TABLE07",
     "table08": "errors:TABLE08",
@@ -64,8 +64,7 @@ class Figure:
 
 def figure(name: str) -> Figure:
     """The figure or table of a name, its module imported now, and with it the plotting libraries."""
-    described: Figure = lookup(__name__, name, where="figures")
-    return described
+    return lookup(__name__, name, where="figures")
 
 
 def draw(params: Mapping[str, Any], inputs: Mapping[str, xr.Dataset], progress: Progress) -> dict[str, Any]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
+from flexclear.papers.wang_wang_2019 import models as paper
 from flexclear.papers.wang_wang_2019.deviations import (
     Deviation,
     ensemble_deviations,
@@ -15,26 +15,6 @@ from flexclear.papers.wang_wang_2019.deviations import (
     velocity_at_events,
 )
 from flexclear.papers.wang_wang_2019.figures import Data, Figure
-from flexclear.papers.wang_wang_2019.models import (
-    CSJ,
-    FAR,
-    FAR_CB,
-    FAR_CSJ,
-    FAR_CSJ_CB,
-    FAR_CSJ_FIXED,
-    FAR_CSJ_FREE,
-    FAR_FIXED,
-    FAR_FREE,
-    FIRST,
-    FIRST_CSJ,
-    FIRST_IDEAL,
-    IDEAL,
-    JOINT,
-    PLATFORM,
-    Model,
-    believed_until,
-    references,
-)
 from flexclear.papers.wang_wang_2019.published import TABLE7, TABLE8, TABLE9, MaximumError
 from flexclear.pipeline.post.plotting.table import Table
 from flexclear.pipeline.post.single_run.series import parameters
@@ -55,17 +35,13 @@ NOISE = 1e-10
 VELOCITY = 1.5
 
 
-@dataclass(frozen=True, slots=True)
-class Column:
-    """One column: its head, and one value or (mean, standard deviation) per row; None where there is none."""
-
-    head: str
-    cells: tuple[str, ...]
+#: one column: its head, and one value or mean and deviation per row
+Column = tuple[str, ...]
 
 
-def paper(head: str, values: MaximumError) -> Column:
+def paper_column(head: str, values: MaximumError) -> Column:
     """The paper's column."""
-    return Column(head, tuple(ABSENT if name is None else number(getattr(values, name)) for *_, name in ROWS))
+    return head, *(ABSENT if name is None else number(getattr(values, name)) for *_, name in ROWS)
 
 
 def single(head: str, deviation: Deviation, tighter: Deviation) -> Column:
@@ -74,7 +50,7 @@ def single(head: str, deviation: Deviation, tighter: Deviation) -> Column:
     for _, name, factor, _ in ROWS:
         value, other = factor * getattr(deviation, name), factor * getattr(tighter, name)
         cells.append(f"{number(value)} ± {max(abs(value - other), NOISE):.0e}")
-    return Column(head, tuple(cells))
+    return head, *cells
 
 
 def several(head: str, deviations: Sequence[Deviation]) -> Column:
@@ -83,18 +59,20 @@ def several(head: str, deviations: Sequence[Deviation]) -> Column:
     for _, name, factor, _ in ROWS:
         values = factor * np.array([getattr(deviation, name) for deviation in deviations])
         cells.append(f"{number(values.mean())} ± {values.std(ddof=1):.1e}")
-    return Column(head, tuple(cells))
+    return head, *cells
 
 
 def _table(title: str, columns: Sequence[Column], notes: Sequence[str]) -> Table:
-    rows = tuple((head, *(column.cells[i] for column in columns)) for i, (head, *_) in enumerate(ROWS))
-    return Table(title, ("largest error", *(column.head for column in columns)), rows, (*notes, MEANING))
+    heads, *rows = zip(("largest error", *(head for head, *_ in ROWS)), *columns, strict=True)
+    return Table(title, heads, tuple(rows), (*notes, MEANING))
 
 
-def _both(data: Data, model: Model, ideal: Model = IDEAL, until: float = np.inf) -> tuple[Deviation, Deviation]:
+def _both(
+    data: Data, model: paper.Model, ideal: paper.Model = paper.IDEAL, until: float = np.inf
+) -> tuple[Deviation, Deviation]:
     """Largest deviations from an ideal mechanism, at the scene's tolerance and at a tighter one."""
     wide, tight = (
-        max_deviation(data[f"{model.scene}:{run}"], data[f"{ideal.scene}:{run}"], PLATFORM, until)
+        max_deviation(data[f"{model.scene}:{run}"], data[f"{ideal.scene}:{run}"], paper.PLATFORM, until)
         for run in ("run", "tight")
     )
     return wide, tight
@@ -133,11 +111,13 @@ def number(value: float) -> str:
 
 
 def _of_rods(data: Data) -> Table:
-    (free, free_t), (fixed, fixed_t), (both, both_t) = (_both(data, model) for model in (FAR_FREE, FAR_FIXED, FAR_CB))
+    (free, free_t), (fixed, fixed_t), (both, both_t) = (
+        _both(data, model) for model in (paper.FAR_FREE, paper.FAR_FIXED, paper.FAR_CB)
+    )
     columns = (
-        paper("paper, free-free", TABLE7["free-free"]),
+        paper_column("paper, free-free", TABLE7["free-free"]),
         single("ours, free-free", free, free_t),
-        paper("paper, fixed-fixed", TABLE7["fixed-fixed"]),
+        paper_column("paper, fixed-fixed", TABLE7["fixed-fixed"]),
         single("ours, fixed-fixed", fixed, fixed_t),
         single("ours, Craig-Bampton (added)", both, both_t),
     )
@@ -178,24 +158,24 @@ def _contradiction(ours: Deviation) -> str:
 
 
 def _of_clearance(data: Data) -> Table:
-    post = data[f"{CSJ.scene}:post"]
+    post = data[f"{paper.CSJ.scene}:post"]
     (ours, tighter), (first, first_tighter) = (
-        _both(data, model, ideal, believed_until(data[f"{model.scene}:post"]))
-        for model, ideal in ((CSJ, IDEAL), (FIRST_CSJ, FIRST_IDEAL))
+        _both(data, model, ideal, paper.believed_until(data[f"{model.scene}:post"]))
+        for model, ideal in ((paper.CSJ, paper.IDEAL), (paper.FIRST_CSJ, paper.FIRST_IDEAL))
     )
     columns = (
-        paper("paper", TABLE8),
+        paper_column("paper", TABLE8),
         single("ours", ours, tighter),
         single("ours, first layout", first, first_tighter),
     )
-    clearance = 1e3 * float(post.clearance.sel(contact=JOINT))
-    count, peak = int(post.impact_count.sel(contact=JOINT)), float(post.peak_force.sel(contact=JOINT))
+    clearance = 1e3 * float(post.clearance.sel(contact=paper.JOINT))
+    count, peak = int(post.impact_count.sel(contact=paper.JOINT)), float(post.peak_force.sel(contact=paper.JOINT))
     notes = (
         comparison("CSJ model", ours, TABLE8),
         f"The run has {count} impacts{_unfinished(post)}; the largest contact force is {peak:.0f} N, the "
         "platform's largest "
-        f"vertical acceleration {float(post.peak_acceleration.sel(body=PLATFORM, axis='z')):.0f} m/s².",
-        _restitution(data[f"{CSJ.scene}:run"], post),
+        f"vertical acceleration {float(post.peak_acceleration.sel(body=paper.PLATFORM, axis='z')):.0f} m/s².",
+        _restitution(data[f"{paper.CSJ.scene}:run"], post),
         "Angle and displacement are fitted, not predicted: once the ball rests against the socket, leg 1 is "
         f"effectively {clearance:g} mm longer or shorter, and these errors are that length times the platform's "
         "sensitivity to it. The paper prints no joint coordinates; those here are of a layout that has the "
@@ -221,10 +201,10 @@ def _velocity(ours: Deviation, first: Deviation) -> str:
 
 def _between_outputs(data: Data) -> str:
     """How far the velocity is off at the events between the outputs that the rows compare."""
-    run, ideal = data[f"{CSJ.scene}:run"], data[f"{IDEAL.scene}:run"]
-    until = believed_until(data[f"{CSJ.scene}:post"])
+    run, ideal = data[f"{paper.CSJ.scene}:run"], data[f"{paper.IDEAL.scene}:run"]
+    until = paper.believed_until(data[f"{paper.CSJ.scene}:post"])
     interval = 1e3 * float(np.median(np.diff(ideal.time.values)))
-    speed, time = velocity_at_events(run, ideal, PLATFORM, until)
+    speed, time = velocity_at_events(run, ideal, paper.PLATFORM, until)
     return (
         f"The rows compare outputs, {interval:.2g} ms apart, as the ensembles of Table 9 have them. At all recorded "
         f"times, first touches of the ball among them, the velocity is off by up to {1e3 * speed:.1f} mm/s (at "
@@ -239,8 +219,8 @@ def _unfinished(post: xr.Dataset) -> str:
 
 def _restitution(run: xr.Dataset, post: xr.Dataset) -> str:
     """What is asked for, what the law gives a free impact, and what the impacts of the run show."""
-    asked = parameters(run)["joint"][JOINT]["normal"]["restitution"]
-    delivered = float(run.contact_delivered_restitution.sel(contact=JOINT))
+    asked = parameters(run)["joint"][paper.JOINT]["normal"]["restitution"]
+    delivered = float(run.contact_delivered_restitution.sel(contact=paper.JOINT))
     shown = (post.impact_separation_speed / post.impact_approach_speed).values
     shown = shown[np.isfinite(shown)]
     return (
@@ -255,9 +235,9 @@ def _restitution(run: xr.Dataset, post: xr.Dataset) -> str:
 def _of_all(data: Data) -> Table:
     """Within the horizon one run, over the whole stroke the ensemble."""
     columns: list[Column] = []
-    for model, name in ((FAR_CSJ_FREE, "free-free"), (FAR_CSJ_FIXED, "fixed-fixed")):
-        columns += [paper(f"paper, {name}", TABLE9[name]), *_ours(name, model, data)]
-    columns += _ours("Craig-Bampton (added)", FAR_CSJ_CB, data)
+    for model, name in ((paper.FAR_CSJ_FREE, "free-free"), (paper.FAR_CSJ_FIXED, "fixed-fixed")):
+        columns += [paper_column(f"paper, {name}", TABLE9[name]), *_ours(name, model, data)]
+    columns += _ours("Craig-Bampton (added)", paper.FAR_CSJ_CB, data)
     notes = (
         "A single run means something point by point only up to its horizon (the time in the column's head): "
         "there the members of an ensemble, "
@@ -265,31 +245,32 @@ def _of_all(data: Data) -> Table:
         "stroke the table gives mean ± "
         "standard deviation, over the members, of each member's largest error.",
         _against_paper(data),
-        f"Largest contact forces: {_largest(data, 'peak_force', {'contact': JOINT}, 'N')}. What softens an impact is "
-        "how far the mode set lets the rod be compressed between its joints; the three sets differ in just that.",
+        f"Largest contact forces: {_largest(data, 'peak_force', {'contact': paper.JOINT}, 'N')}. What softens an "
+        "impact is how far the mode set lets the rod be compressed between its joints; the three sets differ in just "
+        "that.",
         f"Largest vertical accelerations of the platform: "
-        f"{_largest(data, 'peak_acceleration', {'body': PLATFORM, 'axis': 'z'}, 'm/s²')}. They lie inside impacts, "
-        "where the motion is recorded at the largest force and penetration of each contact besides the regular "
-        "outputs.",
+        f"{_largest(data, 'peak_acceleration', {'body': paper.PLATFORM, 'axis': 'z'}, 'm/s²')}. They lie inside "
+        "impacts, where the motion is recorded at the largest force and penetration of each contact besides the "
+        "regular outputs.",
     )
     return _table("Table 9: largest errors, ideal model and FAR-CSJ model", columns, notes)
 
 
-def _ours(name: str, model: Model, data: Data) -> list[Column]:
-    horizon = believed_until(data[f"{model.scene}:post"])
-    inside, tighter = _both(data, model, IDEAL, horizon)
+def _ours(name: str, model: paper.Model, data: Data) -> list[Column]:
+    horizon = paper.believed_until(data[f"{model.scene}:post"])
+    inside, tighter = _both(data, model, paper.IDEAL, horizon)
     head = f"ours, {name}, to {1e3 * inside.until:.1f} ms"
     return [single(head, inside, tighter), several(f"ours, {name}, whole stroke", _members(model, data))]
 
 
-def _members(model: Model, data: Data) -> list[Deviation]:
-    return ensemble_deviations(data[f"{model.scene}:ensemble"], data[f"{IDEAL.scene}:run"], PLATFORM)
+def _members(model: paper.Model, data: Data) -> list[Deviation]:
+    return ensemble_deviations(data[f"{model.scene}:ensemble"], data[f"{paper.IDEAL.scene}:run"], paper.PLATFORM)
 
 
 def _against_paper(data: Data) -> str:
     """In how many standard deviations the paper's single values lie from the ensembles' means."""
     texts = []
-    for model, name in ((FAR_CSJ_FREE, "free-free"), (FAR_CSJ_FIXED, "fixed-fixed")):
+    for model, name in ((paper.FAR_CSJ_FREE, "free-free"), (paper.FAR_CSJ_FIXED, "fixed-fixed")):
         velocity = 1e3 * np.array([member.velocity for member in _members(model, data)])
         texts.append(f"{name} {velocity.mean() / TABLE9[name].velocity:.2f}")
     return (
@@ -302,30 +283,33 @@ def _against_paper(data: Data) -> str:
 
 def _largest(data: Data, what: str, which: dict[str, str], unit: str) -> str:
     """The largest values of the rigid CSJ run and of the ensembles."""
-    rigid = float(data[f"{CSJ.scene}:post"][what].sel(which))
+    rigid = float(data[f"{paper.CSJ.scene}:post"][what].sel(which))
     texts = [f"CSJ {rigid:.0f} {unit}"]
-    for model in FAR_CSJ:
+    for model in paper.FAR_CSJ:
         peak = data[f"{model.scene}:ensemble"][what].sel(which).values
-        texts.append(f"{model.label.removeprefix('FAR-CSJ, ')} {peak.mean():.0f} ± {peak.std(ddof=1):.0f} {unit}")
+        texts.append(f"{model.label.removeprefix('FAR-paper.CSJ, ')} {peak.mean():.0f} ± {peak.std(ddof=1):.0f} {unit}")
     return "; ".join(texts)
 
 
 TABLE07 = Figure(
     "Table 7: largest errors of the FAR model against the ideal model",
-    references((IDEAL, *FAR), "run", "tight"),
+    paper.references((paper.IDEAL, *paper.FAR), "run", "tight"),
     _of_rods,
 )
 TABLE08 = Figure(
     "Table 8: largest errors of the CSJ model against the ideal model",
-    (*references((IDEAL, CSJ, *FIRST), "run", "tight"), *references((CSJ, FIRST_CSJ), "post")),
+    (
+        *paper.references((paper.IDEAL, paper.CSJ, *paper.FIRST), "run", "tight"),
+        *paper.references((paper.CSJ, paper.FIRST_CSJ), "post"),
+    ),
     _of_clearance,
 )
 TABLE09 = Figure(
     "Table 9: largest errors of the FAR-CSJ model against the ideal model",
     (
-        *references((IDEAL, *FAR_CSJ), "run", "tight"),
-        *references((CSJ, *FAR_CSJ), "post"),
-        *references(FAR_CSJ, "ensemble"),
+        *paper.references((paper.IDEAL, *paper.FAR_CSJ), "run", "tight"),
+        *paper.references((paper.CSJ, *paper.FAR_CSJ), "post"),
+        *paper.references(paper.FAR_CSJ, "ensemble"),
     ),
     _of_all,
 )

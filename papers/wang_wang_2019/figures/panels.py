@@ -1,4 +1,4 @@
-"""Figures 11-13: six panels with angle, z, vz, az, reaction at A1 and deviation of the ball's centre."""
+"""Figures 8, 9 and 11-13: the ideal motion; panels with angle, z, vz, az, reaction at A1 and the ball's deviation."""
 
 from __future__ import annotations
 
@@ -11,24 +11,8 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Drawing
 
+from flexclear.papers.wang_wang_2019 import models as paper
 from flexclear.papers.wang_wang_2019.figures import Data, Figure
-from flexclear.papers.wang_wang_2019.models import (
-    CSJ,
-    FAR,
-    FAR_CB,
-    FAR_CSJ,
-    FAR_FIXED,
-    FAR_FREE,
-    IDEAL,
-    JOINT,
-    PLATFORM,
-    Model,
-    Motion,
-    references,
-)
-from flexclear.papers.wang_wang_2019.models import (
-    motion as motion_of,
-)
 from flexclear.pipeline.core.artifacts.quantities import common_times
 from flexclear.pipeline.post.plotting import style
 
@@ -49,7 +33,7 @@ class Quantity:
 
     title: str
     unit: str
-    values: Callable[[Motion], np.ndarray]
+    values: Callable[[paper.Motion], np.ndarray]
     jumps: bool
     ensemble: tuple[str, float] | None = None  #: variable of the post artifact, factor to the unit
 
@@ -64,20 +48,20 @@ REACTION = Quantity("reaction force at A1", "N", lambda m: m.reaction, True, ens
 QUANTITIES = (ANGLE, DISPLACEMENT, VELOCITY, ACCELERATION, REACTION)
 LETTERS = "abcdef"
 #: title and text below it, out of the ideal motion, the others and their post artifacts
-Heading = Callable[[Motion, Sequence[Motion], Sequence[xr.Dataset]], tuple[str, str]]
+Heading = Callable[[paper.Motion, Sequence[paper.Motion], Sequence[xr.Dataset]], tuple[str, str]]
 
 
-def _six_panels(heading: Heading, data: Data, models: Sequence[Model], columns: int, ensembles: bool) -> Drawing:
+def _six_panels(heading: Heading, data: Data, models: Sequence[paper.Model], columns: int, ensembles: bool) -> Drawing:
     """The paper's six panels, each with a slim one below.
 
     models: those compared with the ideal one, drawn in this order.  ensembles: draw the quantiles of theirs as bands.
     Where they have impacts, the slim panels of acceleration and reaction zoom to the ideal model's range; all others
     show the difference from the ideal model.  columns: of the legend.
     """
-    reference, others = motion_of(IDEAL, data), [motion_of(model, data) for model in models]
+    reference, others = paper.motion(paper.IDEAL, data), [paper.motion(model, data) for model in models]
     posts = [data[f"{model.scene}:post"] for model in models]
     bands, loose = posts if ensembles else [], "contact" in posts[0].sizes
-    clearance = 1e3 * float(posts[0].clearance.sel(contact=JOINT)) if loose else 0.0
+    clearance = 1e3 * float(posts[0].clearance.sel(contact=paper.JOINT)) if loose else 0.0
     figure, axes = style.grid(6, 2, (11.0, 12.2), height_ratios=[3, 1.15] * 3, sharex=False)
     for k, quantity in enumerate(QUANTITIES):
         main, strip = axes[2 * (k // 2), k % 2], axes[2 * (k // 2) + 1, k % 2]
@@ -102,7 +86,11 @@ def _six_panels(heading: Heading, data: Data, models: Sequence[Model], columns: 
 
 
 def over_time(
-    axes: Axes, quantity: Quantity, reference: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset] = ()
+    axes: Axes,
+    quantity: Quantity,
+    reference: paper.Motion,
+    others: Sequence[paper.Motion],
+    posts: Sequence[xr.Dataset] = (),
 ) -> None:
     """One quantity of all models over time; pale beyond the horizon, with the ensembles' bands."""
     for motion, post in zip(others, posts, strict=bool(posts)):
@@ -118,20 +106,22 @@ def over_time(
         label=reference.model.label,
         zorder=2.4,
     )
-    axes.set_ylabel(quantity.unit)
-    axes.set_xlim(reference.time[0], reference.time[-1])
+    axes.set(ylabel=quantity.unit, xlim=(reference.time[0], reference.time[-1]))
 
 
-def zoomed(axes: Axes, quantity: Quantity, reference: Motion, others: Sequence[Motion]) -> None:
+def zoomed(axes: Axes, quantity: Quantity, reference: paper.Motion, others: Sequence[paper.Motion]) -> None:
     """The slim panel with the same curves in the ideal model's range."""
     over_time(axes, quantity, reference, others)
     axes.set_ylim(*_range(quantity.values(reference)))
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel(f"zoom\n{quantity.unit}")
+    axes.set(xlabel="time (s)", ylabel=f"zoom\n{quantity.unit}")
 
 
 def difference(
-    axes: Axes, quantity: Quantity, reference: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset] = ()
+    axes: Axes,
+    quantity: Quantity,
+    reference: paper.Motion,
+    others: Sequence[paper.Motion],
+    posts: Sequence[xr.Dataset] = (),
 ) -> None:
     """The slim panel with what differs from the ideal model."""
     axes.margins(y=0.12)
@@ -141,9 +131,7 @@ def difference(
     for motion in others:
         time, values = differences[motion.model.scene]
         _curve(axes, motion, values, 0.9, time)
-    axes.set_xlim(reference.time[0], reference.time[-1])
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel(f"minus ideal\n{quantity.unit}")
+    axes.set(xlim=(reference.time[0], reference.time[-1]), xlabel="time (s)", ylabel=f"minus ideal\n{quantity.unit}")
     _scale(axes, [float(np.abs(values).max()) for _, values in differences.values()])
 
 
@@ -157,20 +145,19 @@ def _scale(axes: Axes, sizes: Sequence[float]) -> None:
     linear = 10.0 ** np.floor(np.log10(smallest))
     axes.set_yscale("symlog", linthresh=linear, linscale=0.6)
     top = 10.0 ** np.ceil(np.log10(largest))
-    axes.set_ylim(-top, top)
-    axes.set_yticks([-top, 0.0, top])
+    axes.set(ylim=(-top, top), yticks=[-top, 0.0, top])
     axes.minorticks_off()
     text = f"linear within ±{linear:g}, logarithmic beyond"
     axes.text(0.995, 0.03, text, transform=axes.transAxes, ha="right", va="bottom", fontsize=6.8, color=style.INK)
 
 
-def deviation(quantity: Quantity, motion: Motion, reference: Motion) -> tuple[np.ndarray, np.ndarray]:
+def deviation(quantity: Quantity, motion: paper.Motion, reference: paper.Motion) -> tuple[np.ndarray, np.ndarray]:
     """Common times and the quantity minus the reference's there."""
     i, j = common_times(motion.time, reference.time)
     return motion.time[i], quantity.values(motion)[i] - quantity.values(reference)[j]
 
 
-def ball_deviation(axes: Axes, reference: Motion, others: Sequence[Motion], clearance: float = 0.0) -> None:
+def ball_deviation(axes: Axes, reference: paper.Motion, others: Sequence[paper.Motion], clearance: float = 0.0) -> None:
     """Where the ball's centre is relative to its position in the ideal model, x-z plane of the world, equal scales.
 
     The path itself is 60 mm long: nothing is seen on it.
@@ -189,13 +176,12 @@ def ball_deviation(axes: Axes, reference: Motion, others: Sequence[Motion], clea
         axes.plot(x, z, color=motion.model.color, lw=0.6, alpha=PALE)
         axes.plot(x[inside], z[inside], color=motion.model.color, lw=1.1, alpha=FIRM)
     axes.plot(0.0, 0.0, "+", color=reference.model.color, ms=8, mew=1.4, zorder=4)
-    axes.set_xlabel(f"x minus ideal ({unit})")
-    axes.set_ylabel(f"z minus ideal ({unit})")
+    axes.set(xlabel=f"x minus ideal ({unit})", ylabel=f"z minus ideal ({unit})")
     axes.locator_params(nbins=6)
     axes.set_aspect("equal", adjustable="datalim")
 
 
-def ball_distance(axes: Axes, reference: Motion, others: Sequence[Motion]) -> None:
+def ball_distance(axes: Axes, reference: paper.Motion, others: Sequence[paper.Motion]) -> None:
     """Distance of the ball's centre from where the ideal model has it, over time."""
     paths = [_ball_apart(motion, reference) for motion in others]
     factor, unit = _short(0.0, paths)
@@ -203,11 +189,10 @@ def ball_distance(axes: Axes, reference: Motion, others: Sequence[Motion]) -> No
         _curve(axes, motion, factor * np.linalg.norm(deviation_of_ball, axis=1), 0.9, time)
     axes.set_xlim(reference.time[0], reference.time[-1])
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel("time (s)")
-    axes.set_ylabel(f"from ideal\n{unit}")
+    axes.set(xlabel="time (s)", ylabel=f"from ideal\n{unit}")
 
 
-def _ball_apart(motion: Motion, reference: Motion) -> tuple[np.ndarray, np.ndarray]:
+def _ball_apart(motion: paper.Motion, reference: paper.Motion) -> tuple[np.ndarray, np.ndarray]:
     """Common times, and where the ball's centre is minus where the reference has it [mm], (t, 3)."""
     i, j = common_times(motion.time, reference.time)
     return motion.time[i], motion.ball[i] - reference.ball[j]
@@ -219,7 +204,7 @@ def _short(least: float, paths: Iterable[tuple[np.ndarray, np.ndarray]]) -> tupl
     return (1e3, "µm") if largest < 0.1 else (1.0, "mm")
 
 
-def _curve(axes: Axes, motion: Motion, values: np.ndarray, width: float, time: np.ndarray | None = None) -> None:
+def _curve(axes: Axes, motion: paper.Motion, values: np.ndarray, width: float, time: np.ndarray | None = None) -> None:
     """Firm inside the horizon, pale beyond it; what the paper does not have lies below what it has."""
     time = motion.time if time is None else time
     inside = time <= motion.horizon
@@ -232,7 +217,7 @@ def _curve(axes: Axes, motion: Motion, values: np.ndarray, width: float, time: n
     axes.plot(time[inside], values[inside], alpha=FIRM, label=motion.model.label, **look)
 
 
-def _envelope(axes: Axes, motion: Motion, values: np.ndarray, time: np.ndarray) -> None:
+def _envelope(axes: Axes, motion: paper.Motion, values: np.ndarray, time: np.ndarray) -> None:
     """The band that a curve fills, from stretch to stretch, paler beyond the horizon."""
     edges = np.linspace(time[0], time[-1], STRETCHES + 1)
     first = np.searchsorted(time, edges[:-1])
@@ -246,13 +231,15 @@ def _envelope(axes: Axes, motion: Motion, values: np.ndarray, time: np.ndarray) 
     axes.plot([], [], color=motion.model.color, lw=1.6, label=motion.model.label)
 
 
-def _peaks(axes: Axes, motion: Motion) -> None:
+def _peaks(axes: Axes, motion: paper.Motion) -> None:
     """Largest force of each impact inside the horizon; the outputs in between may miss it."""
     inside = motion.impacts[:, 0] <= motion.horizon
     axes.plot(*motion.impacts[inside].T, "o", ms=2.2, color=motion.model.color)
 
 
-def _band(axes: Axes, quantity: Quantity, motion: Motion, post: xr.Dataset, reference: Motion | None = None) -> None:
+def _band(
+    axes: Axes, quantity: Quantity, motion: paper.Motion, post: xr.Dataset, reference: paper.Motion | None = None
+) -> None:
     """Middle nine tenths of the ensemble and its median, beyond the horizon only; less the reference where given.
 
     Quantiles, as forces are not negative and most of their values are zero: a mean minus a deviation would be.
@@ -273,7 +260,7 @@ def _band(axes: Axes, quantity: Quantity, motion: Motion, post: xr.Dataset, refe
 
 def _column(variable: xr.DataArray) -> np.ndarray:
     if "ensemble_body" in variable.dims:
-        variable = variable.sel(ensemble_body=PLATFORM)
+        variable = variable.sel(ensemble_body=paper.PLATFORM)
     if "axis" in variable.dims:
         variable = variable.sel(axis="z")
     return variable.values.reshape(variable.sizes["ensemble_time"], -1)[:, 0]
@@ -289,34 +276,34 @@ def _range(values: np.ndarray) -> tuple[float, float]:
     return (low - margin, high + margin) if low < 0.0 else (-0.05 * (high - low), high + margin)
 
 
-def _of_rods(ideal: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
+def _of_rods(ideal: paper.Motion, others: Sequence[paper.Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
     moved = {m.model.scene: 1e3 * np.abs(deviation(DISPLACEMENT, m, ideal)[1]).max() for m in others}
-    fixed = moved[FAR_FIXED.scene]
+    fixed = moved[paper.FAR_FIXED.scene]
     little = f"{fixed:.1g} µm" if fixed > 1e-6 else "nothing"  # next to rounding
     return (
-        f"Figure 11: a flexible rod moves the platform by {moved[FAR_CB.scene]:.2g} µm at most; free-free modes "
-        f"find {moved[FAR_FREE.scene]:.1g} µm of it, fixed-fixed modes {little}",
+        f"Figure 11: a flexible rod moves the platform by {moved[paper.FAR_CB.scene]:.2g} µm at most; free-free modes "
+        f"find {moved[paper.FAR_FREE.scene]:.1g} µm of it, fixed-fixed modes {little}",
         "slim panels (added): difference from the ideal model; the added mode set is drawn as the band that it fills",
     )
 
 
-def _of_clearance(ideal: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
+def _of_clearance(ideal: paper.Motion, others: Sequence[paper.Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
     (csj,), (post,) = others, posts
     return (
-        f"Figure 12: {int(post.impact_count.sel(contact=JOINT))} impacts raise the largest force at A1 from "
-        f"{ideal.reaction.max():.0f} to {float(post.peak_force.sel(contact=JOINT)):.0f} N, the acceleration from "
+        f"Figure 12: {int(post.impact_count.sel(contact=paper.JOINT))} impacts raise the largest force at A1 from "
+        f"{ideal.reaction.max():.0f} to {float(post.peak_force.sel(contact=paper.JOINT)):.0f} N, the acceleration from "
         f"{1e-3 * np.abs(ideal.acceleration).max():.0f} to {1e-3 * np.abs(csj.acceleration).max():.0f} m/s²",
         "slim panels (added): difference from the ideal model, or a zoom to its range; "
         "dots: largest normal force of each impact, as in the title",
     )
 
 
-def _of_both(ideal: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
+def _of_both(ideal: paper.Motion, others: Sequence[paper.Motion], posts: Sequence[xr.Dataset]) -> tuple[str, str]:
     rigid, *flexible = posts
-    peaks = [f"{float(rigid.peak_acceleration.sel(body=PLATFORM, axis='z')):.0f} (CSJ)"]
-    for model, post in zip(FAR_CSJ, flexible, strict=True):
-        mean = float(post.peak_acceleration_mean.sel(ensemble_body=PLATFORM, axis="z"))
-        peaks.append(f"{mean:.0f} ({model.label.removeprefix('FAR-CSJ, ').split(' ')[0]})")
+    peaks = [f"{float(rigid.peak_acceleration.sel(body=paper.PLATFORM, axis='z')):.0f} (CSJ)"]
+    for model, post in zip(paper.FAR_CSJ, flexible, strict=True):
+        mean = float(post.peak_acceleration_mean.sel(ensemble_body=paper.PLATFORM, axis="z"))
+        peaks.append(f"{mean:.0f} ({model.label.removeprefix('FAR-paper.CSJ, ').split(' ')[0]})")
     return (
         "Figure 13: the mode set decides how far a flexible rod softens the impacts",
         f"largest acceleration in m/s², of ensembles the mean: {', '.join(peaks)}. "
@@ -326,19 +313,85 @@ def _of_both(ideal: Motion, others: Sequence[Motion], posts: Sequence[xr.Dataset
     )
 
 
-def _figure(title: str, heading: Heading, models: Sequence[Model], *, columns: int, ensembles: bool = False) -> Figure:
-    needs = references((IDEAL, *models), "run", "post")
+def _tilt(data: Data) -> Drawing:
+    ideal = paper.motion(paper.IDEAL, data)
+    figure, axes = style.grid(1, 1, (6.4, 3.5))
+    axes[0, 0].plot(ideal.time, ideal.angle, color=paper.IDEAL.color, lw=1.8)
+    axes[0, 0].set(xlabel="time (s)", ylabel="angle about y0 (rad)", xlim=(ideal.time[0], ideal.time[-1]))
+    _mark_extreme(axes[0, 0], ideal.time, ideal.angle)
+    tilt = float(np.degrees(np.abs(ideal.angle).max()))
+    style.heading(
+        figure,
+        f"Figure 8: the platform tilts by {tilt:.2f}° and comes back",
+        "rotation about y0 = asin R_WP[0, 2], ideal model",
+    )
+    return figure
+
+
+def _mark_extreme(axes: style.Axes, time: np.ndarray, angle: np.ndarray) -> None:
+    """A dot and the value at the largest tilt."""
+    i = int(np.argmax(np.abs(angle)))
+    axes.plot(time[i], angle[i], "o", color=paper.IDEAL.color, ms=5)
+    text = f"{angle[i]:.4f} rad = {np.degrees(angle[i]):.2f}° at {time[i]:.3f} s".replace("-", "−")
+    below = angle[i] > 0.0
+    axes.annotate(
+        text,
+        (time[i], angle[i]),
+        xytext=(0, -110 if below else 110),
+        textcoords="offset points",
+        ha="center",
+        color=style.SOFT,
+    )
+
+
+def _response(data: Data) -> Drawing:
+    ideal = paper.motion(paper.IDEAL, data)
+    figure, axes = style.grid(2, 2, (9.4, 5.8))
+    shown = (DISPLACEMENT, VELOCITY, ACCELERATION, REACTION)
+    for letter, panel, quantity in zip("abcd", axes.flat, shown, strict=True):
+        panel.plot(ideal.time, quantity.values(ideal), color=paper.IDEAL.color, lw=1.6)
+        panel.set(xlabel="time (s)", ylabel=f"{quantity.title} ({quantity.unit})", xlim=(ideal.time[0], ideal.time[-1]))
+        panel.set_title(f"({letter}) {quantity.title}")
+    style.heading(
+        figure,
+        f"Figure 9: the ideal mechanism moves smoothly, up to "
+        f"{1e-3 * np.abs(ideal.acceleration).max():.1f} m/s² and {ideal.reaction.max():.0f} N",
+        "ideal model: centre of mass of the moving platform; reaction force at joint A1",
+    )
+    return figure
+
+
+def _figure(
+    title: str, heading: Heading, models: Sequence[paper.Model], *, columns: int, ensembles: bool = False
+) -> Figure:
+    needs = paper.references((paper.IDEAL, *models), "run", "post")
     return Figure(title, needs, lambda data: _six_panels(heading, data, models, columns, ensembles))
 
 
-FIG11 = _figure("Figure 11: flexible actuated rod (FAR) against the ideal model, six panels", _of_rods, FAR, columns=4)
+FIG11 = _figure(
+    "Figure 11: flexible actuated rod (FAR) against the ideal model, six panels", _of_rods, paper.FAR, columns=4
+)
 FIG12 = _figure(
-    "Figure 12: clearance spherical joint (CSJ) against the ideal model, six panels", _of_clearance, [CSJ], columns=2
+    "Figure 12: clearance spherical joint (CSJ) against the ideal model, six panels",
+    _of_clearance,
+    [paper.CSJ],
+    columns=2,
 )
 FIG13 = _figure(
     "Figure 13: flexible rod and clearance (FAR-CSJ), CSJ and ideal models, six panels",
     _of_both,
-    (CSJ, *FAR_CSJ),
+    (paper.CSJ, *paper.FAR_CSJ),
     columns=3,
     ensembles=True,
+)
+
+FIG08 = Figure(
+    "Figure 8: trajectory of the moving platform about the y0 axis, ideal model",
+    paper.references([paper.IDEAL], "run", "post"),
+    _tilt,
+)
+FIG09 = Figure(
+    "Figure 9: dynamic response of the ideal mechanism: z displacement, velocity, acceleration, reaction at A1",
+    paper.references([paper.IDEAL], "run", "post"),
+    _response,
 )

@@ -4,33 +4,15 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.papers.wang_wang_2019.figures import Data, Figure, measured
+from flexclear.papers.wang_wang_2019 import deviations
+from flexclear.papers.wang_wang_2019 import models as paper
+from flexclear.papers.wang_wang_2019.deviations import SEPARATION, SLIGHT, difference, mode_set
+from flexclear.papers.wang_wang_2019.figures import Data, Figure
 from flexclear.papers.wang_wang_2019.figures.errors import NOISE
-from flexclear.papers.wang_wang_2019.figures.measured import SEPARATION, SLIGHT, difference, mode_set
 from flexclear.papers.wang_wang_2019.figures.table10 import ratios
-from flexclear.papers.wang_wang_2019.models import (
-    CSJ,
-    FAR,
-    FAR_CB,
-    FAR_CSJ,
-    FAR_CSJ_CB,
-    FAR_CSJ_FIXED,
-    FAR_CSJ_FREE,
-    FAR_FIXED,
-    FAR_FREE,
-    FIRST,
-    FIRST_CSJ,
-    FIRST_IDEAL,
-    IDEAL,
-    JOINT,
-    PLATFORM,
-    Model,
-    references,
-)
 from flexclear.papers.wang_wang_2019.published import TABLE10
 from flexclear.pipeline.core.artifacts.paths import TREE
 from flexclear.pipeline.core.system.file_dependencies import note
@@ -48,17 +30,8 @@ HOLDS, NOT, PARTLY = "holds", "does not hold", "in part"
 Outcome = tuple[str, str]  #: verdict, and the numbers that say so
 
 
-@dataclass(frozen=True, slots=True)
-class Statement:
-    """A statement of the paper, where it is, and the test of it."""
-
-    place: str
-    text: str
-    test: Callable[[Data], Outcome]
-
-
 def _verdicts(data: Data) -> Table:
-    rows = tuple((s.place, s.text, *s.test(data)) for s in STATEMENTS)
+    rows = tuple((place, text, *test(data)) for place, text, test in STATEMENTS)
     notes = (
         f"Slight: below {100 * SLIGHT:g} % of the ideal model's largest value; no influence: below {100 * SMALL:g} %. "
         f"Of ensembles the mean over the members, which differ where they do by more than {100 * SLIGHT:g} % and "
@@ -78,20 +51,15 @@ def _verdict(*tests: bool) -> str:
 
 
 def _same_motion(data: Data) -> Outcome:
-    own, fractions = measured.sizes(data), []
-    for model in FAR:
-        moved = measured.moved(data, model)
-        fractions.append(
-            max(moved.angle / own.angle, moved.displacement / own.displacement, moved.velocity / own.velocity)
-        )
-    return _verdict(
-        *(s < SMALL for s in fractions)
-    ), f"angle, displacement and velocity change by {100 * max(fractions):.1g} % of their largest values at most"
+    own = deviations.sizes(data)
+    fractions = [max(deviations.moved(data, model).over(own)) for model in paper.FAR]
+    text = f"angle, displacement and velocity change by {100 * max(fractions):.1g} % of their largest values at most"
+    return _verdict(*(s < SMALL for s in fractions)), text
 
 
 def _same_acceleration(data: Data) -> Outcome:
-    largest = measured.acceleration(data, IDEAL)
-    fractions = {model: difference(data, model, measured.vertical).max() / largest for model in FAR}
+    largest = deviations.acceleration(data, paper.IDEAL)
+    fractions = {model: difference(data, model, deviations.vertical).max() / largest for model in paper.FAR}
     text = ", ".join(
         f"{100 * fraction:.2g} % ({mode_set(model)})" for model, fraction in fractions.items() if fraction > ROUNDING
     )
@@ -100,13 +68,16 @@ def _same_acceleration(data: Data) -> Outcome:
     ), f"it changes by {text or 'nothing'} of the largest"
 
 
-def _same_path(*models: Model) -> Callable[[Data], Outcome]:
+def _same_path(*models: paper.Model) -> Callable[[Data], Outcome]:
     """Whether the ball's centre stays next to the ideal model's; as a fraction of how far that moves."""
 
     def outcome(data: Data) -> Outcome:
-        ideal = measured.centre(data[f"{IDEAL.scene}:run"])
+        ideal = deviations.ball_centre(data[f"{paper.IDEAL.scene}:run"])
         stroke = float(np.linalg.norm(ideal - ideal[0], axis=1).max())
-        off = {model: float(np.linalg.norm(difference(data, model, measured.centre), axis=1).max()) for model in models}
+        off = {
+            model: float(np.linalg.norm(difference(data, model, deviations.ball_centre), axis=1).max())
+            for model in models
+        }
         words = ", ".join(f"{mode_set(model) or model.label} {_length(far)}" for model, far in off.items())
         return _verdict(*(far < SMALL * stroke for far in off.values())), (
             f"off by {words} at most, of a path that goes {1e3 * stroke:.0f} mm far"
@@ -117,7 +88,7 @@ def _same_path(*models: Model) -> Callable[[Data], Outcome]:
 
 def _other_path(data: Data) -> Outcome:
     """The contrary statement on the same numbers."""
-    verdict, numbers = _same_path(CSJ)(data)
+    verdict, numbers = _same_path(paper.CSJ)(data)
     return {HOLDS: NOT, NOT: HOLDS}[verdict], f"{numbers}: by the measure of the platform's displacement no influence"
 
 
@@ -126,14 +97,14 @@ def _length(far: float) -> str:
 
 
 def _slight_vibration(data: Data) -> Outcome:
-    ideal = measured.reaction(data, IDEAL)
-    reactions = {m: measured.reaction(data, m) for m in FAR}
+    ideal = deviations.reaction(data, paper.IDEAL)
+    reactions = {m: deviations.reaction(data, m) for m in paper.FAR}
     text = ", ".join(f"{mode_set(m)} {force:.0f} N" for m, force in reactions.items())
     return _verdict(*(force / ideal - 1.0 < SLIGHT for force in reactions.values())), f"ideal {ideal:.0f} N; {text}"
 
 
 def _consistent(data: Data) -> Outcome:
-    free, fixed, full = (measured.effects(data, model) for model in (FAR_FREE, FAR_FIXED, FAR_CB))
+    free, fixed, full = (deviations.effects(data, model) for model in (paper.FAR_FREE, paper.FAR_FIXED, paper.FAR_CB))
     fractions = {name: abs(free[name] - fixed[name]) / size for name, size in full.items() if size > 0.0}
     missed = max(free["velocity"], fixed["velocity"]) < SLIGHT * full["velocity"]
     text = ", ".join(f"{100 * fraction:.2g} % ({name})" for name, fraction in fractions.items())
@@ -144,65 +115,57 @@ def _consistent(data: Data) -> Outcome:
 
 
 def _free_suitable(data: Data) -> Outcome:
-    free, full = measured.moved(data, FAR_FREE).velocity, measured.moved(data, FAR_CB).velocity
+    free, full = deviations.moved(data, paper.FAR_FREE).velocity, deviations.moved(data, paper.FAR_CB).velocity
     return _verdict(abs(free / full - 1.0) < SLIGHT), (
         f"free-free modes find {1e3 * free:.2g} mm/s of the {1e3 * full:.2g} mm/s that a basis with all static "
         "compliance finds"
     )
 
 
-def _in_both_layouts(outcome: Callable[[Data, Model, Model], Outcome]) -> Callable[[Data], Outcome]:
+def _in_both_layouts(outcome: Callable[[Data, paper.Model, paper.Model], Outcome]) -> Callable[[Data], Outcome]:
     """The outcome in the scenes' layout, with the first one's numbers behind it."""
 
     def in_both(data: Data) -> Outcome:
-        (verdict, numbers), (_, first) = outcome(data, CSJ, IDEAL), outcome(data, FIRST_CSJ, FIRST_IDEAL)
+        (verdict, numbers), (_, first) = (
+            outcome(data, paper.CSJ, paper.IDEAL),
+            outcome(data, paper.FIRST_CSJ, paper.FIRST_IDEAL),
+        )
         return verdict, f"{numbers} ({first})"
 
     return in_both
 
 
-def _no_influence(data: Data, csj: Model, ideal: Model) -> Outcome:
-    own, moved = measured.sizes(data, ideal), measured.moved(data, csj, ideal)
-    fractions = moved.angle / own.angle, moved.displacement / own.displacement
-    return _verdict(
-        *(s < SMALL for s in fractions)
-    ), f"angle {100 * fractions[0]:.1f} %, displacement {100 * fractions[1]:.1f} %"
+def _no_influence(data: Data, csj: paper.Model, ideal: paper.Model) -> Outcome:
+    angle, displacement, _ = deviations.moved(data, csj, ideal).over(deviations.sizes(data, ideal))
+    text = f"angle {100 * angle:.1f} %, displacement {100 * displacement:.1f} %"
+    return _verdict(angle < SMALL, displacement < SMALL), text
 
 
-def _velocity_free(data: Data, csj: Model, ideal: Model) -> Outcome:
-    fraction = measured.moved(data, csj, ideal).velocity / measured.sizes(data, ideal).velocity
+def _velocity_free(data: Data, csj: paper.Model, ideal: paper.Model) -> Outcome:
+    *_, fraction = deviations.moved(data, csj, ideal).over(deviations.sizes(data, ideal))
     return _verdict(fraction < SMALL), f"{100 * fraction:.1f} % of the largest velocity"
 
 
-def _conspicuous(data: Data, csj: Model, ideal: Model) -> Outcome:
-    force = measured.reaction(data, ideal), measured.reaction(data, csj)
-    acceleration = measured.acceleration(data, ideal), measured.acceleration(data, csj)
-    return _verdict(force[1] > 2.0 * force[0], acceleration[1] > 2.0 * acceleration[0]), (
-        f"force {force[0]:.0f} to {force[1]:.0f} N, acceleration {acceleration[0]:.0f} to {acceleration[1]:.0f} m/s²"
+def _conspicuous(data: Data, csj: paper.Model, ideal: paper.Model) -> Outcome:
+    (force, acceleration), (base, base_acceleration) = (deviations.peaks(data, model) for model in (csj, ideal))
+    return _verdict(force > 2.0 * base, acceleration > 2.0 * base_acceleration), (
+        f"force {base:.0f} to {force:.0f} N, acceleration {base_acceleration:.0f} to {acceleration:.0f} m/s²"
     )
 
 
 def _lowered(data: Data) -> Outcome:
-    models = (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)
-    force = [measured.reaction(data, m) for m in models]
-    acceleration = [measured.acceleration(data, m) for m in models]
-    text = "; ".join(
-        f"{mode_set(m)} {f:.0f} N, {a:.0f} m/s²" for m, f, a in zip(models, force, acceleration, strict=True)
-    )
-    rigid = measured.reaction(data, CSJ), measured.acceleration(data, CSJ)
-    tests = [f < rigid[0] and a < rigid[1] for f, a in zip(force, acceleration, strict=True)]
+    peaks = {model: deviations.peaks(data, model) for model in paper.FAR_CSJ}
+    rigid = deviations.peaks(data, paper.CSJ)
+    text = "; ".join(f"{mode_set(m)} {force:.0f} N, {a:.0f} m/s²" for m, (force, a) in peaks.items())
+    tests = [force < rigid[0] and a < rigid[1] for force, a in peaks.values()]
     return _verdict(*tests), f"CSJ {rigid[0]:.0f} N, {rigid[1]:.0f} m/s²; {text}"
 
 
 def _motion_kept(data: Data) -> Outcome:
     """Angle and displacement are those of the ideal model, and none depends on the mode set."""
-    own, fractions = measured.sizes(data), []
-    moved = {model: measured.moved(data, model) for model in FAR_CSJ}
-    for m in moved.values():
-        fractions.append([m.angle / own.angle, m.displacement / own.displacement, m.velocity / own.velocity])
-    largest = np.max(fractions, axis=0)
-    free, fixed = moved[FAR_CSJ_FREE], moved[FAR_CSJ_FIXED]
-    sets = [abs(getattr(free, n) / getattr(fixed, n) - 1.0) for n in ("angle", "displacement", "velocity")]
+    moved, own = {model: deviations.moved(data, model) for model in paper.FAR_CSJ}, deviations.sizes(data)
+    largest = np.max([one.over(own) for one in moved.values()], axis=0)
+    sets = [abs(ratio - 1.0) for ratio in moved[paper.FAR_CSJ_FREE].over(moved[paper.FAR_CSJ_FIXED])]
     return _verdict(*(s < SMALL for s in largest), *(s < SLIGHT for s in sets)), (
         f"angle {100 * largest[0]:.1f} %, displacement {100 * largest[1]:.1f} %, velocity {100 * largest[2]:.1f} % off "
         f"the ideal model; between free-free and fixed-fixed modes these differ by {100 * max(sets):.2g} % at most"
@@ -211,9 +174,11 @@ def _motion_kept(data: Data) -> Outcome:
 
 def _paths_differ(data: Data) -> Outcome:
     """The ball's path in the socket, by what can be said of it beyond the horizon: statistics of the members."""
-    free, fixed = (data[f"{model.scene}:ensemble"].sel(contact=JOINT) for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED))
+    free, fixed = (
+        data[f"{model.scene}:ensemble"].sel(contact=paper.JOINT) for model in (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED)
+    )
     names = {"impact_count": ("impacts", 1.0), "contact_time_share": ("% of the time in contact", 100.0)}
-    tests = [measured.differ(free[name].values, fixed[name].values) for name in names]
+    tests = [deviations.differ(free[name].values, fixed[name].values) for name in names]
     texts = [
         f"{factor * free[n].mean():.0f} ± {factor * free[n].std(ddof=1):.0f} and "
         f"{factor * fixed[n].mean():.0f} ± {factor * fixed[n].std(ddof=1):.0f} {words}"
@@ -224,44 +189,39 @@ def _paths_differ(data: Data) -> Outcome:
 
 def _dashpot(data: Data) -> Outcome:
     """Vibration as the root mean square of the platform's acceleration minus the ideal one, at the outputs."""
-    ideal = measured.vertical(data[f"{IDEAL.scene}:run"])
-    rigid = float(np.sqrt(np.mean(difference(data, CSJ, measured.vertical) ** 2)))
+    ideal = deviations.vertical(data[f"{paper.IDEAL.scene}:run"])
+    rigid = float(np.sqrt(np.mean(difference(data, paper.CSJ, deviations.vertical) ** 2)))
     rows = {}
-    for model in FAR_CSJ:
-        members = data[f"{model.scene}:ensemble"].acceleration.sel(body=PLATFORM, axis="z").values
+    for model in paper.FAR_CSJ:
+        members = data[f"{model.scene}:ensemble"].acceleration.sel(body=paper.PLATFORM, axis="z").values
         rows[model] = float(np.sqrt(np.mean((members - ideal) ** 2, axis=1)).mean())
-    count = {m: float(data[f"{m.scene}:ensemble"].impact_count.sel(contact=JOINT).mean()) for m in FAR_CSJ}
-    text = "; ".join(f"{mode_set(m)} {rows[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in FAR_CSJ)
+    count = {m: float(data[f"{m.scene}:ensemble"].impact_count.sel(contact=paper.JOINT).mean()) for m in paper.FAR_CSJ}
+    text = "; ".join(f"{mode_set(m)} {rows[m]:.0f} m/s² and {count[m]:.0f} impacts" for m in paper.FAR_CSJ)
+    impacts = int(data[f"{paper.CSJ.scene}:post"].impact_count.sel(contact=paper.JOINT))
     return _verdict(*(size < rigid for size in rows.values())), (
-        f"vibration CSJ {rigid:.0f} m/s² and {int(data[f'{CSJ.scene}:post'].impact_count.sel(contact=JOINT))} impacts; "
+        f"vibration CSJ {rigid:.0f} m/s² and {impacts} impacts; "
         f"{text}; without structural damping the rod takes no energy out of the mechanism"
     )
 
 
 def _sets_differ(data: Data) -> Outcome:
-    force = [measured.reaction(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
-    acceleration = [measured.acceleration(data, m) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED)]
-    differences = [abs(a / b - 1.0) for a, b in (force, acceleration)]
-    return _verdict(
-        *(a > SLIGHT for a in differences)
-    ), f"by {100 * differences[0]:.0f} % in force, {100 * differences[1]:.0f} % in acceleration"
+    free, fixed = (deviations.peaks(data, model) for model in (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED))
+    force, acceleration = (abs(a / b - 1.0) for a, b in zip(free, fixed, strict=True))
+    text = f"by {100 * force:.0f} % in force, {100 * acceleration:.0f} % in acceleration"
+    return _verdict(force > SLIGHT, acceleration > SLIGHT), text
 
 
 def _fixed_right(data: Data) -> Outcome:
-    best = measured.reaction(data, FAR_CSJ_CB), measured.acceleration(data, FAR_CSJ_CB)
-    off = {}
-    for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED):
-        off[model] = measured.reaction(data, model) / best[0] - 1.0, measured.acceleration(data, model) / best[1] - 1.0
-    free, fixed = off[FAR_CSJ_FREE], off[FAR_CSJ_FIXED]
-    return _verdict(abs(fixed[0]) < abs(free[0]), abs(fixed[1]) < abs(free[1])), (
+    *peaks, best = (deviations.peaks(data, model) for model in paper.FAR_CSJ)
+    free, fixed = ([own / of - 1.0 for own, of in zip(one, best, strict=True)] for one in peaks)
+    return _verdict(*(abs(b) < abs(a) for a, b in zip(free, fixed, strict=True))), (
         f"against all static compliance: free-free {100 * free[0]:+.0f} % (force), {100 * free[1]:+.0f} % "
         f"(acceleration); fixed-fixed {100 * fixed[0]:+.0f} %, {100 * fixed[1]:+.0f} %"
     )
 
 
 def _clearance_dominates(data: Data) -> Outcome:
-    rod, clearance = measured.moved(data, FAR_CB), measured.moved(data, CSJ)
-    parts = [getattr(rod, n) / getattr(clearance, n) for n in ("angle", "displacement", "velocity")]
+    parts = deviations.moved(data, paper.FAR_CB).over(deviations.moved(data, paper.CSJ))
     return _verdict(*(s < SLIGHT for s in parts)), (
         f"the rod's part of the clearance's: angle {100 * parts[0]:.2g} %, displacement {100 * parts[1]:.2g} %, "
         f"velocity {100 * parts[2]:.2g} %"
@@ -269,16 +229,13 @@ def _clearance_dominates(data: Data) -> Outcome:
 
 
 def _enlarged(data: Data) -> Outcome:
-    rigid, tests, texts = measured.moved(data, CSJ), [], []
-    for model in (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB):
-        moved = measured.moved(data, model)
-        rise = [getattr(moved, n) / getattr(rigid, n) - 1.0 for n in ("angle", "displacement", "velocity")]
-        tests.append(min(rise) > 0.0)
-        texts.append(f"{mode_set(model)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise))
-    return _verdict(*tests), f"angle, displacement, velocity: {'; '.join(texts)}"
+    rigid = deviations.moved(data, paper.CSJ)
+    rises = {m: [ratio - 1.0 for ratio in deviations.moved(data, m).over(rigid)] for m in paper.FAR_CSJ}
+    texts = [f"{mode_set(m)} " + ", ".join(f"{100 * r:+.1f} %" for r in rise) for m, rise in rises.items()]
+    return _verdict(*(min(rise) > 0.0 for rise in rises.values())), f"angle, displacement, velocity: {'; '.join(texts)}"
 
 
-def _costs(*models: Model) -> Callable[[Data], Outcome]:
+def _costs(*models: paper.Model) -> Callable[[Data], Outcome]:
     """Whether costs over the ideal model's are the paper's, by each way in which Table 10 gives them."""
 
     def outcome(data: Data) -> Outcome:
@@ -304,10 +261,15 @@ def _becomes_chaotic(data: Data) -> Outcome:
         return _one_stroke(data)
     with SECTIONS.open(newline="", encoding="utf-8") as file:
         rows = {row["scene"]: row for row in csv.DictReader(file)}
-    requested = {CSJ: "quasi-periodic", FAR_CSJ_FREE: "chaotic", FAR_CSJ_FIXED: "chaotic", FAR_CSJ_CB: "chaotic"}
+    requested = {
+        paper.CSJ: "quasi-periodic",
+        paper.FAR_CSJ_FREE: "chaotic",
+        paper.FAR_CSJ_FIXED: "chaotic",
+        paper.FAR_CSJ_CB: "chaotic",
+    }
     texts = [f"{mode_set(model) or model.label} {_motion(rows[model.scene])}" for model in requested]
     return _verdict(*(rows[model.scene]["verdict"] == motion for model, motion in requested.items())), (
-        f"over {rows[CSJ.scene]['periods']} repeated strokes: {'; '.join(texts)} (chaos.md)"
+        f"over {rows[paper.CSJ.scene]['periods']} repeated strokes: {'; '.join(texts)} (chaos.md)"
     )
 
 
@@ -319,9 +281,12 @@ def _motion(row: Mapping[str, str]) -> str:
 
 
 def _one_stroke(data: Data) -> Outcome:
-    end = float(data[f"{CSJ.scene}:run"].time.values[-1])
-    horizon = float(data[f"{CSJ.scene}:post"].horizon)
-    parts = [1e3 * float(data[f"{m.scene}:post"].ensemble_horizon) for m in (FAR_CSJ_FREE, FAR_CSJ_FIXED, FAR_CSJ_CB)]
+    end = float(data[f"{paper.CSJ.scene}:run"].time.values[-1])
+    horizon = float(data[f"{paper.CSJ.scene}:post"].horizon)
+    parts = [
+        1e3 * float(data[f"{m.scene}:post"].ensemble_horizon)
+        for m in (paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED, paper.FAR_CSJ_CB)
+    ]
     return "cannot be determined from one stroke", (
         f"neighbours of the CSJ run stay together to {1e3 * horizon:.0f} of {1e3 * end:.0f} ms; of the undamped "
         "FAR-CSJ "
@@ -329,79 +294,70 @@ def _one_stroke(data: Data) -> Outcome:
     )
 
 
-STATEMENTS = (
-    Statement(
+#: statements of the paper: where they are, and the test of each
+STATEMENTS: tuple[tuple[str, str, Callable[[Data], Outcome]], ...] = (
+    (
         "6.2.1, Fig. 11(a)-(c)",
         "With ideal joints the rod's flexibility has no effect on angle, displacement and velocity",
         _same_motion,
     ),
-    Statement(
+    (
         "6.2.1, Fig. 11(d)",
         "With ideal joints the rod's flexibility has no effect on the acceleration",
         _same_acceleration,
     ),
-    Statement("6.2.1, Fig. 11(e)", "The reaction at A1 differs slightly, by a vibration", _slight_vibration),
-    Statement(
-        "6.2.1, Fig. 11(f)", "With ideal joints the path of the ball's centre is almost the same", _same_path(*FAR)
-    ),
-    Statement("6.2.1, Table 7", "Free-free and fixed-fixed modes give the same with ideal joints", _consistent),
-    Statement("6.2.1", "Free-free modes give the right solution where there is no clearance", _free_suitable),
-    Statement(
+    ("6.2.1, Fig. 11(e)", "The reaction at A1 differs slightly, by a vibration", _slight_vibration),
+    ("6.2.1, Fig. 11(f)", "With ideal joints the path of the ball's centre is almost the same", _same_path(*paper.FAR)),
+    ("6.2.1, Table 7", "Free-free and fixed-fixed modes give the same with ideal joints", _consistent),
+    ("6.2.1", "Free-free modes give the right solution where there is no clearance", _free_suitable),
+    (
         "6.2.2, Fig. 12(a), (b)",
         "Clearance has almost no influence on trajectory and displacement",
         _in_both_layouts(_no_influence),
     ),
-    Statement("6.2.2, Fig. 12(c)", "The velocity does not suffer from clearance", _in_both_layouts(_velocity_free)),
-    Statement(
+    ("6.2.2, Fig. 12(c)", "The velocity does not suffer from clearance", _in_both_layouts(_velocity_free)),
+    (
         "6.2.2, Fig. 12(d), (e)",
         "The effect of clearance on acceleration and force is conspicuous",
         _in_both_layouts(_conspicuous),
     ),
-    Statement(
-        "6.2.2, Fig. 12(f)", "Clearance makes the path of the ball's centre significantly different", _other_path
-    ),
-    Statement(
+    ("6.2.2, Fig. 12(f)", "Clearance makes the path of the ball's centre significantly different", _other_path),
+    (
         "6.2.3, Fig. 13(a)-(c), Figs. 14, 15",
         "With clearance and a flexible rod, angle, displacement and velocity stay those of the ideal model, whatever "
         "the mode set",
         _motion_kept,
     ),
-    Statement(
+    (
         "6.2.3, Fig. 13(d), (e)",
         "Free-free and fixed-fixed modes differ obviously in force and acceleration",
         _sets_differ,
     ),
-    Statement("6.2.3", "A flexible rod lowers contact force and acceleration", _lowered),
-    Statement("6.2.3, section 7", "The rod is a dashpot that damps the vibration out", _dashpot),
-    Statement(
-        "6.2.3, section 7", "The right reference conditions, fixed-fixed, must be imposed with clearance", _fixed_right
-    ),
-    Statement("Tables 7 and 8", "Clearance, not the rod's flexibility, costs the accuracy", _clearance_dominates),
-    Statement("Tables 8 and 9", "Clearance and a flexible rod together enlarge the errors further", _enlarged),
-    Statement(
-        "Fig. 13(f), Fig. 17",
-        "The ball's path in the socket differs significantly between the mode sets",
-        _paths_differ,
-    ),
-    Statement(
+    ("6.2.3", "A flexible rod lowers contact force and acceleration", _lowered),
+    ("6.2.3, section 7", "The rod is a dashpot that damps the vibration out", _dashpot),
+    ("6.2.3, section 7", "The right reference conditions, fixed-fixed, must be imposed with clearance", _fixed_right),
+    ("Tables 7 and 8", "Clearance, not the rod's flexibility, costs the accuracy", _clearance_dominates),
+    ("Tables 8 and 9", "Clearance and a flexible rod together enlarge the errors further", _enlarged),
+    ("Fig. 13(f), Fig. 17", "The ball's path in the socket differs significantly between the mode sets", _paths_differ),
+    (
         "6.2.3, Table 10",
         "A flexible rod with ideal joints costs hardly more than the ideal model",
-        _costs(FAR_FREE, FAR_FIXED),
+        _costs(paper.FAR_FREE, paper.FAR_FIXED),
     ),
-    Statement("6.2.3, Table 10", "Clearance makes the ideal model twenty times as dear", _costs(CSJ)),
-    Statement(
+    ("6.2.3, Table 10", "Clearance makes the ideal model twenty times as dear", _costs(paper.CSJ)),
+    (
         "6.2.3, Table 10",
         "Clearance and a flexible rod together make it forty times as dear",
-        _costs(FAR_CSJ_FREE, FAR_CSJ_FIXED),
+        _costs(paper.FAR_CSJ_FREE, paper.FAR_CSJ_FIXED),
     ),
-    Statement("Fig. 16", "The motion changes from periodic to quasi-periodic and chaotic", _becomes_chaotic),
+    ("Fig. 16", "The motion changes from periodic to quasi-periodic and chaotic", _becomes_chaotic),
 )
 
 TABLE = Figure(
     "Verdicts (added): what the paper states in section 6, and whether it holds here",
     (
-        *references((IDEAL, *FAR, CSJ, *FIRST), "run", "post"),
-        *references(FAR_CSJ, "post", "ensemble"),
+        *paper.references((paper.IDEAL, *paper.FAR, paper.CSJ, *paper.FIRST), "run", "post"),
+        *paper.references(paper.FAR_CSJ, "post", "ensemble"),
         "sps4:timing",
     ),
     _verdicts,

@@ -39,7 +39,7 @@ def reduced(motion: np.ndarray, rigid: np.ndarray, relief: np.ndarray, stiffness
 
 
 def fractions(of_modes: np.ndarray, full: np.ndarray) -> np.ndarray:
-    """`found` as fractions of `full`; one where the full model has no compliance to lack, as of a frame to itself."""
+    """Compliance of the modes over that of the full model; one where this has none, as of a frame to itself."""
     negligible = full <= 1e-9 * full.max(axis=(0, 1), keepdims=True)
     return np.where(negligible, 1.0, of_modes / np.where(negligible, 1.0, full))
 

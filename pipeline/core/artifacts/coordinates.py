@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays
-from flexclear.pipeline.core.scene.variable import Schema, table
+from flexclear.pipeline.core.scene.output import Schema, table
 
 AXES = ("x", "y", "z")
 QUATERNION = ("w", "x", "y", "z")

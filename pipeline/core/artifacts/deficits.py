@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: a fraction of the static compliance below this is worth a warning
-ENOUGH = 0.9
+ENOUGH_COMPLIANCE = 0.9
 #: references whose shapes answer static loads at the interfaces exactly
 STATIC = ("craig-bampton", "craig-chang", "residual-flexibility")
 WIDTH = 9
@@ -70,7 +70,7 @@ def warnings(bundle: Labelled, frames_used: Sequence[str], body: str = "the body
     for name, held in pairs:
         i, j = names.index(name), names.index(held)
         fraction = np.minimum(bundle["compliance_share"].values[i, j], bundle["compliance_share"].values[j, i])
-        low = fraction < ENOUGH
+        low = fraction < ENOUGH_COMPLIANCE
         if not low.any():
             continue
         where = f"of '{name}'" if name == held else f"between '{held}' and '{name}'"

@@ -215,12 +215,8 @@ def sweep(root: Path) -> int:
             if not name.endswith((".tmp", ".part", ".lock")):
                 continue
             path = Path(folder, name)
-            if name.endswith(".tmp") and _abandoned(path):
+            if (name.endswith(".tmp") and _abandoned(path)) or (name.endswith(".part") and _old(path)):
                 with contextlib.suppress(OSError):  # nothing can be written there, or another sweeps
-                    path.unlink()
-                    removed += 1
-            elif name.endswith(".part") and _old(path):
-                with contextlib.suppress(OSError):
                     path.unlink()
                     removed += 1
             elif name.endswith(".lock"):

@@ -1,4 +1,4 @@
-r"""What an effect does to a quantity: how far two variants of a scene are apart, and how well that is known.
+r"""What an effect does to a quantity: how far two variants of a scene differ, and how well that is known.
 
 Variants with contacts are run from several starts that differ by a hair. Where these members agree their mean is the
 motion; where they part, beyond the horizon of the motion, it is a statistic, and the difference of two means is known
@@ -31,8 +31,8 @@ RARE = 1e-3
 LIKELY = 0.05
 #: fraction of a series over which the spread of members is pooled
 POOLED = 0.05
-#: by how much members start apart: a fraction of the clearance, and the least [m]
-FRACTION, LEAST = 1e-3, 1e-8
+#: by how much the starts of members differ: a fraction of the clearance, and the least [m]
+MEMBER_OFFSET, LEAST_OFFSET = 1e-3, 1e-8
 #: what is recorded of a quantity to compare it by: the series, and of what impacts make large its extreme, which is
 #: read where it is and not at an output
 OF_KIND = {
@@ -63,7 +63,7 @@ class Influence:
 class Agreement:
     """How far a planned run is from the full one where it matters most, next to what is allowed there [SI].
 
-    allowed: what is requested; beyond the horizon, where two runs of the full scene whose starts cannot be told apart
+    allowed: what is requested; beyond the horizon, where two runs of the full scene from indistinguishable starts
     differ by more, that difference as a root mean square.  horizon: fraction of the run up to which such runs agree
     within what is requested; 1 where they agree throughout, 0 where a number without time differs.
     """
@@ -107,13 +107,13 @@ def chance(members: int, rare: float = RARE) -> float:
 
 
 def with_members(scene: Scene) -> Scene:
-    """The scene with members that start a hair apart: a thousandth of its least clearance, at least 1e-8 m.
+    """The scene with members whose starts differ by a hair: a thousandth of its least clearance, at least 1e-8 m.
 
     No start is known better; and members that are nearer to each other than the errors of a loose tolerance would make
     these look like influences.
     """
     clearances = [joint.clearance for joint in scene.contacts().values()]
-    perturbation = max(LEAST, FRACTION * min(clearances, default=0.0))
+    perturbation = max(LEAST_OFFSET, MEMBER_OFFSET * min(clearances, default=0.0))
     changed = scene.model_copy(update={"ensemble": Ensemble(perturbation=perturbation)})
     changed._name, changed._path = scene.name, scene.path
     return changed
@@ -140,13 +140,13 @@ def influence(a: Point, b: Point, quantity: Quantity, members: int) -> Influence
     if quantity.kind == "impact_times":
         return _impact_times(a, b, name)
     parts = [
-        _apart(a, b, f"{name}.{reduction}", members, turning=quantity.kind == "orientation")
+        _reduced(a, b, f"{name}.{reduction}", members, turning=quantity.kind == "orientation")
         for reduction in _reductions(quantity)
     ]
     return Influence(max(p.difference for p in parts), max(p.uncertainty for p in parts))
 
 
-def _apart(a: Point, b: Point, name: str, members: int, *, turning: bool) -> Influence:
+def _reduced(a: Point, b: Point, name: str, members: int, *, turning: bool) -> Influence:
     distance, error = _along(a, b, name, members, turning=turning)
     doubt = chance(members) * error
     return Influence(float(_beyond(distance, doubt).max(initial=0.0)), float(doubt.max(initial=0.0)))
@@ -196,8 +196,8 @@ def same_starts(a: Point, b: Point, quantity: Quantity, members: int, requested:
 
 def _allowed(full: Point, name: str, requested: float, *, turning: bool) -> np.ndarray:
     """What may be off at each output: what is requested, or the difference of two runs of the scene itself."""
-    apart: np.ndarray = np.sqrt(2.0) * _pooled(_deviations(full, name, turning=turning))
-    return np.maximum(requested, apart)
+    scattered: np.ndarray = np.sqrt(2.0) * _pooled(_deviations(full, name, turning=turning))
+    return np.maximum(requested, scattered)
 
 
 def _deviations(point: Point, name: str, *, turning: bool) -> np.ndarray:
@@ -213,7 +213,7 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
     """
     if quantity.kind == "impact_times":
         return Agreement(_impact_times(planned, full, quantity.name).difference, 0.0, requested)
-    turning, found = quantity.kind == "orientation", list[Agreement]()
+    turning, results = quantity.kind == "orientation", list[Agreement]()
     for reduction in _reductions(quantity):
         name = f"{quantity.name}.{reduction}"
         distance, doubt = _along(planned, full, name, members, turning=turning)
@@ -228,11 +228,11 @@ def agreement(planned: Point, full: Point, quantity: Quantity, members: int, req
             worst = int(np.argmax((error + doubt) / floor))
         beyond = allowed > requested
         horizon = float(np.argmax(beyond)) / len(beyond) if beyond.any() else 1.0
-        found.append(Agreement(float(error[worst]), float(doubt[worst]), float(allowed[worst]), horizon))
-    missed = [one for one in found if one.missed]
-    worst_of = max(missed or found, key=lambda one: one.fraction)
-    same = all(one.error == one.chance == 0.0 for one in found)
-    return replace(worst_of, horizon=1.0 if same else found[0].horizon)  # that of the series, where there is one
+        results.append(Agreement(float(error[worst]), float(doubt[worst]), float(allowed[worst]), horizon))
+    missed = [one for one in results if one.missed]
+    worst_of = max(missed or results, key=lambda one: one.fraction)
+    same = all(one.error == one.chance == 0.0 for one in results)
+    return replace(worst_of, horizon=1.0 if same else results[0].horizon)  # that of the series, where there is one
 
 
 def scatter(point: Point, quantity: Quantity) -> float:

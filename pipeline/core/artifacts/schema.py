@@ -15,10 +15,10 @@ from flexclear.pipeline.core.artifacts.coordinates import AXES as AXES
 from flexclear.pipeline.core.artifacts.coordinates import COORDINATES, turning, with_names
 from flexclear.pipeline.core.artifacts.coordinates import QUATERNION as QUATERNION
 from flexclear.pipeline.core.artifacts.labelled import LabelledArray, LabelledArrays, of
+from flexclear.pipeline.core.scene.output import Schema as Schema
+from flexclear.pipeline.core.scene.output import Variable as Variable
+from flexclear.pipeline.core.scene.output import table
 from flexclear.pipeline.core.scene.run_schema import RUN as RUN
-from flexclear.pipeline.core.scene.variable import Schema as Schema
-from flexclear.pipeline.core.scene.variable import Variable as Variable
-from flexclear.pipeline.core.scene.variable import table
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.version import DISTRIBUTION, version
 
@@ -335,5 +335,5 @@ def require_complete(run: xr.Dataset | LabelledArrays, what: str = "the run") ->
             what,
             f"it is not complete: it was stopped at t = {run.attrs.get('stopped_at', float('nan')):.6g} s "
             f"({run.attrs.get('stopped_by', 'nobody knows why')})",
-            "run the scene again, which continues from there",
+            "run the scene again",
         )

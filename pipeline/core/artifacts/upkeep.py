@@ -13,7 +13,7 @@ from flexclear.pipeline.core.artifacts.store import FAMILY, PARTIAL, Record, Sto
 from flexclear.pipeline.core.system import platforms
 
 #: what is next to artifacts and is none of their files
-BESIDE = (".json", ".lock", ".names", ".part", ".tmp")
+NO_ARTIFACT = (".json", ".lock", ".names", ".part", ".tmp")
 DAY = 86400.0
 #: a file of an artifact may be so long without its record [s]
 YOUNG = 3600.0
@@ -146,6 +146,6 @@ def _shown(store: Store) -> Iterator[Record]:
 def _orphans(store: Store, known: set[Path]) -> Iterator[Path]:
     """Files of artifacts whose record is gone: a process died between them. Young ones may be about to get one."""
     for path in sorted((store.root / "cache").rglob("*")):
-        ours = path.is_file() and path not in known and not path.name.endswith(BESIDE)
+        ours = path.is_file() and path not in known and not path.name.endswith(NO_ARTIFACT)
         if ours and time.time() - path.stat().st_mtime > YOUNG:
             yield path

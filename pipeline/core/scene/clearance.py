@@ -1,45 +1,43 @@
-"""Clearance joints as a scene says them: geometry, materials, normal law, friction law.
+"""Contacts as a scene says them: geometry, materials, normal law, friction law; and the friction of ideal joints.
 
 What a friction law called 'modified-coulomb' does is in `pipeline.dynamics.contact.friction.modified_coulomb`.
 """
 
-from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self, TypeAlias, Union, get_args
 
-from pydantic import Field, model_validator
+from pydantic import Field, create_model, model_validator
 
-from flexclear.pipeline.core.scene.fields import FrameName, Length, Mass, Number, Part, Positive, Pressure, Speed
+from flexclear.pipeline.core.scene.fields import Force, FrameName, Length, Mass, Number, Part, Positive, Pressure, Speed
 
 Share = Field(ge=0.0, le=1.0)
 
 
 class Material(Part):
-    """Elastic constants of a contacting surface.
-
-    youngs_modulus: Young's modulus.  poisson: Poisson's ratio.
-    """
+    """Elastic constants of a contacting surface."""
 
     youngs_modulus: Annotated[Pressure, Positive]
+    """Young's modulus"""
     poisson: Annotated[Number, Field(ge=0.0, lt=0.5)]
+    """Poisson's ratio"""
 
 
 class NormalLaw(Part):
-    """A normal contact law; `stiffness` K [N/m^exponent] may be given instead of materials and radii.
-
-    restitution: the law's own parameter c_r; a free impact rebounds with it only as well as the law
-    achieves.  delivered_restitution: the rebound that a free impact is to have; the parameter
-    follows from it.  exponent: default 1.5, for linear laws 1.
-    law: name of the law, as docs/contact.md lists them.  stiffness: K in force = K depth^exponent; without it, from
-    materials and radii.  damping: of linear laws [N s/m].  effective_mass: of linear laws: mass that rebounds; default:
-    the reduced mass of the two links.
-    """
+    """A normal contact law; `stiffness` K [N/m^exponent] may be given instead of materials and radii."""
 
     law: str
+    """name of the law, as docs/contact.md lists them"""
     restitution: Annotated[Number, Share] | None = None
+    """the law's own parameter c_r; a free impact rebounds with it only as well as the law achieves"""
     delivered_restitution: Annotated[Number, Share] | None = None
+    """the rebound that a free impact is to have; the parameter follows from it"""
     exponent: Annotated[Number, Field(ge=1.0)] | None = None
+    """default 1.5, for linear laws 1"""
     stiffness: Annotated[Number, Positive] | None = None
+    """K in force = K depth^exponent; without it, from materials and radii"""
     damping: Annotated[Number, Field(ge=0.0)] | None = None
+    """of linear laws [N s/m]"""
     effective_mass: Annotated[Mass, Positive] | None = None
+    """of linear laws: mass that rebounds; default: the reduced mass of the two links"""
 
     @model_validator(mode="after")
     def _one_restitution(self) -> Self:
@@ -51,17 +49,17 @@ class NormalLaw(Part):
 
 
 class ModifiedCoulomb(Part):
-    """Wang & Wang's modified Coulomb friction, with its four parameters (Table 6).
-
-    static, dynamic: coefficients of friction.  v_static, v_dynamic: sliding speeds at which friction has the one and
-    the other.
-    """
+    """Wang & Wang's modified Coulomb friction, with its four parameters (Table 6)."""
 
     law: Literal["modified-coulomb"]
     static: Annotated[Number, Field(ge=0.0)]
+    """largest coefficient of friction"""
     dynamic: Annotated[Number, Field(ge=0.0)]
+    """coefficient of friction at high speed"""
     v_static: Annotated[Speed, Positive]
+    """sliding speed at which the coefficient is `static`"""
     v_dynamic: Annotated[Speed, Positive]
+    """sliding speed from which on the coefficient is `dynamic`"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -75,15 +73,15 @@ class ModifiedCoulomb(Part):
 
 
 class Ambrosio(Part):
-    """Ambrosio's Coulomb friction: none below v0, a linear rise to `dynamic` at v1.
-
-    dynamic: coefficient of friction.  v0, v1: sliding speeds between which it rises from nothing to its full value.
-    """
+    """Ambrosio's Coulomb friction: none below v0, a linear rise to `dynamic` at v1."""
 
     law: Literal["ambrosio"]
     dynamic: Annotated[Number, Field(ge=0.0)]
+    """coefficient of friction"""
     v0: Annotated[Speed, Field(ge=0.0)]
+    """sliding speed up to which there is no friction"""
     v1: Annotated[Speed, Positive]
+    """sliding speed from which on it has its full value"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -96,20 +94,21 @@ class Ambrosio(Part):
 
 
 class LuGre(Part):
-    """LuGre friction per unit of normal force.
-
-    v_stribeck: speed over which friction falls from static to dynamic.
-    static, dynamic: coefficients of friction.  bristle_stiffness, bristle_damping, viscous: sigma_0 [1/m], sigma_1
-    [s/m] and sigma_2 [s/m], each over the normal force.
-    """
+    """LuGre friction per unit of normal force."""
 
     law: Literal["lugre"]
     static: Annotated[Number, Positive]
+    """coefficient of friction when sliding begins"""
     dynamic: Annotated[Number, Positive]
+    """coefficient of friction at high speed"""
     v_stribeck: Annotated[Speed, Positive]
+    """speed over which friction falls from static to dynamic"""
     bristle_stiffness: Annotated[Number, Positive]
+    """sigma_0 [1/m], over the normal force"""
     bristle_damping: Annotated[Number, Field(ge=0.0)] = 0.0
+    """sigma_1 [s/m], over the normal force"""
     viscous: Annotated[Number, Field(ge=0.0)] = 0.0
+    """sigma_2 [s/m], over the normal force"""
 
     @model_validator(mode="after")
     def _passive(self) -> Self:
@@ -139,33 +138,32 @@ def _not_above(dynamic: float, static: float) -> None:
 
 
 class Wear(Part):
-    """Archard's wear of a contact: depth = coefficient * normal force * sliding distance / (hardness * area).
-
-    coefficient: k [-], for the pair of surfaces.  hardness: of the softer one.  sectors: into which both surfaces are
-    divided around their axis for the map of depths; a ball and its socket also into bands of equal area.
-    """
+    """Archard's wear of a contact: depth = coefficient * normal force * sliding distance / (hardness * area)."""
 
     coefficient: Annotated[Number, Positive]
+    """k [-], for the pair of surfaces"""
     hardness: Annotated[Pressure, Positive]
+    """of the softer one"""
     sectors: Annotated[int, Field(ge=4, le=720)] = 36
+    """into which both surfaces are divided around their axis for the map of depths; a ball and its socket also into
+    bands of equal area"""
 
 
 class _Contact(Part):
-    """What all contacts between surfaces have.
-
-    floor: least approach speed used as the impact rate of a closing [m/s]; keeps the law regular
-    for grazing and resting contact.  Without it, 1e-5 of the size of the mechanism per second, at most 1e-6 m/s.
-    initial_approach_speed: impact rate of a contact that the
-    scene's start already has, 0 of one that rests there; without it, a start in contact is refused.
-    between: frames of the outer and the inner surface, each as body.FRAME.  normal: law of the normal force.  friction:
-    law of friction; without it there is none.
-    """
+    """What all contacts between surfaces have."""
 
     between: tuple[FrameName, FrameName]
+    """frames of the outer and the inner surface, each as body.FRAME"""
     normal: NormalLaw
+    """law of the normal force"""
     friction: Friction | None = None
+    """law of friction; without it there is none"""
     floor: Annotated[Speed, Positive] | None = None
+    """least approach speed used as the impact rate of a closing [m/s]; keeps the law regular for grazing and resting
+    contact. Without it, 1e-5 of the size of the mechanism per second, at most 1e-6 m/s"""
     initial_approach_speed: Annotated[Speed, Field(ge=0.0)] | None = None
+    """impact rate of a contact that the scene's start already has, 0 of one that rests there; without it, a start in
+    contact is refused"""
 
     #: what the outer and the inner surface are called in keys
     surfaces: ClassVar[tuple[str, str]]
@@ -195,59 +193,65 @@ class _Contact(Part):
 
 
 class _Clearance(_Contact):
-    """What all clearance joints have; clearance: half the difference of the diameters."""
+    """What all clearance joints have;"""
 
     clearance: Annotated[Length, Positive]
+    """half the difference of the diameters"""
 
 
 class ClearanceSpherical(_Clearance):
-    """Ball in socket with radial clearance; between = [socket frame, ball frame].
-
-    ball_radius: radius of the ball.  socket_material, ball_material: elastic constants, for the stiffness.
-    wear: of both surfaces; absent means none.
-    """
+    """Ball in socket with radial clearance; between = [socket frame, ball frame]."""
 
     surfaces = ("socket", "ball")
     type: Literal["clearance-spherical"]
     ball_radius: Annotated[Length, Positive]
+    """radius of the ball"""
     socket_material: Material | None = None
+    """elastic constants, for the stiffness"""
     ball_material: Material | None = None
+    """elastic constants, for the stiffness"""
     wear: Wear | None = None
+    """of both surfaces; absent means none"""
 
 
 class ClearanceRevolute(_Clearance):
-    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame.
-
-    length: of the bearing, along the axis.
-    pin_radius: radius of the pin.  journal_material, pin_material: elastic constants, for the stiffness.
-    wear: of both surfaces; absent means none.
-    """
+    """Pin in journal with radial clearance; between = [journal frame, pin frame], axis = z of the journal's frame."""
 
     surfaces = ("journal", "pin")
     type: Literal["clearance-revolute"]
     pin_radius: Annotated[Length, Positive]
+    """radius of the pin"""
     length: Annotated[Length, Positive]
+    """of the bearing, along the axis"""
     journal_material: Material | None = None
+    """elastic constants, for the stiffness"""
     pin_material: Material | None = None
+    """elastic constants, for the stiffness"""
     wear: Wear | None = None
+    """of both surfaces; absent means none"""
 
 
 class ClearanceSlot(_Clearance):
     """Pin in a straight slot with round ends; between = [slot frame, pin frame].
 
     The slot lies along x of its frame, whose z is the pin's axis; its middle is the frame's origin.
-    clearance: half the slot's width less the pin's radius.  travel: of the pin's centre in the middle of the slot, from
-    where the one end's half circle has its centre to the other's.  length: of the bearing, along the axis.
-    pin_radius: radius of the pin.  slot_material, pin_material: elastic constants, for the stiffness.
     """
 
     surfaces = ("slot", "pin")
     type: Literal["clearance-slot"]
+    clearance: Annotated[Length, Positive]
+    """half the slot's width less the pin's radius"""
     travel: Annotated[Length, Positive]
+    """of the pin's centre in the middle of the slot, from where the one end's half circle has its centre to the
+    other's"""
     pin_radius: Annotated[Length, Positive]
+    """radius of the pin"""
     length: Annotated[Length, Positive]
+    """of the bearing, along the axis"""
     slot_material: Material | None = None
+    """elastic constants, for the stiffness"""
     pin_material: Material | None = None
+    """elastic constants, for the stiffness"""
 
     @property
     def shape(self) -> tuple[float, float]:
@@ -259,15 +263,16 @@ class BallOnPlane(_Contact):
     """Ball above a plane without end; between = [plane frame, ball frame].
 
     The plane is that of x and y of its frame; the ball is on the side of z.
-
-    ball_radius: radius of the ball.  plane_material, ball_material: elastic constants, for the stiffness.
     """
 
     surfaces = ("plane", "ball")
     type: Literal["ball-on-plane"]
     ball_radius: Annotated[Length, Positive]
+    """radius of the ball"""
     plane_material: Material | None = None
+    """elastic constants, for the stiffness"""
     ball_material: Material | None = None
+    """elastic constants, for the stiffness"""
 
     @property
     def clearance(self) -> float:
@@ -278,3 +283,54 @@ class BallOnPlane(_Contact):
 Clearance = ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane
 #: all of them
 CONTACTS: tuple[Any, ...] = get_args(Clearance)
+
+#: sizes that the bearing of a joint may have, and the one that it must have
+SIZES: dict[str, tuple[set[str], set[str]]] = {
+    "revolute": ({"radius", "length", "axial_radius"}, {"radius"}),
+    "prismatic": ({"radius", "length"}, set()),
+    "cylindrical": ({"radius", "length"}, {"radius"}),
+    "universal": ({"radius", "length"}, {"radius"}),
+    "spherical": ({"radius"}, {"radius"}),
+}
+
+
+class _Bearing(Part):
+    """Where an ideal joint rubs; absent sizes mean that what they would turn into a pressure is not counted."""
+
+    radius: Annotated[Length, Positive] | None = None
+    """of the pin, the ball, or the pins of a universal joint's cross; of a prismatic joint the arm of the pads that
+    hold moments about its axis"""
+    length: Annotated[Length, Positive] | None = None
+    """between the two ends that carry moments across the axis; of a prismatic joint that of the slider, its middle at
+    the second frame's origin"""
+    axial_radius: Annotated[Length, Positive] | None = None
+    """of the collar that carries what a revolute joint is pushed along its axis; default: `radius`"""
+    preload: Annotated[Force, Field(ge=0.0)] = 0.0
+    """normal force that is always there"""
+
+
+def _rubbing(law: Any) -> Any:
+    """The parameters of a friction law of contacts, and those of a bearing."""
+    return create_model(f"{law.__name__}Bearing", __base__=(_Bearing, law), __doc__=law.__doc__, __module__=__name__)
+
+
+if TYPE_CHECKING:
+    JointFriction: TypeAlias = Any
+else:
+    JointFriction = Annotated[Union[tuple(_rubbing(law) for law in FRICTIONS)], Field(discriminator="law")]  # noqa: UP007
+
+
+def require_fitting(kind: str, friction: Any) -> None:
+    """ValueError for a joint type that does not rub, and for sizes that its bearing lacks or cannot have."""
+    if kind not in SIZES:
+        known = ", ".join(SIZES)
+        raise ValueError(f"a joint of type '{kind}' has no friction of its own; those that have: {known}")
+    possible, needed = SIZES[kind]
+    given = {name for name in ("radius", "length", "axial_radius") if getattr(friction, name) is not None}
+    for name in sorted(needed - given):
+        raise ValueError(
+            f"friction in a {kind} joint needs a {name}: its moment is the friction force times that; none is given"
+        )
+    for name in sorted(given - possible):
+        may = ", ".join(sorted(possible))
+        raise ValueError(f"the bearing of a {kind} joint has no {name}; sizes that it may have: {may}")

@@ -5,55 +5,49 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from flexclear.pipeline.core.scene.fields import FrameName, Part
+from flexclear.pipeline.core.scene.fields import FrameName, OnCoordinate, Part, given
 from flexclear.pipeline.core.scene.laws import Bare
 
 
-class JointDrive(Part):
-    """Prescribes one coordinate of a joint; joints with several freedoms need its name.
+class JointDrive(OnCoordinate):
+    """Prescribes one coordinate of a joint; joints with several freedoms need its name."""
 
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  law: position over time.
-    """
-
-    joint: str
-    coordinate: str | None = None
     law: Bare
+    """position over time"""
 
 
 class Components(Part):
-    """Laws along, or about, the axes; a component without a law stays free.
-
-    x, y, z: law of this component.
-    """
+    """Laws along, or about, the axes; a component without a law stays free."""
 
     x: Bare | None = None
+    """law of this component"""
     y: Bare | None = None
+    """law of this component"""
     z: Bare | None = None
+    """law of this component"""
 
     def laws(self) -> dict[str, Any]:
         """The laws that there are, by axis."""
-        return {axis: getattr(self, axis) for axis in "xyz" if getattr(self, axis) is not None}
+        return {axis: getattr(self, axis) for axis in given(self, ("x", "y", "z"))}
 
 
 class PathDrive(Part):
-    """Prescribes the pose of a frame in the world, or some components of it.
-
-    position: its origin [m].  rotation: from the world's axes to the frame's, by `angles`: 'cardan' is
-    about x, then about y of the turned frame, then about z of the frame so turned; 'rotation-vector'
-    takes all three components.
-    actuators: joints (``P1``, or ``C.rotation`` where a joint has several freedoms) whose forces shall
-    produce this motion; without them the drive itself acts on the frame.
-    allocation: what to do with more actuators than freedoms: refuse, or give the forces whose sum of
-    squares (in N and N m) is least.
-    angles: what the components of rotation are, cardan angles or a rotation vector.
-    """
+    """Prescribes the pose of a frame in the world, or some components of it."""
 
     frame: FrameName
     position: Components | None = None
+    """its origin [m]"""
     rotation: Components | None = None
+    """from the world's axes to the frame's, by `angles`: 'cardan' is about x, then about y of the turned frame, then
+    about z of the frame so turned; 'rotation-vector' takes all three components"""
     angles: Literal["cardan", "rotation-vector"] = "cardan"
+    """what the components of rotation are, cardan angles or a rotation vector"""
     actuators: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """joints (``P1``, or ``C.rotation`` where a joint has several freedoms) whose forces shall produce this motion;
+    without them the drive itself acts on the frame"""
     allocation: Literal["unique", "least-norm"] = "unique"
+    """what to do with more actuators than freedoms: refuse, or give the forces whose sum of squares (in N and N m) is
+    least"""
 
     @model_validator(mode="after")
     def _prescribes(self) -> Self:

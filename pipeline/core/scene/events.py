@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, TypeAdapter, ValidationError, WithJsonSche
 from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import Drive, JointDrive, PathDrive
 from flexclear.pipeline.core.scene.event_kinds import CHANGES
-from flexclear.pipeline.core.scene.fields import Part, PartName
+from flexclear.pipeline.core.scene.fields import Part, PartName, given, require_one
 from flexclear.pipeline.core.scene.formulas import formula
 from flexclear.pipeline.core.scene.loads import Load, SampledPid
 from flexclear.pipeline.core.scene.owners import COORDINATES
@@ -37,31 +37,25 @@ When = Annotated[float | str, BeforeValidator(_at), WithJsonSchema(_WHEN)]
 
 
 class Event(Part):
-    """Something that changes once in the run: when a time has come, or a comparison of quantities becomes true.
-
-    at: a time, or a comparison of quantities with < or >; vectors count by their magnitude.
-    after: another event, which happens first.
-    release: part that ceases: joint.NAME, drive.NAME, load.NAME, stop.NAME, gear.NAME, or event.NAME of a lock.
-    lock: joint.NAME, whose coordinates stop and stay where they are.
-    switch: load.NAME, or drive.NAME of a joint, that becomes another one.
-    to: the keys that change; with another type, all keys of the part; laws and expressions count time from the event,
-    and laws of drives positions from where the coordinate is.
-    """
+    """Something that changes once in the run: when a time has come, or a comparison of quantities becomes true."""
 
     at: When
+    """a time, or a comparison of quantities with < or >; vectors count by their magnitude"""
     after: PartName | None = None
+    """another event, which happens first"""
     release: str | None = None
+    """part that ceases: joint.NAME, drive.NAME, load.NAME, stop.NAME, gear.NAME, or event.NAME of a lock"""
     lock: str | None = None
+    """joint.NAME, whose coordinates stop and stay where they are"""
     switch: str | None = None
+    """load.NAME, or drive.NAME of a joint, that becomes another one"""
     to: dict[str, Any] | None = None
+    """the keys that change; with another type, all keys of the part; laws and expressions count time from the event,
+    and laws of drives positions from where the coordinate is"""
 
     @model_validator(mode="after")
     def _one_change(self) -> Self:
-        given = [key for key in CHANGES if getattr(self, key) is not None]
-        if len(given) != 1:
-            raise ValueError(
-                f"one of {', '.join(CHANGES)} says what changes; here {' and '.join(given) or 'none'} does"
-            )
+        require_one(self, CHANGES, "says what changes")
         if (self.switch is None) != (self.to is None):
             raise ValueError("switch and to belong together: a part, and the keys of it that change")
         return self
@@ -69,7 +63,7 @@ class Event(Part):
     @property
     def kind(self) -> str:
         """Which of `CHANGES` it is."""
-        return next(key for key in CHANGES if getattr(self, key) is not None)
+        return given(self, CHANGES)[0]
 
     @property
     def part(self) -> tuple[str, str]:

@@ -150,20 +150,20 @@ def postfix(
             node = node.left
         match node:
             case ast.Name(id=name) if name.startswith("_"):
-                found = [_leaf(leaves[int(name[1:])], term, constants or {})]
+                own = [_leaf(leaves[int(name[1:])], term, constants or {})]
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                found = [*steps(operand), "minus"]
+                own = [*steps(operand), "minus"]
             case ast.BinOp(left=left, op=ast.Pow(), right=right):
-                found = [*steps(left), _exponent(text, steps(right)), "^"]
+                own = [*steps(left), _exponent(text, steps(right)), "^"]
             case ast.Call(func=ast.Name(id=name), args=[first, *more], keywords=[]) if not name.startswith("_"):
                 if bool(more) != (name in SEVERAL):
                     count = "one value" if more else "two values or more"
                     raise ValueError(f"'{text}': {name}(...) takes {count}")
-                found = steps(first) + [step for one in more for step in (*steps(one), name)]
-                found += [] if more else [name]
+                own = steps(first) + [step for one in more for step in (*steps(one), name)]
+                own += [] if more else [name]
             case _:
                 raise _misread(text)
-        return found + [step for right, operator in reversed(rights) for step in (*steps(right), operator)]
+        return own + [step for right, operator in reversed(rights) for step in (*steps(right), operator)]
 
     try:
         return steps(ast.parse(" ".join(words), mode="eval").body)

@@ -36,10 +36,8 @@ class Measure:
         return handler.generate_schema(Annotated[source, BeforeValidator(self.read)])
 
     def __get_pydantic_json_schema__(self, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        one: dict[str, Any] = {"type": ["number", "string"]}
-        if self.vector:
-            return {"type": "array", "items": one, "minItems": 3, "maxItems": 3, "description": self.dimension}
-        return one | {"description": f"{self.dimension}: SI number, or text with a unit"}
+        one: dict[str, Any] = {"type": ["number", "string"], "format": self.dimension}
+        return {"type": "array", "items": one, "minItems": 3, "maxItems": 3} if self.vector else one
 
     def read(self, value: Any) -> Any:
         """SI value; ValueError in words."""
@@ -147,60 +145,69 @@ def _frame(value: Any) -> Any:
 
 
 PartName = Annotated[str, AfterValidator(part_name)]
-FrameName = Annotated[str, BeforeValidator(_frame), Field(description="body.FRAME")]
+FrameName = Annotated[str, BeforeValidator(_frame), WithJsonSchema({"type": "string", "description": "body.FRAME"})]
 
 #: where values come from: one text for the whole part, or one per key; "assumed: why" for assumptions
 Source = str | dict[str, str]
 
 
 class Part(BaseModel):
-    """Base of everything a scene may say: frozen, and no unknown keys.
+    """Base of everything a scene may say: frozen, and no unknown keys. Texts below keys say in schemas what they mean.
 
     Modules of parts evaluate their annotations as they are: as texts each would be compiled by each command.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
-
-    source: Source | None = Field(
-        default=None, description="where the values come from; 'assumed: why' for an assumption"
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True, use_attribute_docstrings=True
     )
 
-    @classmethod
-    def __get_pydantic_json_schema__(cls, core: Any, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The schema, with the meanings of keys from the docstring."""
-        from flexclear.pipeline.core.scene.citations import meanings  # reads docstrings, which only schemas need
+    source: Source | None = None
+    """where the values come from; 'assumed: why' for an assumption"""
 
-        schema = handler(core)
-        properties = handler.resolve_ref_schema(schema).get("properties", {})
-        for key, meaning in meanings(cls, properties.keys()).items():
-            old = properties[key].get("description")
-            properties[key]["description"] = f"{meaning}; {old}" if old else meaning
-        return schema
+
+class OnCoordinate(Part):
+    """What is about a joint coordinate."""
+
+    joint: str
+    """name of the joint"""
+    coordinate: str | None = None
+    """name of its coordinate, where it has several"""
+
+
+def given(part: Part, keys: tuple[str, ...]) -> list[str]:
+    """Those of the keys that a part has."""
+    return [key for key in keys if getattr(part, key) is not None]
+
+
+def require_one(part: Part, keys: tuple[str, ...], says: str) -> None:
+    """ValueError unless a part has exactly one of these keys; says: what they do, as "says where"."""
+    there = given(part, keys)
+    if len(there) != 1:
+        text = f"{' and '.join(there)} do" if there else "nothing does"
+        raise ValueError(f"one of {', '.join(keys)} {says}; here {text}")
 
 
 def given_once(part: Part, ways: tuple[str, ...]) -> None:
     """ValueError when an orientation is given in more than one of these ways."""
-    given = [name for name in ways if getattr(part, name) is not None]
-    if len(given) > 1:
-        raise ValueError(f"an orientation is given once, not by {' and '.join(given)}")
+    if len(there := given(part, ways)) > 1:
+        raise ValueError(f"an orientation is given once, not by {' and '.join(there)}")
 
 
 class Pose(Part):
-    """Position and orientation of a frame in its parent; at most one way to say the orientation.
-
-    axes: two of the frame's axes as directions in the parent, e.g. ``{ z = [0, 1, 2], x = [1, 0, 0] }``;
-    the first is exact, the second is made perpendicular to it. Or all three, as a list [x, y, z].
-    axis: direction of z alone, where x and y do not matter; the frame is turned from its parent by the least
-    rotation that brings z there (for the parent's -z, by half a turn about x).
-    position: origin of the frame in its parent.  quaternion: w, x, y, z, of the frame in its parent.  rotation_vector:
-    axis times angle, of the frame in its parent.
-    """
+    """Position and orientation of a frame in its parent; at most one way to say the orientation."""
 
     position: Position = (0.0, 0.0, 0.0)
+    """origin of the frame in its parent"""
     quaternion: tuple[float, float, float, float] | None = None
+    """w, x, y, z, of the frame in its parent"""
     rotation_vector: RotationVector | None = None
+    """axis times angle, of the frame in its parent"""
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+    """two of the frame's axes as directions in the parent, e.g. ``{ z = [0, 1, 2], x = [1, 0, 0] }``; the first is
+    exact, the second is made perpendicular to it. Or all three, as a list [x, y, z]"""
     axis: Direction | None = None
+    """direction of z alone, where x and y do not matter; the frame is turned from its parent by the least rotation that
+    brings z there (for the parent's -z, by half a turn about x)"""
 
     @model_validator(mode="after")
     def _one_orientation(self) -> Self:

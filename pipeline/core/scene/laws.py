@@ -21,7 +21,7 @@ Value: TypeAlias = Annotated[float | str, BeforeValidator(any_quantity), WithJso
 
 
 def _listed(value: Any) -> Any:
-    """One entry may stand without its list."""
+    """One entry may be written without its list."""
     return [value] if isinstance(value, (int, float, str)) else value
 
 
@@ -41,25 +41,23 @@ Ends = Literal["not-a-knot", "natural", "clamped", "periodic"]
 
 
 class Constant(Part):
-    """It keeps a value.
-
-    value: the value.
-    """
+    """It keeps a value."""
 
     type: Literal["constant"]
     value: Value = 0.0
+    """the value"""
 
 
 class Step(Part):
-    """ADAMS STEP: a cubic from one value to the next, flat outside; several are summed (eq. 29, 35).
-
-    start, end: times at which each step begins and ends.  change: by how much each step changes the value.
-    """
+    """ADAMS STEP: a cubic from one value to the next, flat outside; several are summed (eq. 29, 35)."""
 
     type: Literal["step"]
     start: Annotated[Times, Field(max_length=MOST_STEPS)]
+    """times at which each step begins and ends"""
     end: Times
+    """times at which each step begins and ends"""
     change: Values
+    """by how much each step changes the value"""
 
     @field_validator("change")
     @classmethod
@@ -89,31 +87,30 @@ def _coefficient(value: Any) -> Any:
 
 
 class Polynomial(Part):
-    """c0 + c1 (t - origin) + c2 (t - origin)^2 + ...; in SI units, or as ``["30 deg", "10 deg/s"]``.
-
-    coefficients: c0, c1, c2 and so on.  origin: time from which t is counted.
-    """
+    """c0 + c1 (t - origin) + c2 (t - origin)^2 + ...; in SI units, or as ``["30 deg", "10 deg/s"]``."""
 
     type: Literal["polynomial"]
     coefficients: Annotated[
         tuple[Annotated[float | str, BeforeValidator(_coefficient)], ...],
         Field(min_length=1, max_length=COEFFICIENTS),
     ]
+    """c0, c1, c2 and so on"""
     origin: Time = 0.0
+    """time from which t is counted"""
 
 
 class Harmonic(Part):
-    """Offset plus the sum of amplitude sin(frequency t + phase); phase 90 deg is a cosine.
-
-    amplitude: of each sine.  frequency: of each sine, as angular velocity or in Hz.  phase: of each sine at t = 0;
-    default: 0.  offset: mean value.
-    """
+    """Offset plus the sum of amplitude sin(frequency t + phase); phase 90 deg is a cosine."""
 
     type: Literal["harmonic"]
     amplitude: Annotated[Values, Field(min_length=1)]
+    """of each sine"""
     frequency: Annotated[tuple[Rate, ...], _LIST]
+    """of each sine, as angular velocity or in Hz"""
     phase: Annotated[tuple[Angle, ...], _LIST] | None = None
+    """of each sine at t = 0; default: 0"""
     offset: Value = 0.0
+    """mean value"""
 
     @model_validator(mode="after")
     def _same_length(self) -> Self:
@@ -127,18 +124,18 @@ class Harmonic(Part):
 
 
 class Spline(Part):
-    """Interpolating spline: degree 3 with continuous second derivatives, degree 5 with continuous fourth ones.
-
-    ends: 'not-a-knot'; 'natural' (second derivative zero; of degree 5 third and fourth); 'clamped'
-    (first derivative zero; of degree 5 second too); 'periodic'. It must cover the run.
-    time: times of the points, ascending.  value: values at these times.  degree: 3 or 5.
-    """
+    """Interpolating spline: degree 3 with continuous second derivatives, degree 5 with continuous fourth ones."""
 
     type: Literal["spline"]
     time: tuple[Time, ...]
+    """times of the points, ascending"""
     value: tuple[Value, ...]
+    """values at these times"""
     degree: Literal[3, 5] = 3
+    """3 or 5"""
     ends: Ends = "not-a-knot"
+    """'not-a-knot'; 'natural' (second derivative zero; of degree 5 third and fourth); 'clamped' (first derivative zero;
+    of degree 5 second too); 'periodic'. It must cover the run"""
 
     @model_validator(mode="after")
     def _drawable(self) -> Self:
@@ -151,13 +148,12 @@ class Spline(Part):
 
 
 class Column(Part):
-    """A column of a table: its header, or its number from 1, and the unit of what is there.
-
-    column: header, or number from 1.  unit: of the numbers in the column.
-    """
+    """A column of a table: its header, or its number from 1, and the unit of what is there."""
 
     column: str | Annotated[int, Field(ge=1)]
+    """header, or number from 1"""
     unit: str
+    """of the numbers in the column"""
 
     @field_validator("unit")
     @classmethod
@@ -171,17 +167,21 @@ class Table(Part):
     """A spline through the rows of a CSV file, searched for next to the scene and in the folders above it.
 
     The file is read with the scene: `points` are its numbers, time in seconds, values in their column's unit.
-    file: name of the CSV file.  time, value: columns of the times and of the values.  degree: of the spline, 3 or 5.
-    ends: as of a spline.  points: what was read; not written in a scene.
     """
 
     type: Literal["table"]
     file: str
+    """name of the CSV file"""
     time: Column
+    """columns of the times and of the values"""
     value: Column
+    """columns of the times and of the values"""
     degree: Literal[3, 5] = 3
+    """of the spline, 3 or 5"""
     ends: Ends = "not-a-knot"
+    """as of a spline"""
     points: tuple[tuple[float, float], ...] = ()
+    """what was read; not written in a scene"""
 
     @model_validator(mode="before")
     @classmethod
@@ -206,13 +206,11 @@ class Table(Part):
 
 
 class Sum(Part):
-    """Sum of laws.
-
-    laws: those that are added.
-    """
+    """Sum of laws."""
 
     type: Literal["sum"]
     laws: Annotated[tuple["Bare", ...], Field(min_length=1)]
+    """those that are added"""
 
     @model_validator(mode="after")
     def _countable(self) -> Self:
@@ -222,23 +220,20 @@ class Sum(Part):
 
 
 class Section(Part):
-    """From this time on the law holds, until the next section starts.
-
-    start: time from which it holds.  law: what holds then.
-    """
+    """From this time on the law holds, until the next section starts."""
 
     start: Time
+    """time from which it holds"""
     law: "Bare"
+    """what holds then"""
 
 
 class Piecewise(Part):
-    """Laws one after the other; the first also holds before it starts.
-
-    sections: laws and their starts, in order.
-    """
+    """Laws one after the other; the first also holds before it starts."""
 
     type: Literal["piecewise"]
     sections: Annotated[tuple[Section, ...], Field(min_length=1)]
+    """laws and their starts, in order"""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -250,16 +245,17 @@ class Piecewise(Part):
 
 
 class Repeated(Part):
-    """A law that starts over: its course from `start` on for a `period`, `times` times; the last one continues.
-
-    period: length of one course.  times: how often.  start: where the first course begins.  law: what is repeated.
-    """
+    """A law that starts over: its course from `start` on for a `period`, `times` times; the last one continues."""
 
     type: Literal["repeated"]
     period: Annotated[Time, Field(gt=0)]
+    """length of one course"""
     times: Annotated[int, Field(ge=1)]
+    """how often"""
     start: Time = 0.0
+    """where the first course begins"""
     law: "Bare"
+    """what is repeated"""
 
     @model_validator(mode="after")
     def _countable(self) -> Self:
@@ -268,29 +264,30 @@ class Repeated(Part):
 
 
 class Delayed(Part):
-    """A law that counts time from a later moment on.
-
-    by: that moment [s].  law: what is delayed.
-    """
+    """A law that counts time from a later moment on."""
 
     type: Literal["delayed"]
     by: Time
+    """that moment [s]"""
     law: "Bare"
+    """what is delayed"""
 
 
 class Expression(Part):
     """An expression of the time `t` that makes polynomials and sines, as ``h * sin(w * t)^2``.
 
     `max`, `min`, `abs`, `sign` and `step` part it into pieces between start and end.
-    value: the expression.  values: named constants, each a number or text with its unit.  start, end: between which it
-    is used, where it has such kinks.
     """
 
     type: Literal["expression"]
     value: str
+    """the expression"""
     values: dict[str, Value] = Field(default_factory=dict)
+    """named constants, each a number or text with its unit"""
     start: Time = 0.0
+    """between which it is used, where it has such kinks"""
     end: Time | None = None
+    """between which it is used, where it has such kinks"""
 
     @model_validator(mode="after")
     def _lasts(self) -> Self:

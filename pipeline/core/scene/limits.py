@@ -28,23 +28,24 @@ Bytes = Annotated[float, BeforeValidator(_bytes), Field(gt=0.0), WithJsonSchema(
 
 
 class Limits(Part):
-    """What the work may take at most; it is estimated first, and refused at once (exit code 4).
-
-    time: on the clock, of each run, ensemble or study of sections; what there is by then is left, and can continue.
-    memory, disk: default: four fifths of what is free.
-    parts: bodies, joints, drives and loads, of each at most so many.
-    cells: elements or cells of one mesh.  modes: elastic coordinates of one body.
-    rows: of a run.  members: of an ensemble.
-    """
+    """What the work may take at most; it is estimated first, and refused at once (exit code 4)."""
 
     time: Annotated[Time, Field(gt=0.0)] | None = None
+    """on the clock, of each run, ensemble or study of sections; what there is by then is left, and can continue"""
     memory: Bytes | None = None
+    """default: four fifths of what is free"""
     disk: Bytes | None = None
+    """default: four fifths of what is free"""
     parts: Annotated[int, Field(ge=1)] = 2000
+    """bodies, joints, drives and loads, of each at most so many"""
     cells: Annotated[int, Field(ge=1)] = 500_000
+    """elements or cells of one mesh"""
     modes: Annotated[int, Field(ge=1)] = 2000
+    """elastic coordinates of one body"""
     rows: Annotated[int, Field(ge=1)] = 10_000_000
+    """of a run"""
     members: Annotated[int, Field(ge=2)] = 100_000
+    """of an ensemble"""
 
     @property
     def time_words(self) -> str:

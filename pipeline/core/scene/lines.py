@@ -1,6 +1,7 @@
-"""Where in a TOML file a path like ``body.rod.mesh`` is written: errors then name the line.
+"""Lines of TOML files: the one on which a path like ``body.rod.mesh`` is written, and what is wrong with a text that is
+not TOML, where it can be guessed with the line mended.
 
-The reader of the standard library gives no line numbers, so that keys are searched for in the text.
+The reader of the standard library gives no line numbers of keys, so that these are searched for in the text.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import tomllib
 from functools import lru_cache
 from pathlib import Path
 
+from flexclear.pipeline.core.scene.units import unit
 from flexclear.pipeline.core.system.errors import InputError, InputErrors
 
 _KEY = r"""(?:[\w-]+|"[^"]*"|'[^']*')"""
@@ -17,7 +19,7 @@ _DOTTED = rf"{_KEY}(?:[ \t]*\.[ \t]*{_KEY})*"
 _HEADER = re.compile(rf"^[ \t]*\[\[?[ \t]*({_DOTTED})[ \t]*\]\]?[ \t]*(?:#.*)?$")
 _VALUE = re.compile(rf"^[ \t]*({_DOTTED})[ \t]*=")
 _PLACE = re.compile(r"^(?P<file>.+\.toml) \[(?P<keys>[^\[\]]+)\]$")
-#: tables of edits that a path may stand below
+#: tables of edits that a path may be written below
 EDITS: tuple[tuple[str, ...], ...] = ((), ("replace",), ("set",))
 
 
@@ -88,3 +90,88 @@ def written(text: str) -> dict[tuple[str, ...], int]:
 
 def _keys(dotted: str) -> tuple[str, ...]:
     return tuple(key.strip("\"'") for key in re.findall(_KEY, dotted))
+
+
+#: characters of a line that is worth mending
+LONGEST_MENDED = 300
+_NUMBER = re.compile(r"\(at line (\d+)")
+_AT = re.compile(r" \(at (?:line \d+, column \d+|end of document)\)$")
+_OTHER = "names with other characters than letters A to z, digits, - and _ are written in quotation marks"
+#: text in quotation marks, or a comment, both left alone; or a number and what is after it like a unit
+_PARTS = re.compile(
+    r"""("[^"]*"|'[^']*'|\#.*)"""
+    r"""|(?<![\w.])([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)[ \t]*"""
+    r"""((?:[^\W\d_]|[%°])[^,\]}\#"'=]*)"""
+)
+
+
+def not_toml(path: Path, text: str, message: str) -> InputError:
+    """The error of a file with this text, which the reader of TOML refuses with this message."""
+    match, lines = _NUMBER.search(message), text.splitlines()
+    number = int(match[1]) if match else 0
+    line = lines[number - 1] if 0 < number <= len(lines) else ""
+    where = f"{path}, line {number}" if number else str(path)
+    problem, hint = _guessed(line) or _said(message, line)
+    return InputError(where, f"is not TOML: {problem}", hint)
+
+
+def _guessed(line: str) -> tuple[str, str] | None:
+    """What is probably wrong with a line, and what to write instead; None where nothing usual is."""
+    bare = line.strip()
+    value = re.match(r"([\w.\"'-]+)\s*=\s*(.*)$", bare)
+    if bare.startswith(("//", ";", "/*")):
+        return f"a comment begins with #: {bare}", f"write # {bare.lstrip('/;* ')}"
+    if len(re.findall(r"(?<!\\)\"", bare.partition(" #")[0])) % 2:
+        return (
+            f"a quotation mark is missing: {bare}",
+            'text and quantities with units are written between two marks: "1 mm"',
+        )
+    quoted = _quoted(line) if len(line) <= LONGEST_MENDED else line
+    if quoted != line:
+        return f"a quantity with a unit needs quotation marks: {bare}", f"write {quoted.strip()}"
+    if value and re.fullmatch(r"[-+]?\d+,\d+", value[2]):
+        return f"a decimal comma is none of TOML's: {bare}", f"write {value[1]} = {value[2].replace(',', '.')}"
+    if value and re.fullmatch(r"[A-Za-z][\w -]*", value[2]) and value[2] not in ("true", "false", "inf", "nan"):
+        return f"text needs quotation marks: {bare}", f'write {value[1]} = "{value[2]}"'
+    if value and not value[2].partition("#")[0]:
+        return f"a value is missing: {bare}", "write one, or take the line away"
+    colon = re.match(r"([\w.-]+)\s*:\s*(.+)$", bare)
+    if colon:
+        return f"key and value are joined by =: {bare}", f"write {colon[1]} = {colon[2]}"
+    return None
+
+
+def _said(message: str, line: str) -> tuple[str, str | None]:
+    """The reader's own message without its path, and a hint where it needs one."""
+    text = _AT.sub("", message)
+    twice = re.match(r"Cannot declare \((.*?),?\) twice", text)
+    if twice:
+        name = ".".join(re.findall(r"'([^']*)'", twice[1]))
+        return f"the table [{name}] is there twice", "give it another name, or join both"
+    if "Unescaped '\\'" in text or "hex value" in text:
+        return f'\\ begins a special character in "...": {line.strip()}', "write / between folders, on Windows, too"
+    if text == "Cannot overwrite a value":
+        return f"a key is given twice: {line.strip()}", "take one of the two away"
+    if "key part" in text and line.strip().endswith("{"):
+        return f"{text}: {line.strip()}", "a table in { } is on one line; longer ones have a [heading] of their own"
+    if "Unclosed" in text or "Expected ']'" in text:
+        hint = _OTHER if _odd_name(line) else "close each bracket, with commas between entries"
+        return f"{text}: {line.strip()}", hint
+    return text, _OTHER if "after a key" in text or "table declaration" in text else None
+
+
+def _odd_name(line: str) -> bool:
+    """Whether the name of a table has characters that TOML takes in quotation marks only."""
+    return bool(re.match(r"\s*\[[^\]\"']*[^\]\"'\x00-\x7f]", line))
+
+
+def _quoted(line: str) -> str:
+    """The line with its quantities in quotation marks."""
+
+    def mended(part: re.Match[str]) -> str:
+        if part[1] is not None or unit(part[3]) is None:
+            return part[0]
+        rest = part[3][len(part[3].rstrip()) :]
+        return f'"{part[2]} {part[3].strip()}"{rest}'
+
+    return _PARTS.sub(mended, line)

@@ -15,9 +15,8 @@ from typing import Annotated, Any
 from pydantic import TypeAdapter, ValidationError
 
 from flexclear.pipeline.core.scene.fields import LONGEST_NAME
-from flexclear.pipeline.core.scene.file_kinds import SCENE, require_kind
 from flexclear.pipeline.core.scene.limits import check_parts
-from flexclear.pipeline.core.scene.not_toml import not_toml
+from flexclear.pipeline.core.scene.lines import not_toml
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.solver import NAMING
@@ -30,7 +29,7 @@ from flexclear.pipeline.core.system.file_dependencies import note
 FAMILIES = ("body", "joint", "drive", "load", "stop", "gear", "event")
 SETTINGS = ("time", "start", "solver", "output", "ensemble", "sections", "accuracy", "limits", "view")
 #: bytes that no scene or recipe needs: as many as the reader of TOML takes in a second, whatever they are
-LARGEST = 1 << 20
+LARGEST_FILE = 1 << 20
 #: a key of more parts than a scene has levels; the reader of TOML takes their number squared
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')"""
 DEEP = re.compile(rf"(?<![\w\\-])(?:{_PART}[ \t]*+\.[ \t]*+){{50}}")
@@ -39,6 +38,20 @@ LONGEST_CHAIN = 50
 #: keys of parts that name files, which are searched for where the scene is
 FILES = ("mesh", "file")
 EDITS = ("extends", "replace", "set", "remove")
+#: what a TOML file may be
+SCENE, SWEEP, RECIPE = "a scene", "a sweep of a scene", "a mesh recipe"
+#: keys that only files of a kind have
+TYPICAL_KEYS = {
+    SCENE: {"body", "joint", "extends", "time"},
+    SWEEP: {"vary", "keep", "scene"},
+    RECIPE: {"shape", "material", "section", "interfaces", "elements"},
+}
+#: what each kind is for, after its path
+USE = {
+    SCENE: "flexclear run {path}",
+    SWEEP: "flexclear sweep {path}",
+    RECIPE: 'flexclear check {path} looks at it; bodies of scenes name it: mesh = "{path}"',
+}
 
 
 def load_scene(path: str | Path, override: Mapping[str, object] | None = None) -> Scene:
@@ -256,11 +269,11 @@ def read_toml(path: Path) -> dict[str, Any]:
         status = path.stat()
         if not stat.S_ISREG(status.st_mode):
             raise InputError(str(path), "cannot be read: it is no ordinary file", "name a TOML file")
-        if status.st_size > LARGEST:
+        if status.st_size > LARGEST_FILE:
             raise InputError(
                 str(path),
-                f"is larger than {LARGEST >> 20} MB",
-                "name a TOML file; longer courses of a law stand in a table (CSV)",
+                f"is larger than {LARGEST_FILE >> 20} MB",
+                "name a TOML file; longer courses of a law go into a table (CSV)",
             )
         text = path.read_text(encoding="utf-8-sig")
         if DEEP.search(text):
@@ -278,6 +291,19 @@ def read_toml(path: Path) -> dict[str, Any]:
         raise InputError(str(path), "nests tables or lists too deeply to be read") from None
     except ValueError as error:  # a NUL in the path, a number of more digits than Python reads
         raise InputError(str(path), f"cannot be read: {error}", "name a TOML file") from None
+
+
+def kind_of_file(table: Mapping[str, Any]) -> str:
+    """SCENE, SWEEP or RECIPE: the kind that most of a file's keys belong to; SCENE where none decides."""
+    matches = {kind: len(keys & set(table)) for kind, keys in TYPICAL_KEYS.items()}
+    return max(matches, key=lambda kind: matches[kind])
+
+
+def require_kind(table: Mapping[str, Any], path: Path, requested: str) -> None:
+    """InputError when the table in a file is of another kind than requested."""
+    kind = kind_of_file(table)
+    if kind != requested and (kind != SCENE or TYPICAL_KEYS[SCENE] & set(table)):
+        raise InputError(str(path), f"is {kind}, not {requested}", USE[kind].format(path=path))
 
 
 def _neighbours(path: Path) -> str | None:
@@ -406,7 +432,7 @@ def _absolute_files(table: dict[str, Any], path: Path) -> None:
 
 
 def _tables(node: object) -> Iterator[dict[str, Any]]:
-    """Laws that stand in a file, at any depth."""
+    """Laws that are read from a file, at any depth."""
     if isinstance(node, dict):
         if node.get("type") == "table" and isinstance(node.get("file"), str) and "points" not in node:
             yield node

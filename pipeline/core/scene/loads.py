@@ -1,6 +1,6 @@
 """Loads: gravity, forces and torques on frames, springs and dampers, and what acts along joint coordinates.
 
-A load of type 'point-force' acts as the class of the same name in `pipeline.dynamics.loads.point_force` says.
+A load of type 'point-force' acts as `pipeline.dynamics.loads.point_force` says.
 """
 
 import math
@@ -10,7 +10,16 @@ from typing import Annotated, Any, Literal, Self, TypeAlias, get_args
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from flexclear.pipeline.core.scene.expression import BENT
-from flexclear.pipeline.core.scene.fields import Acceleration, Damping, FrameName, Length, Part, Stiffness, Time
+from flexclear.pipeline.core.scene.fields import (
+    Acceleration,
+    Damping,
+    FrameName,
+    Length,
+    OnCoordinate,
+    Part,
+    Stiffness,
+    Time,
+)
 from flexclear.pipeline.core.scene.laws import Bare, Value
 from flexclear.pipeline.core.scene.units import quantity
 
@@ -103,53 +112,50 @@ BushingDamping: TypeAlias = _field("damping", "damping", "force per angular velo
 
 
 class Gravity(Part):
-    """Uniform acceleration field, world axes.
-
-    acceleration: of a falling body, world axes.
-    """
+    """Uniform acceleration field, world axes."""
 
     type: Literal["gravity"]
     acceleration: Acceleration
+    """of a falling body, world axes"""
 
 
 class PointForce(Part):
-    """Force [N] at the origin of a frame; each component a value or a law of time.
-
-    axes: those of the world, or those of the frame, with which the force then turns.
-    force: components x, y, z [N].
-    """
+    """Force [N] at the origin of a frame; each component a value or a law of time."""
 
     type: Literal["point-force"]
     frame: FrameName
     force: Components
+    """components x, y, z [N]"""
     axes: Literal["world", "frame"] = "world"
+    """those of the world, or those of the frame, with which the force then turns"""
 
 
 class PointTorque(Part):
-    """Torque [N m] on the body of a frame; as `PointForce`.
-
-    torque: components x, y, z [N m].  axes: those of the world, or of the frame.
-    """
+    """Torque [N m] on the body of a frame; as `PointForce`."""
 
     type: Literal["point-torque"]
     frame: FrameName
     torque: Components
+    """components x, y, z [N m]"""
     axes: Literal["world", "frame"] = "world"
+    """those of the world, or of the frame"""
 
 
 class SpringDamper(Part):
     """Acts between the origins of two frames, along the line between them.
 
     Tension: stiffness (length - free_length) + damping (rate of the length).
-    between: the two frames.  stiffness: force per length.  damping: force per speed.  free_length: length at which the
-    spring neither pulls nor pushes.
     """
 
     type: Literal["spring-damper"]
     between: tuple[FrameName, FrameName]
+    """the two frames"""
     stiffness: Annotated[Stiffness, Field(ge=0.0)] = 0.0
+    """force per length"""
     damping: Annotated[Damping, Field(ge=0.0)] = 0.0
+    """force per speed"""
     free_length: Annotated[Length, Field(ge=0.0)] | None = None
+    """length at which the spring neither pulls nor pushes"""
 
     @model_validator(mode="after")
     def _acts(self) -> Self:
@@ -160,26 +166,19 @@ class SpringDamper(Part):
         return self
 
 
-class JointForce(Part):
-    """Force [N] or torque [N m] along a joint coordinate, on the joint's second body: a motor of given strength.
-
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  force: force or torque over
-    time.
-    """
+class JointForce(OnCoordinate):
+    """Force [N] or torque [N m] along a joint coordinate, on the joint's second body: a motor of given strength."""
 
     type: Literal["joint-force"]
-    joint: str
-    coordinate: str | None = None
     force: Bare
+    """force or torque over time"""
 
 
 class _ByExpression(Part):
-    """What loads by an expression have. It combines `values`, quantities of position and velocity, and the time `t`.
-
-    values: named constants, each a number or text with its unit.
-    """
+    """What loads by an expression have. It combines `values`, quantities of position and velocity, and the time `t`."""
 
     values: dict[str, Value] = Field(default_factory=dict)
+    """named constants, each a number or text with its unit"""
 
     @property
     def texts(self) -> tuple[str, ...]:
@@ -193,85 +192,71 @@ class _ByExpression(Part):
         return any(f"{name}(" in text.replace(" ", "") for name in BENT for text in self.texts)
 
 
-class JointExpression(_ByExpression):
-    """Force [N] or torque [N m] along a joint coordinate, on the joint's second body, by an expression.
-
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  force: the expression, as
-    ``-k * max(0, guide.position - 10 mm)^1.5``.  values: named constants, each a number or text with its unit.
-    """
+class JointExpression(OnCoordinate, _ByExpression):
+    """Force [N] or torque [N m] along a joint coordinate, on the joint's second body, by an expression."""
 
     type: Literal["joint-expression"]
-    joint: str
-    coordinate: str | None = None
     force: str
+    """the expression, as ``-k * max(0, guide.position - 10 mm)^1.5``"""
 
 
 class LineExpression(_ByExpression):
-    """Tension between the origins of two frames, along the line between them, by an expression.
-
-    between: the two frames.  force: the expression; positive pulls them together.  `length` is their distance, `rate`
-    that of the length.  values: named constants, each a number or text with its unit.
-    """
+    """Tension between the origins of two frames, along the line between them, by an expression."""
 
     type: Literal["line-expression"]
     between: tuple[FrameName, FrameName]
+    """the two frames"""
     force: str
+    """the expression; positive pulls them together. `length` is their distance, `rate` that of the length"""
 
 
 class PointExpression(_ByExpression):
-    """Force [N] at the origin of a frame by an expression for each component, or by one whose value is a vector.
-
-    axes: those of the world, or those of the frame, with which the force then turns.
-    force: components x, y, z, or one vector.  values: named constants, each a number or text with its unit.
-    """
+    """Force [N] at the origin of a frame by an expression for each component, or by one whose value is a vector."""
 
     type: Literal["point-expression"]
     frame: FrameName
     force: str | tuple[str, str, str]
+    """components x, y, z, or one vector"""
     axes: Literal["world", "frame"] = "world"
+    """those of the world, or those of the frame, with which the force then turns"""
 
 
-class JointSpring(Part):
+class JointSpring(OnCoordinate):
     """Spring and damper along a joint coordinate: -stiffness (coordinate - rest) - damping (its rate).
 
     Turns are counted: an angle may grow beyond 180 deg.
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  stiffness: per unit of the
-    coordinate.  damping: per unit of its rate.  rest: coordinate at which the spring does nothing.
     """
 
     type: Literal["joint-spring"]
-    joint: str
-    coordinate: str | None = None
     stiffness: Value = 0.0
+    """per unit of the coordinate"""
     damping: Value = 0.0
+    """per unit of its rate"""
     rest: Value = 0.0
+    """coordinate at which the spring does nothing"""
 
 
 class Coulomb(Part):
-    """Friction force [N] or torque [N m] over the speed: rises to `static` at v_static, falls to `dynamic`.
-
-    static, dynamic: friction at the speeds v_static and v_dynamic.  v_static, v_dynamic: speeds along the coordinate,
-    the first below the second.
-    """
+    """Friction force [N] or torque [N m] over the speed: rises to `static` at v_static, falls to `dynamic`."""
 
     static: Value
+    """friction at the speeds v_static and v_dynamic"""
     dynamic: Value
+    """friction at the speeds v_static and v_dynamic"""
     v_static: Value
+    """speeds along the coordinate, the first below the second"""
     v_dynamic: Value
+    """speeds along the coordinate, the first below the second"""
 
 
-class JointFriction(Part):
-    """Friction along a joint coordinate: viscous coefficient times the rate, and Coulomb's of given strength.
-
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.  viscous: friction per unit of
-    the rate.  coulomb: friction of given strength.
-    """
+class JointFriction(OnCoordinate):
+    """Friction along a joint coordinate: viscous coefficient times the rate, and Coulomb's of given strength."""
 
     type: Literal["joint-friction"]
-    joint: str
-    coordinate: str | None = None
     viscous: Value = 0.0
+    """friction per unit of the rate"""
     coulomb: Coulomb | None = None
+    """friction of given strength"""
 
     @property
     def bends(self) -> bool:
@@ -283,16 +268,16 @@ class Bushing(Part):
     """Elastic mount between two frames: force -(stiffness x + damping dx/dt) on six displacements x of the second one.
 
     The displacements are those of the second frame in the first one's axes: x, y, z of its origin and the rotation
-    vector, which is followed up to a full turn.  stiffness, damping: six numbers on the diagonal, or a symmetric 6x6
-    matrix that stores and takes energy.
-
-    between: the frame it is mounted in, and the frame it carries.
+    vector, which is followed up to a full turn.
     """
 
     type: Literal["bushing"]
     between: tuple[FrameName, FrameName]
+    """the frame it is mounted in, and the frame it carries"""
     stiffness: BushingStiffness = NOTHING
+    """six numbers on the diagonal, or a symmetric 6x6 matrix that stores and takes energy"""
     damping: BushingDamping = NOTHING
+    """six numbers on the diagonal, or a symmetric 6x6 matrix that stores and takes energy"""
 
     @model_validator(mode="after")
     def _acts(self) -> Self:
@@ -301,27 +286,23 @@ class Bushing(Part):
         return self
 
 
-class _Controller(Part):
-    """What controllers have. They push `joint` along its coordinate by a law of the error = reference - measured.
+class _Controller(OnCoordinate):
+    """What controllers have. They push `joint` along its coordinate by a law of the error = reference - measured."""
 
-    measured: the coordinate that is measured, ``A`` or ``A.rotation``; default: the one that is pushed.
-    reference: a law of time of the measured coordinate.
-    proportional, integral, derivative: gains [force, or torque, per unit of the measured coordinate;
-    1/s of it; s of it].
-    limits: least and largest force.  tracking_time: how fast the integral follows a limited output [s]; default
-    proportional/integral.
-    joint: name of the joint.  coordinate: name of its coordinate, where it has several.
-    """
-
-    joint: str
-    coordinate: str | None = None
     measured: str | None = None
+    """the coordinate that is measured, ``A`` or ``A.rotation``; default: the one that is pushed"""
     reference: Bare
+    """a law of time of the measured coordinate"""
     proportional: Value = 0.0
+    """gain [force, or torque, per unit of the measured coordinate]"""
     integral: Value = 0.0
+    """gain of the integral [1/s of the proportional unit]"""
     derivative: Value = 0.0
+    """gain of the derivative [s of the proportional unit]"""
     limits: tuple[Value, Value] | None = None
+    """least and largest force"""
     tracking_time: Annotated[Time, Field(gt=0.0)] | None = None
+    """how fast the integral follows a limited output [s]; default proportional/integral"""
 
 
 class Pid(_Controller):
@@ -335,11 +316,11 @@ class SampledPid(_Controller):
 
     At sample k: proportional e_k + I_k + derivative (e_k - e_(k-1))/period, no derivative at the first;
     I_(k+1) = I_k + period (integral e_k + (force - asked)/tracking_time).
-    period: time between two samples.
     """
 
     type: Literal["sampled-pid"]
     period: Annotated[Time, Field(gt=0.0)]
+    """time between two samples"""
 
 
 #: loads whose force is an expression

@@ -1,50 +1,81 @@
-"""What a run records: its regular output times, and what is recorded on request only.
+"""What a run records: its regular output times, and what is recorded on request only; how variables are described.
 
 A request is a key of ``[output]``, with the variables that it adds to the run's dataset below; the module of the same
 name in `pipeline.dynamics.record` makes them.
 """
 
+import re
 from collections.abc import Collection
+from dataclasses import dataclass
 from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Part, Position, Time
-from flexclear.pipeline.core.scene.variable import Schema, table
+from flexclear.pipeline.core.scene.fields import Part, Position, Time, require_one
+
+
+@dataclass(frozen=True, slots=True)
+class Variable:
+    """One variable of an artifact. `optional` ones are absent where the scene has no such part.
+
+    units: as UDUNITS reads them; empty for words.  turning: units of entries that turn instead of sliding, where a
+    dimension has both.  gaps: whether entries may be NaN, where there is nothing.
+    """
+
+    dims: tuple[str, ...]
+    units: str
+    long_name: str
+    optional: bool = False
+    turning: str = ""
+    gaps: bool = False
+
+
+Schema = dict[str, Variable]
+
+
+def table(text: str) -> Schema:
+    """Variables by name, one in each line: ``name | dimensions | units | long name``.
+
+    Behind the name ``?`` marks what is optional and ``~`` what may have gaps; ``units, units`` are those of entries
+    that slide and of those that turn. An indented line continues the long name of the line before.
+    """
+    variables = {}
+    for line in re.sub(r"\n +", " ", text.strip()).splitlines():
+        name, dims, units, long_name = (part.strip() for part in line.split("|", 3))
+        sliding, _, turning = units.partition(", ")
+        variables[name.rstrip("?~")] = Variable(
+            tuple(dims.split()), sliding, long_name, "?" in name, turning, gaps="~" in name
+        )
+    return variables
 
 
 class Gauge(Part):
-    """Where on the surface of a solid its stress is recorded: one of position, frame and region.
-
-    body: the solid, one of those in `stress`.  position: of the nearest node, body frame.  frame: a frame of its
-    recipe, for the nodes that are tied to it.  region: a named region of its mesh.
-    """
+    """Where on the surface of a solid its stress is recorded: one of position, frame and region."""
 
     body: str
+    """the solid, one of those in `stress`"""
     position: Position | None = None
+    """of the nearest node, body frame"""
     frame: str | None = None
+    """a frame of its recipe, for the nodes that are tied to it"""
     region: str | None = None
+    """a named region of its mesh"""
 
     @model_validator(mode="after")
     def _one_rule(self) -> Self:
-        rules = ("position", "frame", "region")
-        given = [name for name in rules if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise ValueError(f"one of {', '.join(rules)} says where, not {' and '.join(given) or 'none'}")
+        require_one(self, ("position", "frame", "region"), "says where")
         return self
 
 
 class Output(Part):
-    """Regular output interval; drive breaks and events are always added.
-
-    stress: flexible bodies whose stresses are recorded: section forces and peaks of rods, surfaces of solids.
-    gauges: where on solids stress is recorded next to the peak.
-    interval: time between two regular outputs.
-    """
+    """Regular output interval; drive breaks and events are always added."""
 
     interval: Annotated[Time, Field(gt=0.0)] = 1e-4
+    """time between two regular outputs"""
     stress: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """flexible bodies whose stresses are recorded: section forces and peaks of rods, surfaces of solids"""
     gauges: Annotated[dict[str, Gauge], Field(min_length=1)] | None = None
+    """where on solids stress is recorded next to the peak"""
 
     @model_validator(mode="after")
     def _gauges_are_on_stressed_bodies(self) -> Self:

@@ -1,12 +1,21 @@
-"""The parts of a scene: bodies and joints. An effect is a part; absent means not there."""
+"""The parts of a scene: bodies and what they look like, joints, stops and gears. An effect is a part; absent means not
+there."""
 
 import math
+import re
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, WithJsonSchema, model_validator
 
-from flexclear.pipeline.core.scene.appearance import Seen
-from flexclear.pipeline.core.scene.clearance import BallOnPlane, ClearanceRevolute, ClearanceSlot, ClearanceSpherical
+from flexclear.pipeline.core.scene.clearance import (
+    BallOnPlane,
+    ClearanceRevolute,
+    ClearanceSlot,
+    ClearanceSpherical,
+    JointFriction,
+    NormalLaw,
+    require_fitting,
+)
 from flexclear.pipeline.core.scene.fields import (
     AngularVelocity,
     FrameName,
@@ -14,6 +23,7 @@ from flexclear.pipeline.core.scene.fields import (
     Length,
     Mass,
     Number,
+    OnCoordinate,
     Part,
     PartName,
     Pose,
@@ -21,40 +31,120 @@ from flexclear.pipeline.core.scene.fields import (
     Positive,
     Time,
     Velocity,
+    given,
+    require_one,
 )
-from flexclear.pipeline.core.scene.joint_friction import JointFriction, require_fitting
+from flexclear.pipeline.core.scene.laws import Value
 from flexclear.pipeline.core.scene.units import quantity
+
+#: keys of a body that only pictures see
+UNSEEN = ("geometry", "color")
+
+
+class BoxShape(Part):
+    """A box about the origin of `pose`."""
+
+    type: Literal["box"]
+    size: Position
+    """lengths of the edges along x, y and z"""
+    pose: Pose = Pose()
+    """of the box's middle in the body frame"""
+
+    @model_validator(mode="after")
+    def _extended(self) -> Self:
+        if min(self.size) <= 0.0:
+            raise ValueError(f"the edges of a box are longer than zero, not {list(self.size)} m")
+        return self
+
+
+class CylinderShape(Part):
+    """A cylinder about the origin of `pose`, its axis along z."""
+
+    type: Literal["cylinder"]
+    radius: Annotated[Length, Positive]
+    """of the cylinder"""
+    length: Annotated[Length, Positive]
+    """along z"""
+    pose: Pose = Pose()
+    """of the cylinder's middle in the body frame"""
+
+
+class SphereShape(Part):
+    """A sphere about the origin of `pose`."""
+
+    type: Literal["sphere"]
+    radius: Annotated[Length, Positive]
+    """of the sphere"""
+    pose: Pose = Pose()
+    """of the sphere's middle in the body frame"""
+
+
+class FileShape(Part):
+    """A surface from a file that meshio reads: STL, VTK, PLY, OBJ; of volume meshes their boundary."""
+
+    type: Literal["file"]
+    file: str
+    """the file, searched for next to the scene"""
+    unit: Annotated[Length, Positive] = 1.0
+    """length of one unit of the file, as "1 mm"."""
+    pose: Pose = Pose()
+    """of the file's axes in the body frame"""
+
+
+Shape = Annotated[BoxShape | CylinderShape | SphereShape | FileShape, Field(discriminator="type")]
+
+
+def _color(value: Any) -> Any:
+    if isinstance(value, str) and not re.fullmatch("#[0-9a-fA-F]{6}", value):
+        raise ValueError(f"a colour is written as '#0072B2' (red, green and blue, hexadecimal), not '{value}'")
+    return value
+
+
+Color = Annotated[str, BeforeValidator(_color)]
+
+
+class Seen(Part):
+    """What pictures show of a body instead of what follows from its joints."""
+
+    geometry: tuple[Shape, ...] | None = None
+    """shapes that pictures show, [] for none; default: bars and plates between the joints"""
+    color: Color | None = None
+    """in pictures, as "#0072B2"."""
 
 
 class Ground(Seen):
-    """The fixed world; listed only to give it frames.
-
-    frames: named frames fixed in the world.
-    """
+    """The fixed world; listed only to give it frames."""
 
     type: Literal["ground"]
     frames: dict[PartName, Pose] = Field(default_factory=dict)
+    """named frames fixed in the world"""
 
 
-class RigidBody(Seen):
-    """Mass, centre of mass and inertia about it, all in the body frame.
+class Moving(Seen):
+    """What all bodies that move have."""
 
-    mass: mass of the body.  com: centre of mass in the body frame.  frames: named points with axes on the body, in the
-    body frame.  frame_tolerance: how far its frames may be moved so that the joints fit, where they nearly do; of
-    bodies from a mesh a thousandth of the distance of their frames, as the nodes of a hole know its middle no better.
-    """
+    pose: Pose | None = None
+    """start pose of the body frame; without it, it follows from a joint"""
+    velocity: Velocity | None = None
+    """start velocity of the centre of mass, world axes"""
+    angular_velocity: AngularVelocity | None = None
+    """start angular velocity of the body frame, world axes"""
+
+
+class RigidBody(Moving):
+    """Mass, centre of mass and inertia about it, all in the body frame."""
 
     type: Literal["rigid"]
     mass: Annotated[Mass, Positive]
+    """mass of the body"""
     com: Position = (0.0, 0.0, 0.0)
+    """centre of mass in the body frame"""
     inertia: Inertia
-    pose: Pose | None = Field(
-        default=None, description="start pose of the body frame; without it, it follows from a joint"
-    )
-    velocity: Velocity | None = Field(default=None, description="start velocity of the centre of mass, world axes")
-    angular_velocity: AngularVelocity | None = Field(default=None, description="start angular velocity, world axes")
     frames: dict[PartName, Pose] = Field(default_factory=dict)
+    """named points with axes on the body, in the body frame"""
     frame_tolerance: Annotated[Length, Field(ge=0.0)] = 0.0
+    """how far its frames may be moved so that the joints fit, where they nearly do; of bodies from a mesh a thousandth
+    of the distance of their frames, as the nodes of a hole know its middle no better"""
 
 
 def _hertz(value: Any) -> float:
@@ -69,99 +159,78 @@ Frequency = Annotated[
 
 
 class Modes(Part):
-    """Which elastic coordinates a flexible body keeps: one of count, up_to, compliance and mass says how many.
-
-    count: number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete
-    basis; 0 makes a rigid body with the recipe's mass and inertia.
-    up_to: highest frequency of the retained normal modes, e.g. "5000 Hz".
-    compliance: least fraction of the static compliance between the interfaces, in each of the six directions.
-    mass: least fraction of the body's mass that moves with the basis, in each direction.
-    interfaces: the recipe's frames that a basis is built for; default: the recipe's own list.
-    held: motions held by the reference "constrained", as "top.rz": frame and x, y, z, rx, ry or rz in its axes.
-    of: the reference whose shapes "mean-axis" is based on.
-    reference: name of the reference condition, as docs/structure.md lists them.
-    """
+    """Which elastic coordinates a flexible body keeps: one of count, up_to, compliance and mass says how many."""
 
     reference: str
+    """name of the reference condition, as docs/structure.md lists them"""
     count: Annotated[int, Field(ge=0)] | Literal["all"] | None = None
+    """number of elastic coordinates, static (constraint or attachment) modes included; "all" for a complete basis; 0
+    makes a rigid body with the recipe's mass and inertia"""
     up_to: Annotated[Frequency, Positive] | None = None
+    """highest frequency of the retained normal modes, e.g. "5000 Hz"."""
     compliance: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
+    """least fraction of the static compliance between the interfaces, in each of the six directions"""
     mass: Annotated[Number, Field(gt=0.0, le=1.0)] | None = None
+    """least fraction of the body's mass that moves with the basis, in each direction"""
     interfaces: tuple[str, ...] | None = None
+    """the recipe's frames that a basis is built for; default: the recipe's own list"""
     held: tuple[FrameName, ...] = ()
+    """motions held by the reference "constrained", as "top.rz": frame and x, y, z, rx, ry or rz in its axes"""
     of: str | None = None
+    """the reference whose shapes "mean-axis" is based on"""
 
     @model_validator(mode="after")
     def _one_choice(self) -> Self:
-        ways = ("count", "up_to", "compliance", "mass")
-        given = [name for name in ways if getattr(self, name) is not None]
-        if len(given) != 1:
-            shown = "nothing does" if not given else f"{' and '.join(given)} do"
-            raise ValueError(f"one of {', '.join(ways)} says how many modes are retained; here {shown}")
+        require_one(self, ("count", "up_to", "compliance", "mass"), "says how many modes are retained")
         return self
 
 
 class RatioPerMode(Part):
-    """Damping ratio of each elastic coordinate, in the order of the bundle's modes.
-
-    ratios: of each mode, of critical damping.
-    """
+    """Damping ratio of each elastic coordinate, in the order of the bundle's modes."""
 
     ratios: tuple[Annotated[Number, Field(ge=0.0)], ...]
+    """of each mode, of critical damping"""
 
 
 class Rayleigh(Part):
     """Damping matrix alpha M + beta K of the deformation; rigid motion of the body is not damped.
 
     alpha [1/s], beta [s]: the ratio of a mode with frequency omega is (alpha/omega + beta omega)/2.
-
-    alpha: of the mass [1/s].  beta: of the stiffness [s].
     """
 
     alpha: Annotated[Number, Field(ge=0.0)] = 0.0
+    """of the mass [1/s]"""
     beta: Annotated[Time, Field(ge=0.0)] = 0.0
+    """of the stiffness [s]"""
 
 
 class Stiffening(Part):
     """Bending shortens a beam: centrifugal and axial loads then stiffen it (or soften, in compression)."""
 
 
-class FlexibleBody(Seen):
-    """A body reduced from a mesh; its frames are those of the recipe.
-
-    pose: start pose of the undeformed mesh frame.
-    damping: one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh's; absent means none.
-    stiffening: ``{}`` for a beam that turns fast or carries large axial loads; absent means linear shapes.
-    mesh: file of the mesh recipe, relative to the scene.  modes: which elastic coordinates are retained.  velocity:
-    start
-    velocity of the centre of mass, world axes.  angular_velocity: start angular velocity of the body frame, world axes.
-    """
+class FlexibleBody(Moving):
+    """A body reduced from a mesh; its frames are those of the recipe, its body frame is that of the undeformed mesh."""
 
     type: Literal["flexible"]
     mesh: str
+    """file of the mesh recipe, relative to the scene"""
     modes: Modes
+    """which elastic coordinates are retained"""
     damping: Annotated[Number, Field(gt=0.0)] | RatioPerMode | Rayleigh | None = None
+    """one modal damping ratio of all elastic coordinates, a ratio per mode, or Rayleigh's; absent means none"""
     stiffening: Stiffening | None = None
-    pose: Pose | None = None
-    velocity: Velocity | None = None
-    angular_velocity: AngularVelocity | None = None
+    """``{}`` for a beam that turns fast or carries large axial loads; absent means linear shapes"""
 
 
-class MeshedRigidBody(Seen):
+class MeshedRigidBody(Moving):
     """A rigid body with the mass, the inertia and the frames of a mesh recipe: a flexible body without its modes.
 
     ``modes = { count = 0 }`` of a flexible body says the same; damping and stiffening then have nothing to act on.
-
-    mesh: file of the mesh recipe, relative to the scene.  pose: start pose of the mesh frame; without it, it follows
-    from a joint.  velocity: start velocity of the centre of mass, world axes.  angular_velocity: start angular
-    velocity, world axes.
     """
 
     type: Literal["rigid"]
     mesh: str
-    pose: Pose | None = None
-    velocity: Velocity | None = None
-    angular_velocity: AngularVelocity | None = None
+    """file of the mesh recipe, relative to the scene; the body frame is that of the mesh"""
 
     @model_validator(mode="before")
     @classmethod
@@ -199,15 +268,15 @@ Body = Annotated[
 class IdealJoint(Part):
     """Two frames; the axes of motion are those of the first, its axis is z.
 
-    A free joint holds nothing: it says that a body shall fly. The motion of a type 'planar' is in
-    `pipeline.dynamics.joints.planar`.
-    type: which motion it leaves free.  between: first frame, whose axes are those of motion, and second frame, each as
-    body.FRAME.  friction: follows the force that the joint carries; absent means none.
+    A free joint holds nothing: it says that a body shall fly. The motion of each type is in `pipeline.dynamics.joints`.
     """
 
     type: Literal["spherical", "revolute", "universal", "prismatic", "cylindrical", "planar", "fixed", "free"]
+    """which motion it leaves free"""
     between: tuple[FrameName, FrameName]
+    """first frame, whose axes are those of motion, and second frame, each as body.FRAME"""
     friction: JointFriction | None = None
+    """follows the force that the joint carries; absent means none"""
 
     @model_validator(mode="after")
     def _rubs(self) -> Self:
@@ -221,3 +290,54 @@ IDEAL: tuple[str, ...] = get_args(IdealJoint.model_fields["type"].annotation)
 Joint = Annotated[
     IdealJoint | ClearanceSpherical | ClearanceRevolute | ClearanceSlot | BallOnPlane, Field(discriminator="type")
 ]
+
+
+class Stop(OnCoordinate):
+    """Contact where a joint coordinate reaches an end; the coordinate's zero and sign are those of the joint."""
+
+    lower: Value | None = None
+    """the ends, one or both; angles continue beyond half a turn, from within half a turn of zero at the start"""
+    upper: Value | None = None
+    """the ends, one or both; angles continue beyond half a turn, from within half a turn of zero at the start"""
+    normal: NormalLaw
+    """a normal law of contacts with its stiffness, of angles in N m and rad"""
+    floor: Value | None = None
+    """least approach speed used as impact rate; without it 1e-6 rad/s, or of lengths that of contacts"""
+    initial_approach_speed: Value | None = None
+    """of an end that the scene's start has passed; without it, such a start is refused"""
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.lower is None and self.upper is None:
+            raise ValueError("a stop needs an end: give lower, upper or both; it has neither")
+        if self.normal.stiffness is None:
+            raise ValueError("the stiffness of a stop is unknown: give normal.stiffness")
+        mass = (self.normal.restitution, self.normal.delivered_restitution) != (None, None)
+        if self.normal.law == "kelvin-voigt" and mass and self.normal.effective_mass is None:
+            raise ValueError(
+                "the mass that meets a stop depends on the pose, so a linear stop needs a damping, "
+                "or a restitution with the effective_mass [kg or kg m^2] that is to rebound with it"
+            )
+        return self
+
+    @property
+    def ends(self) -> tuple[str, ...]:
+        """Which ends there are."""
+        return tuple(given(self, ("lower", "upper")))
+
+
+class Gear(Part):
+    """A joint coordinate that follows another one: change of `second` = ratio times change of `first`."""
+
+    first: str
+    """joints (``A``), with the coordinate where there are several (``A.rotation``)"""
+    second: str
+    """joints (``A``), with the coordinate where there are several (``A.rotation``)"""
+    ratio: Value
+    """a number; of a slide that follows an angle a length per angle ("10 mm/rad"), and the other way round"""
+
+    @model_validator(mode="after")
+    def _two(self) -> Self:
+        if self.first == self.second:
+            raise ValueError(f"a gear couples two coordinates; first and second are both '{self.first}'")
+        return self

@@ -58,7 +58,7 @@ class Plan:
     modes: elastic coordinates of flexible bodies that stay that need fewer than they have.
     integration: estimated error of the integration by quantity [SI].  evaluations: of the right-hand side, all that
     the plan has run.  runs: how many.  uncoupled: names of parts that nothing couples to the requested quantities.
-    meshes: finite elements of flexible bodies whose recipes tell them.  ledger_tolerance: of the planned run, where it
+    meshes: finite elements of flexible bodies whose recipes give them.  ledger_tolerance: of the planned run, where it
     is not the usual one.
     """
 

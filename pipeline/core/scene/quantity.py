@@ -138,13 +138,13 @@ class Quantity:
         """SI unit of its values and errors; an expression's as one of its terms has it, where one does: J or N m."""
         if not self.steps:
             return KINDS[self.kind].units[self.turns]
-        measured = self._measured()[0]
+        measured = measure(self.steps)[0]
         return next((t.unit for t in self.terms() if units.measured(t.unit) == measured), units.si(measured))
 
     @property
     def dim(self) -> str:
         """Dimension of its components: axis, quat, or none."""
-        return self._measured()[1] if self.steps else "" if self.component else KINDS[self.kind].dim
+        return measure(self.steps)[1] if self.steps else "" if self.component else KINDS[self.kind].dim
 
     @property
     def over_time(self) -> bool:
@@ -174,10 +174,6 @@ class Quantity:
         """The quantity that `written` gave."""
         owner, kind, component, turns, text, steps = data
         return cls(owner, kind, component, turns, text, tuple(_step(step) for step in steps))
-
-    def _measured(self) -> tuple[units.Exponents, str]:
-        """Exponents of the unit, and the dimension of the components; ValueError where the parts do not go together."""
-        return measure(self.steps)
 
 
 def _step(step: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Names in a scene that lead nowhere: frames, bodies and joints that are not there, found before anything is computed.
+"""Names in a scene that lead nowhere: frames, bodies and joints that are not there, reported before the work.
 
 It looks at the plain table, so that a scene with other mistakes is searched, too.
 """

@@ -1,8 +1,9 @@
 """From a name in a scene to the part it names, imported only when it is asked for.
 
-A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a table from the scene's name to
-``"module:object"``; some hold further tables of that shape. It imports none of its modules. Where a scene's models
-(`pipeline.core.scene`) name the parts of a family already, the table is made from them by `declared`.
+A family folder's ``__init__`` holds ``KIND`` (for messages) and ``NAMES``, a table from the scene's name to the part:
+``"module"``, or ``"module:object"`` where a module holds more than the part; a module in a folder next to the family's
+begins with a dot. It imports none of its modules. Where a scene's models (`pipeline.core.scene`) name the parts of a
+family already, the table is made from them by `declared`.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any, get_args
 from flexclear.pipeline.core.system.errors import InputError
 
 #: most names that a hint lists
-LISTED = 40
+LISTED_NAMES = 40
 #: longer names are compared with none
 LONGEST_NAME = 100
 
@@ -36,42 +37,43 @@ ELSEWHERE = (
     ),
     (("sine", "sin", "cosine", "sinusoidal"), "harmonic", ""),
     (("mu", "coefficient"), "dynamic", ""),
-    (("frames",), "mesh", "frames of a flexible body stand in its recipe"),
+    (("frames",), "mesh", "frames of a flexible body are in its recipe"),
     (("mass", "inertia", "com", "density"), "mesh", "of a flexible body they follow from its recipe"),
 )
 
 
-def listed(package: str, name: str, *, where: str, table: str = "NAMES") -> tuple[str, str]:
-    """Module (below the package) and object that a family lists under `name`; neither is imported.
+def listed(package: str, name: str, *, where: str) -> tuple[str, str]:
+    """Full name of the module, and object there or nothing, that a family lists under `name`; neither is imported.
 
     Raises InputError, placed at `where`, for a name that the family does not have.
     """
     family = sys.modules.get(package) or import_module(package)  # every command asks thousands of times
-    names: Mapping[str, str] = getattr(family, table)
+    names: Mapping[str, str] = family.NAMES
     if name not in names:
         raise InputError(where, f"no {family.KIND} is called '{name}'", suggestion(name, names))
     module, _, attribute = names[name].partition(":")
-    return module, attribute
+    return f"{package.rpartition('.')[0]}{module}" if module[0] == "." else f"{package}.{module}", attribute
 
 
-def module_of(package: str, name: str, *, where: str = "", table: str = "NAMES") -> str:
+def module_of(package: str, name: str, *, where: str = "") -> str:
     """Full name of the module that a family lists under `name`, which is not imported; InputError as of `listed`."""
-    return f"{package}.{listed(package, name, where=where, table=table)[0]}"
+    return listed(package, name, where=where)[0]
 
 
 def lookup(package: str, name: str, *, where: str) -> Any:
-    """The object that a family lists under `name` in its NAMES, its module imported now; InputError for others."""
+    """The module or object that a family lists under `name`, imported now; InputError for others."""
     module, attribute = listed(package, name, where=where)
-    return getattr(import_module(f"{package}.{module}"), attribute)
+    found = import_module(module)
+    return getattr(found, attribute) if attribute else found
 
 
 def declared(models: Iterable[Any], key: str = "type", made: str = "") -> dict[str, str]:
-    """The table of a family whose parts a scene's models declare: 'point-force' is in the module `point_force`.
+    """The table of a family whose parts a scene's models declare: 'point-force' is the module `point_force`.
 
-    The object there is called like the model, or `made`.  key: field of the models that holds the name.
+    made: name of the object there that is the part.  key: field of the models that holds the name.
     """
-    names = {name: model for model in models for name in get_args(model.model_fields[key].annotation)}
-    return {name: f"{module_name(name)}:{made or model.__name__}" for name, model in names.items()}
+    names = [name for model in models for name in get_args(model.model_fields[key].annotation)]
+    return {name: f"{module_name(name)}:{made}".rstrip(":") for name in names}
 
 
 def module_name(name: str) -> str:
@@ -91,5 +93,5 @@ def suggestion(name: str, known: Mapping[str, object] | list[str]) -> str:
     if matches:
         return f"did you mean '{matches[0]}'?"
     names = sorted(known)
-    more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
-    return "known: " + ", ".join(names[:LISTED]) + more if names else "there are none"
+    more = f" and {len(names) - LISTED_NAMES} more" if len(names) > LISTED_NAMES else ""
+    return "known: " + ", ".join(names[:LISTED_NAMES]) + more if names else "there are none"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.event_kinds import CHANGES, EVENT_KINDS
-from flexclear.pipeline.core.scene.output import VARIABLES
-from flexclear.pipeline.core.scene.variable import Schema, table
+from flexclear.pipeline.core.scene.output import VARIABLES, Schema, table
 
 #: stage 4: one run
 RUN: Schema = table(f"""

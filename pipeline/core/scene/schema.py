@@ -24,16 +24,17 @@ from flexclear.pipeline.core.scene.owners import owners
 from flexclear.pipeline.core.scene.parts import (
     Body,
     FlexibleBody,
+    Gear,
     Ground,
     IdealJoint,
     Joint,
     MeshedRigidBody,
     RigidBody,
+    Stop,
 )
 from flexclear.pipeline.core.scene.quantity import Quantity, parse, usual
 from flexclear.pipeline.core.scene.solver import NAMING, PlainIntegrator, Solver
 from flexclear.pipeline.core.scene.start import Start
-from flexclear.pipeline.core.scene.stops import Gear, Stop
 from flexclear.pipeline.core.scene.units import any_quantity, measured, quantity
 from flexclear.pipeline.core.system import file_names
 
@@ -44,13 +45,12 @@ MOST_SAMPLES = 1e6
 
 
 class TimeSpan(Part):
-    """Start and end of the run.
-
-    start, end: times at which the run begins and ends.
-    """
+    """Start and end of the run."""
 
     start: Time = 0.0
+    """times at which the run begins and ends"""
     end: Time
+    """times at which the run begins and ends"""
 
     @model_validator(mode="after")
     def _forward(self) -> Self:
@@ -60,47 +60,44 @@ class TimeSpan(Part):
 
 
 class Ensemble(Part):
-    """Members that start with the ball of every clearance joint offset in a random direction.
-
-    bodies: whose motion is recorded; default: the bodies that carry the clearance joints.
-    members: how many runs.  perturbation: by which length the balls are offset.  seed: of the random directions.
-    """
+    """Members that start with the ball of every clearance joint offset in a random direction."""
 
     members: Annotated[int, Field(ge=2)] = 16
+    """how many runs"""
     perturbation: Annotated[Length, Field(gt=0.0)] = 1e-8
+    """by which length the balls are offset"""
     seed: Annotated[int, Field(ge=0)] = 20190310
+    """of the random directions"""
     bodies: tuple[str, ...] | None = None
+    """whose motion is recorded; default: the bodies that carry the clearance joints"""
 
 
 class Sections(Part):
-    """A motion that its laws repeat, sampled once in each period: see ``flexclear sections``.
-
-    period: of the laws of drives and loads, from the run's start on; without it the run is one period.
-    phase: when in the period the motion is examined [s].  transient: periods that are not recorded, before the
-    `periods`
-    that are.  exponent_periods: how many of these are followed by a neighbour too, which gives the rate at which
-    motions part.  bodies: whose motion is recorded; default: as of an ensemble, or all without clearance.
-    periods: that are recorded.
-    """
+    """A motion that its laws repeat, sampled once in each period: see ``flexclear sections``."""
 
     period: Annotated[Time, Field(gt=0.0)] | None = None
+    """of the laws of drives and loads, from the run's start on; without it the run is one period"""
     phase: Annotated[Time, Field(ge=0.0)] = 0.0
+    """when in the period the motion is examined [s]"""
     transient: Annotated[int, Field(ge=0, le=1_000_000)] = 100
+    """periods that are not recorded, before the `periods` that are"""
     periods: Annotated[int, Field(ge=20, le=1_000_000)] = 500
+    """that are recorded"""
     exponent_periods: Annotated[int, Field(ge=20, le=1_000_000)] = 200
+    """how many of these are followed by a neighbour too, which gives the rate at which motions part"""
     bodies: tuple[str, ...] | None = None
+    """whose motion is recorded; default: as of an ensemble, or all without clearance"""
 
 
 class Request(Part):
-    """A requested accuracy: absolute in SI, or relative to the quantity's own size.
-
-    absolute: in SI.  unit: SI unit that the number was written with, if it was.  relative: fraction of the largest
-    change of the quantity.
-    """
+    """A requested accuracy: absolute in SI, or relative to the quantity's own size."""
 
     absolute: Annotated[Number, Field(gt=0.0)] | None = None
+    """in SI"""
     unit: str | None = None
+    """SI unit that the number was written with, if it was"""
     relative: Annotated[Number, Field(gt=0.0, lt=1.0)] | None = None
+    """fraction of the largest change of the quantity"""
 
 
 class Accuracy(Part):
@@ -109,15 +106,14 @@ class Accuracy(Part):
     The value is an absolute one with a unit (or bare, in SI), or a fraction like ``"0.1 %"`` or
     ``{ relative = 1e-6 }`` of the quantity's largest change; expressions are quoted, as
     ``"force(A1) - force(A2)" = "1 N"``.
-    quantities: a file writes them without this key.
-    allow_missed: what is missed is reported either way, and the run is stored; without this the command ends with an
-    error.
-    by_need: whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step.
     """
 
     quantities: dict[str, Request] = Field(default_factory=dict)
+    """a file writes them without this key"""
     allow_missed: bool = False
+    """what is missed is reported either way, and the run is stored; without this the command ends with an error"""
     by_need: bool | None = None
+    """whether the integrator is chosen, too; by default it is where `[solver]` names none and gives no step"""
 
     @model_validator(mode="before")
     @classmethod
@@ -131,32 +127,24 @@ class Accuracy(Part):
 
 
 class View(Part):
-    """What is examined; no effect on the motion.
+    """What is examined; no effect on the motion."""
 
-    watch: quantities that comparisons, tables and films show, as ``platform.position`` or ``A1.force - A2.force``;
-    default: those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts.
-    direction: from which pictures and films look at the mechanism, a vector from it to the eye; default: of a planar
-    mechanism its normal, else from above and in front.
-    """
-
-    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = Field(
-        default=None, description="quantities that comparisons, tables and films show, as 'platform.position'"
-    )
-    direction: Direction | None = Field(default=None, description="vector from the mechanism to the eye, world axes")
-    up: Direction | None = Field(
-        default=None, description="what is up in pictures, world axes; default: against gravity, else z"
-    )
-    zoom: Annotated[Number, Positive] | None = Field(
-        default=None, description="how many times larger than usual the mechanism is drawn"
-    )
-    exaggeration: Annotated[Number, Positive] | None = Field(
-        default=None, description="how many times larger than computed deformations are drawn; default: to be seen"
-    )
-    duration: Annotated[Time, Positive] | None = Field(default=None, description="of films; default: some 4 s")
-    impact_slowdown: Annotated[Number, Field(ge=1.0)] | None = Field(
-        default=None,
-        description="how many times slower than elsewhere films run around impacts; default: 8; 1 runs evenly",
-    )
+    watch: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """quantities that comparisons, tables and films show, as ``platform.position`` or ``A1.force - A2.force``; default:
+    those of `[accuracy]`, else the motion of the body with most joints, a reaction and the contacts"""
+    direction: Direction | None = None
+    """from which pictures and films look at the mechanism, a vector from it to the eye; default: of a planar mechanism
+    its normal, else from above and in front"""
+    up: Direction | None = None
+    """what is up in pictures, world axes; default: against gravity, else z"""
+    zoom: Annotated[Number, Positive] | None = None
+    """how many times larger than usual the mechanism is drawn"""
+    exaggeration: Annotated[Number, Positive] | None = None
+    """how many times larger than computed deformations are drawn; default: to be seen"""
+    duration: Annotated[Time, Positive] | None = None
+    """of films; default: some 4 s"""
+    impact_slowdown: Annotated[Number, Field(ge=1.0)] | None = None
+    """how many times slower than elsewhere films run around impacts; default: 8; 1 runs evenly"""
 
     @model_validator(mode="after")
     def _points(self) -> Self:
@@ -194,40 +182,44 @@ def _requested(name: str, value: Any) -> Any:
 
 
 class Scene(Part):
-    """Everything a scene file says, after composition. Names of parts are keys.
-
-    title: what it is, in a line.  description: more words.  body: bodies by name.  joint: joints by name, ideal ones
-    and ones with clearance.  drive: prescribed motions by name.  load: forces, springs, controllers and gravity by
-    name.  stop: ends of joint coordinates by name.  gear: coupled joint coordinates by name.  event: what ceases,
-    stops or changes in the run, by name. time: begin and end of the run. start: how the run begins, beyond poses
-    and velocities of bodies. solver: integrator and tolerance. output: what is recorded. ensemble: runs from nearby
-    starts. sections: repeated motion, looked at once in each period. accuracy: requested accuracy by quantity.
-    limits: what the work may take of the machine. view: what pictures and comparisons look at.
-    """
+    """Everything a scene file says, after composition. Names of parts are keys."""
 
     title: str
+    """what it is, in a line"""
     description: str = ""
+    """more words"""
     body: dict[PartName, Body]
+    """bodies by name"""
     joint: dict[PartName, Joint] = Field(default_factory=dict)
+    """joints by name, ideal ones and ones with clearance"""
     drive: dict[PartName, Drive] = Field(default_factory=dict)
+    """prescribed motions by name"""
     load: dict[PartName, Load] = Field(default_factory=dict)
+    """forces, springs, controllers and gravity by name"""
     stop: dict[PartName, Stop] = Field(default_factory=dict)
+    """ends of joint coordinates by name"""
     gear: dict[PartName, Gear] = Field(default_factory=dict)
+    """coupled joint coordinates by name"""
     event: dict[PartName, Event] = Field(default_factory=dict)
+    """what ceases, stops or changes in the run, by name"""
     time: TimeSpan
+    """begin and end of the run"""
     start: Start | None = None
+    """how the run begins, beyond poses and velocities of bodies"""
     solver: Solver = PlainIntegrator()
+    """integrator and tolerance"""
     output: Output = Output()
+    """what is recorded"""
     ensemble: Ensemble | None = None
+    """runs from nearby starts"""
     sections: Sections | None = None
+    """repeated motion, looked at once in each period"""
     accuracy: Accuracy | None = None
+    """requested accuracy by quantity"""
     limits: Limits = Limits()
+    """what the work may take of the machine"""
     view: View | None = None
-
-    def _amounts_are_allowed(self) -> None:
-        check_rows((self.time.end - self.time.start) / self.output.interval, self.output.interval, self.limits)
-        if self.ensemble is not None:
-            check_members(self.ensemble.members, self.limits)
+    """what pictures and comparisons look at"""
 
     def _samples_can_be_made(self) -> None:
         for name, load in self.load.items():
@@ -298,7 +290,9 @@ class Scene(Part):
     def check(self) -> None:
         """ValueError where parts and settings that are right by themselves do not go together; ResourceError where they
         ask for more than `[limits]` allows."""
-        self._amounts_are_allowed()
+        check_rows((self.time.end - self.time.start) / self.output.interval, self.output.interval, self.limits)
+        if self.ensemble is not None:
+            check_members(self.ensemble.members, self.limits)
         self._samples_can_be_made()
         self._quantities_are_there()
         check_formulas(self)
@@ -334,7 +328,7 @@ class Scene(Part):
         return [parse(one.name, self.owners()) for one in chosen]
 
     def _prescribed(self) -> set[str]:
-        """Rigid bodies whose motion drives tell: from the ground on by fixed joints and driven ones of one freedom."""
+        """Rigid bodies whose motion drives determine: fixed to the ground, or by driven joints of one freedom."""
         driven = {getattr(drive, "joint", None) for drive in self.drive.values()}
         prescribed = [j for n, j in self.joint.items() if j.type == "fixed" or (j.type in SINGLE and n in driven)]
         known = {name for name, body in self.body.items() if isinstance(body, Ground)}

@@ -14,27 +14,25 @@ NAMING = ("integrator", "rtol", "step")
 
 
 class Stepping(Part):
-    """What all integrators have.
-
-    rtol: relative tolerance; of the steps where they are chosen, and always of loop closures and Newton iterations.
-    ledger_tolerance: largest energy error of a run, as a fraction of the energy that it turns over; default 1e5 rtol,
-    but
-        from 1e-4 to 1e-3, where the error chooses the steps (1e-3 of methods that damp by their order: that of
-        generalized-alpha is 2), and 0.1 for fixed steps.
-    evaluations: most right-hand sides of one run.  step: present means steps of this length.
-    events: where contacts begin and end, ``at step ends`` only with fixed steps.
-    integrator: name, as docs/integrators.md lists them.
-    by_need: whether a dear run gets another integrator and tolerance, where the scene has no `[accuracy]`; by default
-        it does where `[solver]` gives neither of them and no step.
-    """
+    """What all integrators have."""
 
     integrator: str
+    """name, as docs/integrators.md lists them"""
     rtol: Annotated[Number, Field(ge=1e-14, le=1e-2)] = 1e-10
+    """relative tolerance; of the steps where they are chosen, and always of loop closures and Newton iterations"""
     ledger_tolerance: Annotated[Number, Field(gt=0.0)] | None = None
+    """largest energy error of a run, as a fraction of the energy that it turns over; default 1e5 rtol, but from 1e-4 to
+    1e-3, where the error chooses the steps (1e-3 of methods that damp by their order: that of generalized-alpha is
+    2), and 0.1 for fixed steps"""
     evaluations: Annotated[int, Field(gt=0, le=10**15)] = 50_000_000
+    """most right-hand sides of one run"""
     step: Annotated[Time, Field(gt=0.0)] | None = None
+    """present means steps of this length"""
     events: Literal["located", "at step ends"] = "located"
+    """where contacts begin and end, ``at step ends`` only with fixed steps"""
     by_need: bool | None = None
+    """whether an expensive run gets another integrator and tolerance, where the scene has no `[accuracy]`; by default
+    it does where `[solver]` gives neither of them and no step"""
 
     @model_validator(mode="after")
     def _located_unless_fixed(self) -> Self:
@@ -50,10 +48,12 @@ class Stepping(Part):
 
 
 class GeneralizedAlpha(Stepping):
-    """Implicit structural integrator; rho_inf: spectral radius at infinite frequency, 1 damps nothing."""
+    """Implicit structural integrator;"""
 
     integrator: Literal["generalized-alpha"]
+    """name, as docs/integrators.md lists them"""
     rho_inf: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.8
+    """spectral radius at infinite frequency, 1 damps nothing"""
 
 
 #: models of the integrators that have parameters of their own
@@ -65,6 +65,7 @@ class PlainIntegrator(Stepping):
     """Every integrator without parameters of its own."""
 
     integrator: Annotated[str, WithJsonSchema({"type": "string", "enum": PLAIN})] = DEFAULT
+    """name, as docs/integrators.md lists them"""
 
 
 def _known(value: Any) -> Any:

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, GetJsonSchemaHandler, model_validator
 
-from flexclear.pipeline.core.scene.fields import Number, Part, PartName
+from flexclear.pipeline.core.scene.fields import Number, OnCoordinate, Part, PartName, given
 
 #: the keys of one joint coordinate
 KEYS = ("position", "near", "velocity")
@@ -15,19 +15,19 @@ Measure = float | str
 
 
 class JointStart(Part):
-    """Start of one joint coordinate; its unit, where text gives one, is that of the coordinate or of its rate.
-
-    position: where it starts, exactly.  near: of several ways to assemble the mechanism, the one in which it is closest
-    to this; without the poses of bodies it is also where the assembly is searched for.  velocity: its rate.
-    """
+    """Start of one joint coordinate; its unit, where text gives one, is that of the coordinate or of its rate."""
 
     position: Measure | None = None
+    """where it starts, exactly"""
     near: Measure | None = None
+    """of several ways to assemble the mechanism, the one in which it is closest to this; without the poses of bodies it
+    is also where the assembly is searched for"""
     velocity: Measure | None = None
+    """its rate"""
 
     @model_validator(mode="after")
     def _something(self) -> Self:
-        if all(getattr(self, key) is None for key in KEYS):
+        if not given(self, KEYS):
             raise ValueError(f"one of {', '.join(KEYS)} says how the coordinate starts; here none does")
         if self.position is not None and self.near is not None:
             raise ValueError("position says where the coordinate starts, near only about where; give one of them")
@@ -42,13 +42,12 @@ def _coordinates(value: Any) -> Any:
 
 
 class ModalStart(Part):
-    """Deformation of a flexible body at the start, by its modes in the order of the bundle; those left out are zero.
-
-    coordinate: modal coordinates [m].  velocity: their rates [m/s]; without them, the bodies'.
-    """
+    """Deformation of a flexible body at the start, by its modes in the order of the bundle; those left out are zero."""
 
     coordinate: tuple[Number, ...] = ()
+    """modal coordinates [m]"""
     velocity: tuple[Number, ...] | None = None
+    """their rates [m/s]; without them, the bodies'"""
 
 
 class _Either:
@@ -63,16 +62,12 @@ class _Either:
 JointStarts = Annotated[dict[str, JointStart], BeforeValidator(_coordinates), _Either()]
 
 
-class Branch(Part):
-    """One way out of a change point: on which this joint coordinate changes most in the direction of `sign`.
+class Branch(OnCoordinate):
+    """One way out of a change point: on which this joint coordinate changes most in the direction of `sign`."""
 
-    joint, coordinate: as of a drive.  sign: 1 takes the branch on which the coordinate grows most, or falls least; -1
-    that on which it falls most, or grows least.
-    """
-
-    joint: str
-    coordinate: str | None = None
     sign: Literal[1, -1]
+    """1 takes the branch on which the coordinate grows most, or falls least; -1 that on which it falls most, or grows
+    least"""
 
 
 def _several(value: Any) -> Any:
@@ -81,22 +76,20 @@ def _several(value: Any) -> Any:
 
 
 class Start(Part):
-    """The start of the run.
-
-    at: "equilibrium", the static equilibrium with the drives where their laws start, and the joint coordinates whose
-    `position` is given held there; or "ideal", where the mechanism without clearance would start, each loose pin
-    resting in its socket on the side to which the joint's force presses it, flexible
-    bodies deformed as the loads of that moment hold them.
-    joint: of joints, by name; those with several coordinates by the coordinate's name below.
-    modal: of flexible bodies, by name.
-    branch: in a change point, which of the branches that cross there the motion takes; with several loops a list, each
-    choosing among what those before it have left.
-    """
+    """The start of the run."""
 
     at: At | None = None
+    """"equilibrium", the static equilibrium with the drives where their laws start, and the joint coordinates whose
+    `position` is given held there; or "ideal", where the mechanism without clearance would start, each loose pin
+    resting in its socket on the side to which the joint's force presses it, flexible bodies deformed as the loads of
+    that moment hold them"""
     joint: dict[PartName, JointStarts] = Field(default_factory=dict)
+    """of joints, by name; those with several coordinates by the coordinate's name below"""
     modal: dict[PartName, ModalStart] = Field(default_factory=dict)
+    """of flexible bodies, by name"""
     branch: Annotated[tuple[Branch, ...], BeforeValidator(_several)] = ()
+    """in a change point, which of the branches that cross there the motion takes; with several loops a list, each
+    choosing among what those before it have left"""
 
     @model_validator(mode="after")
     def _no_two_deformations(self) -> Self:

@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, PrivateAttr, ValidationError, model_validator
 
 from flexclear.pipeline.core.scene.fields import Part
-from flexclear.pipeline.core.scene.file_kinds import SWEEP, require_kind
-from flexclear.pipeline.core.scene.load import read_toml
+from flexclear.pipeline.core.scene.load import SWEEP, read_toml, require_kind
 from flexclear.pipeline.core.scene.units import any_quantity
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 
@@ -27,24 +26,26 @@ WAYS = (("values",), ("from", "to"), ("mean", "deviation"))
 
 
 class Parameter(Part):
-    """What values a parameter takes: those of a list, a range, or a normal distribution.
+    """What values a parameter takes: those of a list, a range, or a normal distribution."""
 
-    values: one by one.  from, to: a range, of `count` points in a grid; in samples a uniform distribution.
-    spacing: of a range; `log` needs ends of one sign.  mean, deviation: of a normal distribution, in samples.
-    places: the paths in the scene that all take the value; default: the parameter's name.
-    count: points of a range in a grid.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, populate_by_name=True)
+    model_config = ConfigDict(populate_by_name=True)
 
     values: Annotated[tuple[Any, ...], Field(min_length=1)] | None = None
+    """one by one"""
     first: Value | None = Field(default=None, alias="from")
+    """begin of a range, of `count` points in a grid; in samples of a uniform distribution"""
     last: Value | None = Field(default=None, alias="to")
+    """end of the range"""
     count: Annotated[int, Field(ge=2, le=MOST_POINTS)] | None = None
+    """points of a range in a grid"""
     spacing: Literal["linear", "log"] = "linear"
+    """of a range; `log` needs ends of one sign"""
     mean: Value | None = None
+    """of a normal distribution, in samples"""
     deviation: Value | None = None
+    """of a normal distribution, in samples"""
     places: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
+    """the paths in the scene that all take the value; default: the parameter's name"""
 
     @model_validator(mode="before")
     @classmethod
@@ -104,40 +105,39 @@ def number_and_unit(value: Any) -> tuple[float, str]:
 
 
 class Sample(Part):
-    """Points spread over all parameters together, instead of a grid.
-
-    method: scrambled Sobol sequence (best with a power of two), Latin hypercube, or independent random numbers.
-    points: how many.  seed: of the random numbers.
-    """
+    """Points spread over all parameters together, instead of a grid."""
 
     method: Literal["sobol", "latin-hypercube", "random"]
+    """scrambled Sobol sequence (best with a power of two), Latin hypercube, or independent random numbers"""
     points: Annotated[int, Field(ge=1, le=MOST_POINTS)]
+    """how many"""
     seed: Annotated[int, Field(ge=0)] = 1
+    """of the random numbers"""
 
 
 class Sweep(Part):
-    """Everything that a sweep file says.
-
-    scene: a scene file, or the name of one below scenes/.  set: changes of the scene that hold at all points.
-    vary: parameters by name; the name is a path in the scene unless `places` says which ones.
-    combine: every value with every other (grid), or the first values, the second ones and so on (list).
-    keep: what is recorded of each point, as ``slider.velocity.largest``.
-    members: starts of each point that differ by a hair (`[ensemble]` of the scene); mean and deviation are recorded.
-    error: run each point at a hundredth of its tolerance as well, and keep the differences.
-    title: what it is, in a line.  description: more words.  sample: points spread over all parameters, instead of a
-    grid.
-    """
+    """Everything that a sweep file says."""
 
     title: str = ""
+    """what it is, in a line"""
     description: str = ""
+    """more words"""
     scene: str
+    """a scene file, or the name of one below scenes/"""
     set: dict[str, Any] = Field(default_factory=dict)
+    """changes of the scene that hold at all points"""
     vary: Annotated[dict[str, Parameter], Field(min_length=1, max_length=MOST_PARAMETERS)]
+    """parameters by name; the name is a path in the scene unless `places` says which ones"""
     combine: Literal["grid", "list"] = "grid"
+    """every value with every other (grid), or the first values, the second ones and so on (list)"""
     sample: Sample | None = None
+    """points spread over all parameters, instead of a grid"""
     keep: Annotated[tuple[str, ...], Field(min_length=1)]
+    """what is recorded of each point, as ``slider.velocity.largest``"""
     members: Annotated[int, Field(ge=2)] | None = None
+    """starts of each point that differ by a hair (`[ensemble]` of the scene); mean and deviation are recorded"""
     error: bool = False
+    """run each point at a hundredth of its tolerance as well, and keep the differences"""
 
     _name: str = PrivateAttr(default="sweep")
 

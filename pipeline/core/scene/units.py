@@ -84,7 +84,7 @@ _EXPONENTS = {dimension: exponents for dimension, (exponents, _) in _DIMENSIONS.
 UNITS = {name: (factor, of) for of, (_, known) in _DIMENSIONS.items() for name, factor in known.items()}
 
 #: largest number, and one over the least: squares of products such as m l^2 must stay within floating point
-LARGEST = 1e50
+LARGEST_NUMBER = 1e50
 #: what the exponents belong to
 _BASE = ("kg", "m", "s", "rad")
 #: a unit and its power; powers of more digits measure nothing, and would not be numbers
@@ -92,7 +92,7 @@ _FACTOR = re.compile(r"([A-Za-z]+)(?:\^(-?\d(?:\.\d{1,3})?))?")
 _SPELLINGS = str.maketrans({"²": "^2", "³": "^3", "·": " ", "*": " ", "µ": "u", "μ": "u", "°": "deg"})
 
 #: characters of a quantity; more are none
-LONGEST = 200
+LONGEST_QUANTITY = 200
 _QUANTITY = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$")
 
 
@@ -214,10 +214,9 @@ def components(values: Iterable[object], dimension: str) -> list[float]:
 
 
 def _computable(number: float, written: object) -> float:
-    if number != 0.0 and not 1.0 / LARGEST <= abs(number) <= LARGEST:
-        raise ValueError(
-            f"{written!r} is beyond what can be computed with: {1.0 / LARGEST:g} to {LARGEST:g} in SI units"
-        )
+    if number != 0.0 and not 1.0 / LARGEST_NUMBER <= abs(number) <= LARGEST_NUMBER:
+        bounds = f"{1.0 / LARGEST_NUMBER:g} to {LARGEST_NUMBER:g}"
+        raise ValueError(f"{written!r} is beyond what can be computed with: {bounds} in SI units")
     return number
 
 
@@ -250,7 +249,7 @@ def _read(value: object, dimension: str) -> float:
 def _parts(text: str) -> re.Match[str] | None:
     """Number and unit; white space at the ends is not left to the expression, which would try it in many ways."""
     text = text.strip()
-    return _QUANTITY.fullmatch(text) if len(text) <= LONGEST else None
+    return _QUANTITY.fullmatch(text) if len(text) <= LONGEST_QUANTITY else None
 
 
 def any_quantity(value: object) -> float | str:

@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.system.errors import InputError, InputErrors
 
 #: findings that are put into words; nobody reads more of them, and each is compared with what could have been meant
-MOST = 500
+MOST_ERRORS = 500
 #: findings that a value is no whole number
 WHOLE = ("int_type", "int_parsing", "int_from_float")
 #: kinds of findings -> what was expected
@@ -59,7 +59,7 @@ TAGS = {
 def input_errors(path: Path | str, error: ValidationError, model: type[BaseModel]) -> InputErrors:
     """All validation errors of a file that should be a `model`."""
     places: dict[str, list[tuple[str, InputError]]] = {}
-    for e in error.errors(include_url=False)[:MOST]:
+    for e in error.errors(include_url=False)[:MOST_ERRORS]:
         invalid = _input_error(path, e, model)
         places.setdefault(invalid.place, []).append((e["type"], invalid))
     unique = {str(e): e for there in places.values() for e in _nearest(there)}
@@ -151,7 +151,7 @@ def _alternatives(annotation: Any) -> Iterator[Any]:
 
 
 def _inside(alternative: Any, key: Any) -> list[Any]:
-    """What may stand under a key of a table or list."""
+    """What may be under a key of a table or list."""
     if _is_model(alternative):
         alternative.model_rebuild()  # laws that are made of laws know what these are only then
         info = alternative.model_fields.get(key) if isinstance(key, str) else None

@@ -1,6 +1,9 @@
 """Variants of a scene: which of its effects can be taken away, the scene without some of them, as the ideal mechanism,
 and that as a file.
 
+Parts that nothing couples to what is asked for can be left out without any error. Joints, drives, loads, stops and
+gears couple the bodies and joints that they name; the fixed world couples nothing, gravity acts on each body by itself.
+
 An effect is named by the path that goes with it: ``joint.A1.clearance``, ``joint.A1.friction``, ``body.rod1.modes``,
 ``body.rod1.damping``, ``body.rod1.stiffening``, ``load.gravity``, ``stop.X``. A variant differs from its scene by parts
 replaced and removed only, so that it can be written as a file that extends the scene's.
@@ -11,14 +14,14 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flexclear.pipeline.core.scene.appearance import UNSEEN
 from flexclear.pipeline.core.scene.clearance import Clearance
-from flexclear.pipeline.core.scene.load import FAMILIES, edited
+from flexclear.pipeline.core.scene.load import FAMILIES, SETTINGS, edited
+from flexclear.pipeline.core.scene.parts import UNSEEN
 from flexclear.pipeline.core.scene.quantity import parse
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
@@ -35,7 +38,9 @@ OWNED = {CLEARANCE: ("contact", "worn"), "stop": ("contact",), FLEXIBILITY: ("mo
 #: joint with clearance -> the joint that connects the same frames without; slots and planes have none
 WITHOUT_CLEARANCE = {"clearance-revolute": "revolute", "clearance-spherical": "spherical"}
 #: keys of a flexible body that a rigid one from the same recipe has, too
-KEPT = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
+SHARED_KEYS = ("mesh", "pose", "velocity", "angular_velocity", *UNSEEN)
+#: settings that follow the parts: quantities of parts that are gone are no longer asked for or shown
+FOLLOWING = ("accuracy", "view", "ensemble")
 BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -98,13 +103,7 @@ def without(scene: Scene, gone: Collection[Effect]) -> Scene:
     """
     if not gone:
         return scene
-    changes = dict(_changes(scene, gone))
-    removed = [where for where, value in changes.items() if value is None]
-    table = {where: value for where, value in changes.items() if value is not None}
-    for family in dict.fromkeys(where.split(".")[0] for where in removed):
-        left = {n: p.model_dump(mode="json", exclude_none=True) for n, p in getattr(scene, family).items()}
-        table[family] = {n: p for n, p in left.items() if f"{family}.{n}" not in removed}
-    result = edited(scene, table | _settings(scene, gone) | _owned(scene, gone))
+    result = edited(scene, dict(_changes(scene, gone)) | _settings(scene, gone) | _owned(scene, gone))
     result._name = f"{scene.name} without {', '.join(sorted(effect.name for effect in gone))}"
     return result
 
@@ -190,7 +189,7 @@ def _changes(scene: Scene, gone: Collection[Effect]) -> Mapping[str, Any]:
         if effect.kind == CLEARANCE:
             changes[f"joint.{name}"] = {"type": WITHOUT_CLEARANCE[part.type], "between": list(part.between)}
         elif effect.kind == FLEXIBILITY:
-            unchanged = part.model_dump(mode="json", include=set(KEPT), exclude_none=True)
+            unchanged = part.model_dump(mode="json", include=set(SHARED_KEYS), exclude_none=True)
             changes[f"body.{name}"] = {"type": "rigid", **unchanged}
         elif effect.name.count(".") == 1:
             changes[effect.name] = None
@@ -209,6 +208,57 @@ def with_modes(scene: Scene, counts: Mapping[str, int]) -> Scene:
         modes = body.modes.model_dump(mode="json", exclude_none=True, exclude={"count", "up_to", "compliance", "mass"})
         changes[f"body.{name}.modes"] = {**modes, "count": count}
     return edited(scene, changes) if changes else scene
+
+
+def uncoupled(scene: Scene, asked: Collection[str]) -> tuple[str, ...]:
+    """Places, such as ``body.bob``, of all parts that nothing couples to the parts of the names asked for.
+
+    Empty where a name asked for is none of a part, and where a setting speaks of what could be left out.
+    """
+    table = scene.model_dump(mode="json", exclude_none=True)
+    parts = {f"{family}.{name}": part for family in FAMILIES for name, part in table.get(family, {}).items()}
+    moving = [name for name, body in scene.body.items() if body.type != "ground"]
+    neighbours: dict[str, set[str]] = {f"body.{name}": set() for name in moving}
+    for part_name, part in parts.items():
+        if part_name.startswith("body."):
+            continue
+        stems = {text.partition(".")[0] for text in _texts(part)}
+        named = {f"body.{n}" for n in stems & set(moving)} | {f"joint.{n}" for n in stems & set(scene.joint)}
+        for other in named - {part_name}:
+            neighbours.setdefault(part_name, set()).add(other)
+            neighbours.setdefault(other, set()).add(part_name)
+    ends = [part_name for part_name in neighbours if part_name.partition(".")[2] in asked]
+    if {part_name.partition(".")[2] for part_name in ends} != set(asked):
+        return ()
+    reached = set(ends)
+    while ends:
+        new = neighbours[ends.pop()] - reached
+        reached |= new
+        ends += new
+    uncoupled_parts = [part_name for part_name in parts if part_name in neighbours and part_name not in reached]
+    names = {part_name.partition(".")[2] for part_name in uncoupled_parts}
+    spoken = {text.partition(".")[0] for key in SETTINGS if key not in FOLLOWING for text in _texts(table.get(key))}
+    return () if names & spoken else tuple(uncoupled_parts)
+
+
+def lessened(scene: Scene, removed: Collection[str]) -> Scene:
+    """The scene without these parts; the scene itself where there are none."""
+    if not removed:
+        return scene
+    return edited(scene, dict.fromkeys((*removed, *FOLLOWING)))
+
+
+def _texts(value: object) -> Iterator[str]:
+    """All texts in a table, and the names of what it lists."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        for key, item in value.items():
+            yield str(key)
+            yield from _texts(item)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from _texts(item)
 
 
 def text(scene: Scene, planned: Scene, extends: str, comments: Iterable[str] = ()) -> str:

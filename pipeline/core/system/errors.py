@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 #: bytes of each piece of an error that are shown, and of all errors of a file together
-LONGEST, TOGETHER = 1000, 3500
+LONGEST_SHOWN, LONGEST_MESSAGE = 1000, 3500
 #: exit code of a command that Ctrl-C has ended
 INTERRUPTED = 130
 
 
-def shown(text: str, longest: int = LONGEST) -> str:
-    """Text as it may stand on a terminal: control characters spelt out, the middle of what is long left out."""
+def shown(text: str, longest: int = LONGEST_SHOWN) -> str:
+    """Text as a terminal may show it: control characters spelt out, the middle of what is long left out."""
     if len(text) > longest:  # first, since what is left is examined character by character
         text = _short(text, longest)
     text = "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
@@ -54,7 +54,7 @@ class InputErrors(InputError):  # noqa: N818 - several of them
         self.errors = errors
         lines: list[str] = []
         for error in errors:
-            if lines and sum(len(text.encode()) + 1 for text in (*lines, str(error))) > TOGETHER:
+            if lines and sum(len(text.encode()) + 1 for text in (*lines, str(error))) > LONGEST_MESSAGE:
                 lines.append(f"... and {len(errors) - len(lines)} more")
                 break
             lines.append(str(error))

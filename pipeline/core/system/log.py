@@ -11,7 +11,7 @@ import logging
 import sys
 from typing import TextIO
 
-from flexclear.pipeline.core.system.errors import TOGETHER, shown
+from flexclear.pipeline.core.system.errors import LONGEST_MESSAGE, shown
 
 LOG = logging.getLogger("flexclear")
 #: writes lines to the stream that `write_to` has named last, else to what stderr is at the time
@@ -32,7 +32,7 @@ class _Plain(logging.Formatter):
     """Clean a text that may come from files of others: no control characters, and only the ends of a long one."""
 
     def format(self, record: logging.LogRecord) -> str:
-        return shown(super().format(record), TOGETHER)
+        return shown(super().format(record), LONGEST_MESSAGE)
 
 
 def write_to(out: TextIO | None) -> None:

@@ -19,7 +19,7 @@ INSTRUCTIONS = ("avx512f", "avx2", "fma", "neon", "sve")
 CHOOSING = ("NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES", "NUMBA_OPT", "OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")
 
 #: fraction of what is left that one piece of work may take
-FRACTION = 0.8
+ALLOWED_FRACTION = 0.8
 
 
 def disk(folder: Path) -> int:
@@ -28,15 +28,15 @@ def disk(folder: Path) -> int:
 
 
 def require_memory(need: float, what: str, remedy: str, limit: float | None = None) -> None:
-    """ResourceError when `what` needs more bytes than are allowed; limit: default `FRACTION` of what is left."""
-    allowed = FRACTION * memory() if limit is None else limit
+    """ResourceError when `what` needs more bytes than are allowed; limit: default a fraction of what is left."""
+    allowed = ALLOWED_FRACTION * memory() if limit is None else limit
     if need > allowed:
         raise ResourceError(f"{what} takes about {size(need)} of memory, and {size(allowed)} are allowed; {remedy}")
 
 
 def require_disk(need: float, what: str, folder: Path, remedy: str, limit: float | None = None) -> None:
     """ResourceError when `what` needs more bytes on disk than are allowed; limit: as of `require_memory`."""
-    allowed = FRACTION * disk(folder) if limit is None else limit
+    allowed = ALLOWED_FRACTION * disk(folder) if limit is None else limit
     if need > allowed:
         raise ResourceError(
             f"{what} takes about {size(need)} of the disk of {folder}, and {size(allowed)} are allowed; {remedy}"

@@ -18,7 +18,7 @@ from typing import Any
 #: the request that lets a file share the bytes of another until one of them is written (linux/fs.h)
 FICLONE = 0x40049409
 #: how long a file is awaited that another program has open, and between two attempts [s]
-PATIENCE, PAUSE = 2.0, 0.05
+WAIT_FOR_FILE, PAUSE = 2.0, 0.05
 
 
 def _module(name: str) -> Any:
@@ -51,7 +51,7 @@ def memory() -> int:
 
 
 def peak_memory() -> int:
-    """Largest resident memory of this process so far [B]; 0 where the system does not tell."""
+    """Largest resident memory of this process so far [B]; 0 where the system does not report it."""
     resource = _module("resource")
     if resource is None:
         return 0
@@ -94,7 +94,7 @@ def remove(path: Path) -> None:
 
 def _insist(change: Callable[[], None], path: Path) -> None:
     """Do what takes a file away; whoever has it open (a viewer, an indexer, a virus scanner) may let it go soon."""
-    end = time.monotonic() + PATIENCE
+    end = time.monotonic() + WAIT_FOR_FILE
     while True:
         try:
             return change()

@@ -14,18 +14,18 @@ from flexclear.pipeline.core.system.errors import StoppedError
 from flexclear.pipeline.core.system.platforms import cores
 from flexclear.pipeline.core.system.progress import Progress, silent
 
-__all__ = ["cores", "free", "meanwhile", "side_by_side", "tell", "width"]
+__all__ = ["cores", "free", "meanwhile", "set_idle", "side_by_side", "width"]
 
 Result = TypeVar("Result")
 #: how long a thread is awaited before this one listens to the keyboard [s]: some systems interrupt no wait
 TICK = 0.1
 #: threads while other tasks run, which will end and leave their cores: so many, where there are as many cores
-BESIDE = 4
+THREADS_WHILE_BUSY = 4
 
 _others_idle: bool | None = None
 
 
-def tell(others_idle: bool) -> None:
+def set_idle(others_idle: bool) -> None:
     """In a worker, with each task: whether nothing else can run while it does."""
     global _others_idle
     _others_idle = others_idle
@@ -40,7 +40,7 @@ def free() -> bool:
 
 def width() -> int:
     """How many threads of compiled code to run side by side."""
-    return cores() if free() else min(cores(), BESIDE)
+    return cores() if free() else min(cores(), THREADS_WHILE_BUSY)
 
 
 def side_by_side(

@@ -67,12 +67,12 @@ def execute(task: Task, inputs: Mapping[str, Record], store: Store, sources: Sou
 
 def states(tasks: list[Task], store: Store, sources: Sources) -> list[State]:
     """State of each task and all its inputs, inputs first; nothing is run."""
-    states_of: dict[int, State] = {}
+    states_of: dict[Task, State] = {}
     for task in in_order(tasks):
-        above = {name: states_of[id(t)].record for name, t in task.inputs.items()}
+        above = {name: states_of[t].record for name, t in task.inputs.items()}
         fresh = {name: record for name, record in above.items() if record is not None}
         stale = frozenset(above.keys() - fresh.keys())
-        states_of[id(task)] = _state(task, fresh, stale, store, sources)
+        states_of[task] = _state(task, fresh, stale, store, sources)
     return list(states_of.values())
 
 

@@ -28,7 +28,7 @@ OWN = ("flexclear", "benchmarks")
 #: modules that only word messages, citations and validation errors: no result depends on them
 _SCENE = "flexclear.pipeline.core.scene"
 WORDING = {f"{_SCENE}.{name}" for name in ("citations", "validation_errors", "plausibility")}
-#: the functions that `import flexclear` offers stand above the stages: no result reaches them
+#: the functions that `import flexclear` offers are above the stages: no result reaches them
 ABOVE = {"flexclear.public"}
 #: how often a source is parsed at most, where threads of libraries come between
 ATTEMPTS = 10
@@ -192,10 +192,10 @@ def _imported(tree: ast.Module, name: str, package: bool, deep: bool) -> tuple[s
 
 
 def code_digest(tree: ast.Module) -> str:
-    """Digest of what a module does: its syntax tree, from which docstrings and words of raised errors are taken."""
+    """Digest of what a module does: its syntax tree without docstrings, also of attributes, and words of errors."""
     for node in ast.walk(tree):
-        if isinstance(node, _DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
-            del node.body[0]
+        if isinstance(node, _DOCUMENTED):
+            node.body = [one for one in node.body if not _is_text(one)]
         elif isinstance(node, ast.Raise):
             for part in ast.walk(node):
                 if isinstance(part, ast.JoinedStr):
@@ -203,6 +203,12 @@ def code_digest(tree: ast.Module) -> str:
                 elif isinstance(part, ast.Constant) and isinstance(part.value, str):
                     part.value = ""
     return hashlib.sha256(_dumped(tree).encode()).hexdigest()
+
+
+def _is_text(statement: ast.stmt) -> bool:
+    """Whether a statement is a text alone, which does nothing."""
+    value = statement.value if isinstance(statement, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
 def _dumped(tree: ast.Module) -> str:
@@ -266,27 +272,21 @@ def library_versions(packages: frozenset[str]) -> dict[str, str]:
 @cache
 def library_version(package: str) -> str:
     """Version of the distribution that holds an import package; 'absent' when it is not installed."""
-    metadata = _metadata(package)
-    # `importlib.metadata.version` parses the whole description as an e-mail, 5 ms for each library
-    match = metadata and re.search(r"^Version: (.+)$", metadata, re.MULTILINE)
-    return "absent" if metadata is None else match[1].strip() if match else "unknown"
+    from importlib.metadata import PackageNotFoundError, version  # here, since it brings readers of e-mail
+
+    try:
+        return version(DISTRIBUTIONS.get(package, package))
+    except PackageNotFoundError:
+        return "absent"
 
 
 @cache
 def _required(package: str) -> tuple[str, ...]:
     """Distributions that a library requires whatever is asked of it; some only on other machines."""
-    lines = re.findall(r"^Requires-Dist: ([\w.-]+)(.*)$", _metadata(package) or "", re.MULTILINE)
-    return tuple(name for name, condition in lines if "extra" not in condition)
-
-
-@cache
-def _metadata(package: str) -> str | None:
-    from importlib.metadata import PackageNotFoundError, distribution  # here, since it brings readers of e-mail
+    from importlib.metadata import PackageNotFoundError, requires
 
     try:
-        installed = distribution(DISTRIBUTIONS.get(package, package))
+        lines = (line.partition(";") for line in requires(DISTRIBUTIONS.get(package, package)) or ())
     except PackageNotFoundError:
-        return None
-    # in a checkout that is on the path itself, the program's own is under its older name
-    text = installed.read_text("METADATA") or installed.read_text("PKG-INFO") or ""
-    return text.partition("\n\n")[0]  # the rest describes the library
+        return ()
+    return tuple(re.split(r"[^\w.-]", name, maxsplit=1)[0] for name, _, condition in lines if "extra" not in condition)

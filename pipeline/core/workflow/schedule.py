@@ -1,4 +1,4 @@
-"""Brings tasks up to date over the cores there are: fresh ones are found, stale ones run as soon as
+"""Brings tasks up to date over the cores there are: fresh ones are recognised, stale ones run as soon as
 their inputs are there."""
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ GRACE = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """A task that could not be done: the exit code and what to tell the user."""
+    """A task that could not be done: the exit code and what the user reads."""
 
     task: Task
     exit_code: int
@@ -42,9 +42,9 @@ class Failure:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of the tasks asked for: records by task (by identity), and the failures."""
+    """What became of the tasks asked for: the records of those that are up to date, and the failures."""
 
-    records: Mapping[int, Record]
+    records: Mapping[Task, Record]
     failures: tuple[Failure, ...]
 
 
@@ -63,21 +63,21 @@ class _Plan:
 
     waiting: list[Task]
     tasks: tuple[Task, ...]
-    done: dict[int, Record] = field(default_factory=dict)
-    failed: dict[int, Failure] = field(default_factory=dict)
+    done: dict[Task, Record] = field(default_factory=dict)
+    failed: dict[Task, Failure] = field(default_factory=dict)
 
     def inputs(self, task: Task) -> dict[str, Record]:
-        return {name: self.done[id(above)] for name, above in task.inputs.items()}
+        return {name: self.done[above] for name, above in task.inputs.items()}
 
     def ready(self) -> list[Task]:
-        return [t for t in self.waiting if all(id(above) in self.done for above in t.inputs.values())]
+        return [t for t in self.waiting if all(above in self.done for above in t.inputs.values())]
 
     def give_up_below_failures(self) -> None:
         """Tasks whose inputs failed are left out silently; the failure itself is reported."""
         for task in list(self.waiting):
-            broken = next((self.failed[id(a)] for a in task.inputs.values() if id(a) in self.failed), None)
+            broken = next((self.failed[a] for a in task.inputs.values() if a in self.failed), None)
             if broken is not None:
-                self.failed[id(task)] = broken
+                self.failed[task] = broken
                 self.waiting.remove(task)
 
 
@@ -103,14 +103,14 @@ def bring(tasks: list[Task], store: Store, sources: Sources, monitor: Monitor, j
                 _together(plan, store, sources, monitor, width)
         monitor.end()
         for task in plan.tasks:
-            if id(task) in plan.failed:
-                store.outdated(task.folder, task.label, plan.failed[id(task)].message)
-    failures = {id(f): f for f in plan.failed.values()}
-    if any(failure.exit_code == INTERRUPTED for failure in failures.values()):
-        for failure in failures.values():
+            if task in plan.failed:
+                store.outdated(task.folder, task.label, plan.failed[task].message)
+    failures = tuple(dict.fromkeys(plan.failed.values()))
+    if any(failure.exit_code == INTERRUPTED for failure in failures):
+        for failure in failures:
             monitor.say(failure.message)
         raise KeyboardInterrupt
-    return Outcome(plan.done, tuple(failures.values()))
+    return Outcome(plan.done, failures)
 
 
 def _width(tasks: list[Task]) -> int:
@@ -121,10 +121,10 @@ def _width(tasks: list[Task]) -> int:
 def _settle_fresh(plan: _Plan, store: Store, sources: Sources) -> None:
     """Tasks are in order, so one pass finds all that is fresh."""
     for task in list(plan.waiting):
-        if all(id(above) in plan.done for above in task.inputs.values()):
+        if all(above in plan.done for above in task.inputs.values()):
             record = find(task, plan.inputs(task), store, sources)
             if record is not None:
-                plan.done[id(task)] = record
+                plan.done[task] = record
                 plan.waiting.remove(task)
 
 
@@ -184,7 +184,7 @@ def _leave_waiting(plan: _Plan, why: str) -> None:
     if plan.waiting:
         code = StoppedError(why, interrupted=why == stopping.INTERRUPTED).exit_code
         rest = Failure(plan.waiting[0], code, f"{len(plan.waiting)} of {len(plan.tasks)} tasks are left undone: {why}")
-        plan.failed |= {id(task): rest for task in plan.waiting}
+        plan.failed |= {task: rest for task in plan.waiting}
         plan.waiting.clear()
 
 
@@ -257,9 +257,9 @@ def _relay(reports: Any, monitor: Monitor) -> None:
 
 def _note(plan: _Plan, task: Task, result: Record | Failure) -> None:
     if isinstance(result, Failure):
-        plan.failed[id(task)] = replace(result, task=task)  # a worker has a copy of it
+        plan.failed[task] = replace(result, task=task)  # a worker has a copy of it
     else:
-        plan.done[id(task)] = result
+        plan.done[task] = result
 
 
 def _work(
@@ -272,7 +272,7 @@ def _work(
 ) -> Record | Failure:
     """In a worker: the same as in `_alone`, with progress sent home."""
     root, source, memo = where
-    cores.tell(others_idle)
+    cores.set_idle(others_idle)
 
     def progress(fraction: float | None, text: str) -> None:
         reports.put((name, fraction, text))
@@ -300,11 +300,12 @@ def attempt(
 
 
 def _left(task: Task, stopped: StoppedError, store: Store) -> str:
-    """Message about a task that was stopped: what there is of it, and that it can continue."""
-    text = f"{stopped}; run it again, and it continues from there"
+    """Message about a task that was stopped, and what there is of it."""
     time = getattr(stopped.partial, "attrs", {}).get("stopped_at")
-    if time is not None:  # else it is of a part of the work, such as a member of an ensemble, and no dataset
-        path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
-        if path is not None:
-            text += f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)"
-    return text
+    if time is None:  # it is of a part of the work, such as a member of an ensemble, and no dataset
+        return f"{stopped}; run it again, and what is finished of it is not computed again"
+    path = store.show_partial(stopped.partial, task.folder, task.names.get(MAIN, MAIN))
+    there = (
+        f"; what there is, up to t = {time:.6g} s, is in {path} (attribute complete = 0)" if path is not None else ""
+    )
+    return f"{stopped}; run it again{there}"

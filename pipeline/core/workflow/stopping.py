@@ -88,7 +88,7 @@ def until(seconds: float | None, why: str) -> Iterator[None]:
 
 
 @contextmanager
-def gently(tell: Callable[[str], None]) -> Iterator[None]:
+def gently(say: Callable[[str], None]) -> Iterator[None]:
     """Meanwhile the first Ctrl-C is a request, where requests are heeded; else, and the second time, it ends all."""
     global _why
     if threading.current_thread() is not threading.main_thread():
@@ -99,7 +99,7 @@ def gently(tell: Callable[[str], None]) -> Iterator[None]:
         if not heeds() or _why:
             raise KeyboardInterrupt
         request(INTERRUPTED)
-        tell("stopping in good order; Ctrl-C again ends at once")
+        say("stopping in good order; Ctrl-C again ends at once")
 
     ignored = signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     before = None if ignored else signal.signal(signal.SIGINT, handle)

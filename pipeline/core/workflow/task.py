@@ -69,16 +69,16 @@ class Task:
 
 def in_order(tasks: list[Task]) -> list[Task]:
     """`tasks` and all their inputs, each once, inputs first."""
-    ordered: dict[int, Task] = {}
+    ordered: dict[Task, None] = {}
 
     def visit(task: Task) -> None:
         for above in task.inputs.values():
             visit(above)
-        ordered.setdefault(id(task), task)
+        ordered.setdefault(task)
 
     for task in tasks:
         visit(task)
-    return list(ordered.values())
+    return list(ordered)
 
 
 def facts(task: Task, digests: Mapping[str, str], sources: Sources) -> dict[str, str]:

@@ -38,7 +38,7 @@ class Bell:
         return Bell(context.Event(), context.Array("c", 1000), context.Value("i", 0))
 
     def ring(self, why: str) -> None:
-        """Tell all workers."""
+        """Ask all workers."""
         self.why.value = why.encode()[:999]
         self.rung.set()
 

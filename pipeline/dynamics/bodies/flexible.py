@@ -51,6 +51,17 @@ def straight(d, k, j, vector, first):
     return 0.0
 
 
+def of_each(body: Callable) -> Callable:
+    """The kernel that applies body(d, k) to every flexible body k."""
+
+    @kernel
+    def bodies(d):
+        for k in range(d.n_flex):
+            body(d, k)
+
+    return bodies
+
+
 @dataclass(frozen=True)
 class FlexibleBodies:
     """Kernels of all flexible bodies.
@@ -228,21 +239,6 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
         return kinetic, elastic
 
     @kernel
-    def inertia(d):
-        for k in range(d.n_flex):
-            body_inertia(d, k)
-
-    @kernel
-    def mass_matrix(d):
-        for k in range(d.n_flex):
-            body_mass_matrix(d, k)
-
-    @kernel
-    def modal_inertia(d):
-        for k in range(d.n_flex):
-            body_modal_inertia(d, k)
-
-    @kernel
     def energies(d, component):
         kinetic = elastic = 0.0
         for k in range(d.n_flex):
@@ -252,5 +248,6 @@ def flexible_bodies(shortening: Any = None) -> FlexibleBodies:
                 elastic += bent
         return kinetic, elastic
 
+    inertia, mass_matrix, modal_inertia = map(of_each, (body_inertia, body_mass_matrix, body_modal_inertia))
     before = (deform, site, inboard, inertia, mass_matrix, modal_inertia)
     return FlexibleBodies(*before, port_load, modal_forces, modal_rates, energies)

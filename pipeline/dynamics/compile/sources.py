@@ -27,6 +27,7 @@ from flexclear.pipeline.dynamics.effects import (
     INTEGRATORS,
     JOINTS,
     LOADS,
+    SURFACES,
     Parts,
     Scheme,
     most_parts,
@@ -65,10 +66,15 @@ class Composition:
         self.imports.append((module, name))
         return name
 
-    def family(self, package: str, names: Iterable[str], table: str = "NAMES") -> str:
-        """A tuple of the modules of a family's parts."""
-        modules = [self.take(package, listed(package, name, where="parts", table=table)[0]) for name in names]
-        return "(" + "".join(f"{module}, " for module in modules) + ")"
+    def part(self, package: str, name: str) -> str:
+        """A family's part: a module, or what it holds."""
+        module, attribute = listed(package, name, where="parts")
+        below, _, own = module.rpartition(".")
+        return f"{self.take(below, own)}.{attribute}".rstrip(".")
+
+    def family(self, package: str, names: Iterable[str]) -> str:
+        """A tuple of a family's parts."""
+        return "(" + "".join(f"{self.part(package, name)}, " for name in names) + ")"
 
     @property
     def tree(self) -> str:
@@ -246,7 +252,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
         "evaluate": "calls.rates",
         "project": _projection(file),
         "retract": "calls.retract",
-        "method": file.take(f"{INTEGRATORS}.{module}", method),
+        "method": file.take(module, method),
         "stepping": file.take(INTEGRATORS, "fixed" if scheme.fixed else "adaptive"),
     }
     if integrators.INTEGRATORS[scheme.integrator].reads_all:
@@ -255,7 +261,7 @@ def _advance(parts: Parts, scheme: Scheme) -> str:
     if events:
         file.given["events"] = events
     if parts.closures:
-        file.given["poses"] = file.take(f"{INTEGRATORS}.singular_step", "OVER_POSES")
+        file.given["poses"] = file.take(INTEGRATORS, "singular_step")
     file.take(DYNAMICS, "memory as m")
     maker = file.take(f"{INTEGRATORS}.stepper", "make_advance")
     return _text(file, f"steps of {scheme}", "steps", maker, ADVANCE)
@@ -289,7 +295,7 @@ def _forces(parts: Parts) -> Composition:
     if parts.flexible:
         file.given["flexible"] = f"{file.take(f'{DYNAMICS}.bodies.flexible', 'flexible_bodies')}()"
     if parts.surfaces:
-        surfaces = file.family(JOINTS, parts.surfaces, "CONTACTS")
+        surfaces = file.family(SURFACES, parts.surfaces)
         maker, frictions = (
             file.take(f"{DYNAMICS}.contact.forces", "make_contacts"),
             file.family(FRICTION_LAWS, parts.frictions),
@@ -304,7 +310,7 @@ def _forces(parts: Parts) -> Composition:
 
 def _load(file: Composition, number: int, name: str, formula: str = "") -> str:
     """The module of a kind of loads, or what it makes of the kernel of an expression (`_formulas`)."""
-    module = file.take(LOADS, listed(LOADS, name, where="parts")[0])
+    module = file.part(LOADS, name)
     if not formula:
         return module
     file.take(f"{DYNAMICS}.kernels", "kernel")

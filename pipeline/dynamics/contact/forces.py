@@ -2,7 +2,7 @@
 
 gap = c - |p_OI|, with p_OI from the centre of the outer surface (socket, journal) to that of the
 inner one (ball, pin), where the surfaces part (a slot and a plane measure the gap otherwise, see
-`joints`); depth d = -gap; d' = n . (velocity of the inner centre as seen from the outer body), n
+`surfaces`); depth d = -gap; d' = n . (velocity of the inner centre as seen from the outer body), n
 along p_OI. Both forces act at one point Q on the line of centres, on the inner surface (Wang & Wang
 2019, eq. 23); the sliding velocity is that of the material points there, so that rolling is no
 sliding. Acting at one point keeps angular momentum.

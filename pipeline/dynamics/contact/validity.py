@@ -26,7 +26,7 @@ def warnings(name: str, joint: Any, law: Resolved, depth: float, force: float) -
     found = [] if law.warning is None else [f"{name}: {law.warning}"]
     if not joint.radius:
         return found  # the end of a coordinate has no surfaces
-    surfaces = lookup("flexclear.pipeline.dynamics.contact", joint.type, where=name)
+    surfaces = lookup("flexclear.pipeline.dynamics.contact.surfaces", joint.type, where=name)
     size = surfaces.contact_size(joint, depth, force)
     if joint.normal.stiffness is None and size > SMALL_CONTACT * joint.radius:
         found.append(

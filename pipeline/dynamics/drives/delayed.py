@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from flexclear.pipeline.core.scene.laws import Delayed
-from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
+from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 
 
 def pieces(law: Delayed, dimension: str) -> Pieces:
     """The pieces of the inner law, each later by the delay."""
     inner = pieces_of(law.law, dimension)
-    later = tuple(Piece(p.start + law.by, p.coefficients, p.terms) for p in inner.pieces)
-    return Pieces(later, (inner.span[0] + law.by, inner.span[1] + law.by))
+    return Pieces(tuple(p.later(law.by) for p in inner.pieces), (inner.span[0] + law.by, inner.span[1] + law.by))

@@ -68,10 +68,12 @@ def _applied(operator: str, operands: list[Course], span: tuple[float, float]) -
     """Result of an operation, piece by piece."""
     if operator in ("max", "min"):
         a, b = operands
-        return _split(_each(_difference, a, b), *((a, b) if operator == "max" else (b, a)), span)
+        return _split(_each(_OPERATIONS["-"], a, b), *((a, b) if operator == "max" else (b, a)), span)
     if operator in ("abs", "sign", "step"):
         one = operands[0]
-        low = {"abs": _each(_negative, one), "sign": _constant(-1.0, span), "step": _constant(0.0, span)}[operator]
+        low = {"abs": _each(_OPERATIONS["minus"], one), "sign": _constant(-1.0, span), "step": _constant(0.0, span)}[
+            operator
+        ]
         high = one if operator == "abs" else _constant(1.0, span)
         return _split(one, high, low, span)
     if operator in _OPERATIONS:
@@ -116,25 +118,6 @@ def _roots(piece: Piece, start: float, end: float) -> list[float]:
 # Algebra of pieces that are written from time 0 on -------------------------------------------------------------------
 
 
-def _sum(a: Piece, b: Piece) -> Piece:
-    n = max(len(a.coefficients), len(b.coefficients))
-    rows = [piece.coefficients + (0.0,) * (n - len(piece.coefficients)) for piece in (a, b)]
-    return Piece(0.0, tuple(x + y for x, y in zip(*rows, strict=True)), a.terms + b.terms)
-
-
-def _scaled(factor: float, a: Piece) -> Piece:
-    terms = tuple((factor * size, w, phase) for size, w, phase in a.terms)
-    return Piece(0.0, tuple(factor * c for c in a.coefficients), terms)
-
-
-def _negative(a: Piece) -> Piece:
-    return _scaled(-1.0, a)
-
-
-def _difference(a: Piece, b: Piece) -> Piece:
-    return _sum(a, _negative(b))
-
-
 def _number(a: Piece, what: str) -> float:
     """The value of a constant; ValueError for what changes."""
     if a.terms or any(a.coefficients[1:]):
@@ -146,23 +129,23 @@ def _product(a: Piece, b: Piece) -> Piece:
     if b.terms and not a.terms:
         a, b = b, a
     if a.terms and not b.terms:
-        return _scaled(_number(b, "a sine times the time"), a)
+        return a.times(_number(b, "a sine times the time"))
     degree = np.convolve(a.coefficients, b.coefficients)
     if not a.terms:
         if len(degree) > COEFFICIENTS and any(degree[COEFFICIENTS:]):
             raise ValueError(f"a polynomial has at most the degree {COEFFICIENTS - 1}")
         return Piece(0.0, tuple(float(c) for c in degree[:COEFFICIENTS]))
     offsets = [_number(Piece(0.0, piece.coefficients), "a sine times the time") for piece in (a, b)]
-    crossed = _scaled(offsets[1], Piece(0.0, (offsets[0],), a.terms))
+    crossed = Piece(0.0, (offsets[0],), a.terms).times(offsets[1])
     mixed = [_sines(one, other) for one in a.terms for other in b.terms]
-    return reduce(_sum, mixed, _sum(crossed, _scaled(offsets[0], Piece(0.0, (0.0,), b.terms))))
+    return reduce(Piece.plus, mixed, crossed.plus(Piece(0.0, (0.0,), b.terms).times(offsets[0])))
 
 
 def _sines(one: tuple[float, float, float], other: tuple[float, float, float]) -> Piece:
     """Product of two sines: half the cosine of the difference less that of the sum."""
     (a, w, p), (b, v, q) = one, other
     parts = ((0.5 * a * b, w - v, p - q), (-0.5 * a * b, w + v, p + q))
-    return reduce(_sum, (_sine(size, rate, phase + 0.5 * math.pi) for size, rate, phase in parts), ZERO)
+    return reduce(Piece.plus, (_sine(size, rate, phase + 0.5 * math.pi) for size, rate, phase in parts), ZERO)
 
 
 def _sine(size: float, rate: float, phase: float) -> Piece:
@@ -174,7 +157,7 @@ def _quotient(a: Piece, b: Piece) -> Piece:
     below = _number(b, "a divisor that changes")
     if below == 0.0:
         raise ValueError("it is divided by zero")
-    return _scaled(1.0 / below, a)
+    return a.times(1.0 / below)
 
 
 def _power(a: Piece, b: Piece) -> Piece:
@@ -195,10 +178,10 @@ def _function(name: str, a: Piece) -> Piece:
 
 
 _OPERATIONS: dict[str, Callable[..., Piece]] = {
-    "+": _sum,
-    "-": _difference,
+    "+": Piece.plus,
+    "-": lambda a, b: a.plus(b.times(-1.0)),
     "*": _product,
     "/": _quotient,
     "^": _power,
-    "minus": _negative,
+    "minus": lambda a: a.times(-1.0),
 }

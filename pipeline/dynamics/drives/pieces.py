@@ -8,11 +8,11 @@ start of a piece, where integration stops and starts anew.
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from math import comb, inf, perm, pi, sin
 
 import numpy as np
@@ -40,6 +40,20 @@ class Piece:
         shifted = tuple(sum(comb(n, k) * c[n] * d ** (n - k) for n in range(k, len(c))) for k in range(len(c)))
         return Piece(start, shifted, tuple((a, w, phase + w * d) for a, w, phase in self.terms))
 
+    def later(self, delay: float) -> Piece:
+        """The same course, from a later time on."""
+        return Piece(self.start + delay, self.coefficients, self.terms)
+
+    def times(self, factor: float) -> Piece:
+        """The function multiplied by a factor."""
+        terms = tuple((factor * size, w, phase) for size, w, phase in self.terms)
+        return Piece(self.start, tuple(factor * c for c in self.coefficients), terms)
+
+    def plus(self, other: Piece) -> Piece:
+        """The sum of two functions, both written from the same time on."""
+        pairs = zip_longest(self.coefficients, other.coefficients, fillvalue=0.0)
+        return Piece(self.start, tuple(a + b for a, b in pairs), self.terms + other.terms)
+
     def value(self, t: float, order: int = 0) -> float:
         """A derivative at time t."""
         s, smooth = t - self.start, 0.0
@@ -65,26 +79,17 @@ class Pieces:
         """Whether a piece has more than a polynomial."""
         return any(p.terms for p in self.pieces)
 
-    def at(self, t: float, side: str = "right") -> Piece:
-        """The piece that holds just right (or left) of t."""
-        before = bisect_right if side == "right" else bisect_left
-        return self.pieces[max(before(self.starts, t) - 1, 0)]
+    def at(self, t: float) -> Piece:
+        """The piece that holds at t, of two that meet there the later."""
+        return self.pieces[max(bisect_right(self.starts, t) - 1, 0)]
 
-    def value(self, t: float, order: int = 0, side: str = "right") -> float:
-        """A derivative at t, from its right or its left."""
-        return self.at(t, side).value(t, order)
+    def value(self, t: float, order: int = 0) -> float:
+        """A derivative at t."""
+        return self.at(t).value(t, order)
 
     def times(self, factor: float) -> Pieces:
         """The law multiplied by a factor."""
-        scaled = (
-            Piece(
-                p.start,
-                tuple(factor * c for c in p.coefficients),
-                tuple((factor * a, w, phase) for a, w, phase in p.terms),
-            )
-            for p in self.pieces
-        )
-        return Pieces(tuple(scaled), self.span)
+        return Pieces(tuple(p.times(factor) for p in self.pieces), self.span)
 
     def table(self) -> tuple[np.ndarray, list[Terms]]:
         """Rows (start, eight coefficients), shape (n, 9), and the harmonics of each piece."""

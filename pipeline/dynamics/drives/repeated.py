@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 
 from flexclear.pipeline.core.scene.laws import Repeated
-from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
+from flexclear.pipeline.dynamics.drives.pieces import Pieces, pieces_of
 
 
 def pieces(law: Repeated, dimension: str) -> Pieces:
@@ -26,10 +26,6 @@ def pieces(law: Repeated, dimension: str) -> Pieces:
     last = [first[0], *after]
     made = [*before]
     for k in range(law.times):
-        made += [_later(p, k * law.period) for p in (last if k == law.times - 1 else first)]
+        made += [p.later(k * law.period) for p in (last if k == law.times - 1 else first)]
     shift = (law.times - 1) * law.period
     return Pieces(tuple(made), (inner.span[0], inner.span[1] + shift if inner.span[1] < inf else inf))
-
-
-def _later(p: Piece, delay: float) -> Piece:
-    return Piece(p.start + delay, p.coefficients, p.terms)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import zip_longest
+from functools import reduce
 
 from flexclear.pipeline.core.scene.laws import Sum
 from flexclear.pipeline.dynamics.drives.pieces import Piece, Pieces, pieces_of
@@ -13,10 +13,5 @@ def pieces(law: Sum, dimension: str) -> Pieces:
     laws = [pieces_of(part, dimension) for part in law.laws]
     starts = sorted({float(t) for one in laws for t in one.starts[1:]})
     first = starts[0] - 1.0 if starts else 0.0
-    parts = tuple(_added([one.at(t).moved(t) for one in laws]) for t in [first, *starts])
+    parts = tuple(reduce(Piece.plus, (one.at(t).moved(t) for one in laws)) for t in [first, *starts])
     return Pieces(parts, (max(one.span[0] for one in laws), min(one.span[1] for one in laws)))
-
-
-def _added(parts: list[Piece]) -> Piece:
-    columns = zip_longest(*(p.coefficients for p in parts), fillvalue=0.0)
-    return Piece(parts[0].start, tuple(sum(c) for c in columns), tuple(t for p in parts for t in p.terms))

@@ -6,6 +6,7 @@ folders, and the same declarations, those of the effects.
 
 An effect is a folder here. Its declaration is in `effect`; its other modules are called like the folder of the tower
 whose work they do for the effect, and import what modules there may: `model`, `equations`, `contact`, `run`, `record`.
+A load that comes with an effect is a module there, called like the load.
 """
 
 from __future__ import annotations
@@ -24,8 +25,10 @@ from flexclear.pipeline.dynamics.effects.effect import Effect
 if TYPE_CHECKING:
     from flexclear.pipeline.core.scene.schema import Scene
 
-JOINTS, CONTACTS = "flexclear.pipeline.dynamics.joints", "flexclear.pipeline.dynamics.contact"
-NORMAL_LAWS, FORMS, FRICTION_LAWS = (f"{CONTACTS}.{family}" for family in ("normal", "form", "friction"))
+JOINTS, CONTACT = "flexclear.pipeline.dynamics.joints", "flexclear.pipeline.dynamics.contact"
+SURFACES, NORMAL_LAWS, FORMS, FRICTION_LAWS = (
+    f"{CONTACT}.{family}" for family in ("surfaces", "normal", "form", "friction")
+)
 LOADS, LAWS = "flexclear.pipeline.dynamics.loads", "flexclear.pipeline.dynamics.drives"
 RECORDS = "flexclear.pipeline.dynamics.record"
 EVENTS = "flexclear.pipeline.dynamics.events"
@@ -87,17 +90,16 @@ def scheme_of(solver: Any) -> Scheme:
 
 @dataclass(frozen=True)
 class Named:
-    """A part that a scene names: its family's package and table there, its name, and where the scene says so."""
+    """A part that a scene names: its family's package, its name, and where the scene says so."""
 
     package: str
     name: str
     where: str
-    table: str = "NAMES"
 
     @property
     def module(self) -> str:
         """The module that holds the part; InputError when the family has no such name."""
-        return module_of(self.package, self.name, where=self.where, table=self.table)
+        return module_of(self.package, self.name, where=self.where)
 
 
 def most_parts(scene: Scene) -> Parts:
@@ -143,9 +145,8 @@ def named(scene: Scene) -> Iterator[Named]:
     for integrator in _integrators(scene):
         yield Named(INTEGRATORS, integrator, "[solver]")
     for name, joint in scene.joint.items():
-        yield Named(JOINTS, joint.type, f"[joint.{name}]", "CONTACTS" if name in contacts else "NAMES")
+        yield Named(SURFACES if name in contacts else JOINTS, joint.type, f"[joint.{name}]")
     for name, contact in contacts.items():
-        yield Named(CONTACTS, contact.type, f"[joint.{name}.normal]")
         yield Named(NORMAL_LAWS, contact.normal.law, f"[joint.{name}.normal]")
         if contact.friction is not None:
             yield Named(FRICTION_LAWS, contact.friction.law, f"[joint.{name}.friction]")

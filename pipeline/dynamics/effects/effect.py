@@ -25,9 +25,9 @@ class Effect:
     kinds: for a scene with the effect the kinds by which its code is composed, often none; None for other scenes.
     family: whose parts these kinds are, below `dynamics`.
     named: parts of families that it names in a scene: family, name, and where the scene says so.
-    wiring, numbers, work: rows of its tables in h, f and w by their names (`memory`). A table in h adds a size
-    ``n_<table>`` to the header, a ledger the size ``<name>_slot``.  stretches: of w, by name.
-    lengths: rows of the tables in w, and entries of the stretches, given the function from the name of a size to it.
+    wiring, numbers: rows of its tables in h and f by their names (`memory`). A table in h adds a size ``n_<table>`` to
+    the header, a ledger the size ``<name>_slot``.  work: the same in w, each after how many rows there are.
+    stretches: of w, each with its length; both as `memory` writes them.
     compose: arguments that it adds to generated files, or replaces there, by the point in `compile.sources` at which
     it does.  In their texts, ``<module.name>`` is a name in its folder, ``{file}`` the `compile.sources.Composition`,
     and ``{kinds}`` the tuple of the modules of its kinds.
@@ -44,7 +44,7 @@ class Effect:
     explains: ``explanation(engine)`` -> why the run stopped, in words, or None.
     records: ``series(model, seen)`` -> variables and coordinates of the run's dataset, by the beginnings of the
     variables' names.
-    acts: ``acting(model, seen)`` -> frames on which it acts, moments and forces (`record.acting`).
+    acts: ``acting(model, seen)`` -> frames on which it acts, moments and forces (`record.wrenches`).
     warns: ``warnings(run)`` -> sentences about what a run is to be doubted for.
     """
 
@@ -54,9 +54,8 @@ class Effect:
     named: Callable[[Scene], Iterable[tuple[str, str, str]]] = lambda scene: ()
     wiring: Mapping[str, str] = field(default_factory=dict)
     numbers: Mapping[str, str] = field(default_factory=dict)
-    work: Mapping[str, str] = field(default_factory=dict)
+    work: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     stretches: tuple[str, ...] = ()
-    lengths: Mapping[str, Callable[[Callable[[str], int]], int]] = field(default_factory=dict)
     compose: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     changeable: tuple[str, ...] = ()
     touches: bool = False

@@ -22,7 +22,8 @@ from flexclear.pipeline.dynamics.vectors import ZERO, add, add_wrench, dot, scal
 
 BEARING = m.NAMED["bearing"]
 #: variables of a run's dataset with their dimensions, and coordinates
-Series = tuple[dict[str, tuple[tuple[str, ...], np.ndarray]], dict[str, object]]
+Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
+Series = tuple[Variables, dict[str, object]]
 #: tolerance by which the loops of rows stay as they are, and nothing but frames is written
 AS_RECORDED = -1.0
 #: of so many rows one is closed first, and those between two of them start from what that changed there, where rows

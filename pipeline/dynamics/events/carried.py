@@ -14,7 +14,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects import LOADS
 from flexclear.pipeline.dynamics.effects.stops.model import End
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import coordinate_of, joint_class, named_coordinate
+from flexclear.pipeline.dynamics.model.driving import coordinate_of, joint_type, named_coordinate
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
@@ -60,7 +60,7 @@ def _slots(model: Model) -> Iterator[tuple[tuple[str, ...], range]]:
     def turns(gauge: int, joint: str, coordinate: Coordinate) -> Iterator[tuple[tuple[str, ...], range]]:
         at = int(gauges[gauge]["turns"]) if gauge >= 0 else -1
         if at >= 0:
-            single = len(joint_class(scene.joint[joint].type).COORDINATES) == 1
+            single = len(joint_type(scene.joint[joint].type).COORDINATES) == 1
             yield (TURNS, joint if single else f"{joint}.{coordinate.name}"), range(first + at, first + at + 1)
 
     looks = arrays.table(m.LOOKS)["index"]

@@ -16,14 +16,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model.interface_basis import modes_of
+from flexclear.pipeline.dynamics.linear.bench import inertia
+from flexclear.pipeline.dynamics.linear.tangent import free_motions
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapping
-from flexclear.pipeline.dynamics.run.evaluation.tree_factor import mass_factor
+from flexclear.pipeline.dynamics.run.states import rows_of
 
 #: singular values below this fraction of the largest are rounding
 IMPULSE_RANK = 1e-9
@@ -40,29 +40,19 @@ class Blow(NamedTuple):
 
 def rows(engine: Engine, states: np.ndarray, t: float) -> np.ndarray:
     """Rows of the record for states at the start, all with the contacts that a run from the first begins with."""
-    contacts = len(engine.model.contacts)
-    made = m.empty_record(len(states), contacts, engine.model.ny)
-    record = m.record(made, contacts)
-    record.time[:], record.state[:] = t, states
+    modes, latched = np.zeros((2, len(engine.model.contacts)))
     for c in overlapping(engine, states[0]):
         speed = engine.model.contacts[c].joint.initial_approach_speed
         if speed is not None:
-            record.modes[:, c], record.latched[:, c] = 1.0, speed or NO_IMPACT
-    return made
+            modes[c], latched[c] = 1.0, speed or NO_IMPACT
+    return rows_of(engine, states, t, modes, latched)
 
 
 def blow(engine: Engine, y: np.ndarray, t: float, targets: Mapping[str, float]) -> Blow:
     """The state y at time t after coordinates, by their names in records, are brought to rates [m/s or rad/s]."""
     model = engine.model
     closure_rows.evaluate(engine, y, t)
-    modes = modes_of(model.arrays)
-    L = modes @ mass_factor(engine)
-    M, J = L @ L.T, engine.rows(m.JACOBIAN) @ modes.T
-    factor = np.linalg.cholesky(M)
-    half = np.linalg.solve(factor, J.T).T
-    _, values, V = np.linalg.svd(half)
-    rank = int(np.sum(values > IMPULSE_RANK * values.max(initial=0.0)))
-    Z = np.linalg.solve(factor.T, V[rank:].T)
+    Z = free_motions(*inertia(engine))[0]
     scale = np.maximum(np.abs(Z).max(axis=0, initial=0.0), np.finfo(float).tiny)
     states = np.tile(y, (1 + Z.shape[1], 1))
     states[1:, model.speeds] += (Z / scale).T

@@ -55,14 +55,13 @@ class Happened:
 
 @dataclass(frozen=True)
 class Phase:
-    """A phase from `start` to `end` [s]; without a run where the next event happens at once.
+    """A phase up to `end` [s]; without a run where the next event happens at once.
 
     begins, ends: energies by name [J].  coordinates: of joints at its end, by name [m or rad].
     exchanged: largest energy exchanged so far [J].  happened: the event at its end.
     """
 
     run: Run | None
-    start: float
     end: float
     begins: dict[str, float]
     ends: dict[str, float]

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+from flexclear.pipeline.core.artifacts.labelled import Labelled, LabelledArrays
 from flexclear.pipeline.core.scene.events import Event
 from flexclear.pipeline.core.scene.quantity import Quantity, condition
 from flexclear.pipeline.core.scene.schema import Scene
@@ -31,9 +30,6 @@ from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges, Panel, 
 from flexclear.pipeline.dynamics.run.run import Run, follow, maker, observed, require_shallow
 from flexclear.pipeline.dynamics.run.trajectory import SLICE, Followed, Stop, Trajectory, never
 from flexclear.pipeline.dynamics.starts.snapshot import moving
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: evaluations after which the conditions are examined; where a run fails after an event, again with fewer
 PAUSES = (2_000, 50)
@@ -126,7 +122,7 @@ class _Plan:
         conditions = {n: self._condition(e) for n, e in due.items() if not isinstance(e.at, float)}
         watch = Watch(engine, y, conditions, known)
         begins = _energies(engine, y, t)
-        phase = Phase(None, t, t, begins, begins, watch.coordinates)
+        phase = Phase(None, t, begins, begins, watch.coordinates)
         if watch.held and start.before is None:
             name = watch.held[0]
             raise InputError(

@@ -14,13 +14,15 @@ from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Blocks, by_name
 from flexclear.pipeline.dynamics.events.impulse import rows as rows_of
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.run.coordinates import joint_coordinates, named_coordinates
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe_blocks
-from flexclear.pipeline.dynamics.run.horizon.periods import Moment, handed
+from flexclear.pipeline.dynamics.run.horizon.periods import handed
+from flexclear.pipeline.dynamics.run.pieces import Moment
 from flexclear.pipeline.dynamics.run.trajectory import integrate
 
 #: parts into which an interval is divided to look closer, and how often: what is left is a straight line
@@ -38,7 +40,7 @@ class Watch:
 
     def __init__(self, engine: Engine, y: np.ndarray, conditions: Mapping[str, Quantity], known: Mapping[str, float]):
         self._engine, self._conditions = another(engine), conditions
-        self._rows = m.empty_record(0, len(engine.model.contacts), engine.model.ny)
+        self._rows = recording.empty_record(0, len(engine.model.contacts), engine.model.ny)
         self._seen: Blocks | None = None
         self._looked = 1
         self.hit: tuple[str, float] | None = None
@@ -116,7 +118,7 @@ class Watch:
         """Rows at times from that of a row on, integrated from there."""
         engine = another(self._engine)
         contacts = len(engine.model.contacts)
-        first = m.record(row, contacts)
+        first = recording.record(row, contacts)
         modes, latched = engine.modes.copy(), engine.latched.copy()
         modes[:contacts], latched[:contacts] = first.modes[0], first.latched[0]
         watched, begun = np.zeros_like(engine.view(m.WATCH.place)), list[tuple[float, ...]]()
@@ -131,7 +133,7 @@ class Watch:
         return made.rows[np.minimum(np.searchsorted(made.time, times), len(made.rows) - 1)]
 
     def _observed(self, rows: np.ndarray, *, after: bool = False) -> Blocks:
-        one = m.record(rows[:1], len(self._engine.model.contacts))
+        one = recording.record(rows[:1], len(self._engine.model.contacts))
         if self._engine.model.closures:
             closure_rows.select_rows(self._engine, one.state[0], float(one.time[0]))
         return observe_blocks(self._engine, rows, after=after)
@@ -167,4 +169,4 @@ class Watch:
         return other if one is None else {name: np.concatenate([one[name], other[name]]) for name in other}
 
     def _time(self, rows: np.ndarray) -> np.ndarray:
-        return m.record(rows, len(self._engine.model.contacts)).time
+        return recording.record(rows, len(self._engine.model.contacts)).time

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate.norms import finite, scaled_norm, set_error_scales
+from flexclear.pipeline.dynamics.integrate.norms import scaled_norm, set_error_scales
 from flexclear.pipeline.dynamics.integrate.stepper import FAILED
 from flexclear.pipeline.dynamics.kernels import kernel
 
@@ -26,27 +26,18 @@ LEAST_NORM = 1e-4
 STRICTER = 10.0
 
 
-def make_step_control(
-    evaluate: Callable, contacts: tuple[Callable, Callable], begin: Callable, error: Callable, method: Any
-) -> tuple:
+def make_step_control(evaluate: Callable, any_closed: Callable, error: Callable, method: Any) -> tuple:
     """The kernels first_step, error_norm, after_rejection and next_step of the stepper."""
     order = method.error_order + 1
     exponent = -1.0 / order
     remembering = exponent + 0.2 * MEMORY
     steady = method.steady
-    watch_start, any_closed = contacts
 
     @kernel
     def first_step(d):
-        """Slope at the start of a segment, and a first step; False when the equations have no solution here."""
+        """Length of the first step of a segment, from the slope at its start and one a little way along."""
         y, slope = d.at_y, d.at_slopes
         other = slope + d.ny
-        evaluate(d, d.time, y, slope)
-        d.evaluations += 2
-        if d.evaluation != m.OK or not finite(d, slope):
-            d.status = m.NOT_A_NUMBER if d.evaluation == m.OK else m.NO_START
-            return False
-        watch_start(d)
         set_error_scales(d, y)
         size, steepness = scaled_norm(d, y), scaled_norm(d, slope)
         step = 1e-6 * d.span
@@ -56,6 +47,7 @@ def make_step_control(
         for k in range(d.ny):
             d.y_stage[k] = d.w[y + k] + step * d.w[slope + k]
         evaluate(d, d.time + step, d.at_y_stage, other)
+        d.evaluations += 1
         if d.evaluation == m.OK:
             for k in range(d.ny):
                 d.w[other + k] -= d.w[slope + k]
@@ -64,12 +56,9 @@ def make_step_control(
                 step = min(100.0 * step, (0.01 / steepness) ** (1.0 / order))
         if any_closed(d) and d.touched_step > 0.0:
             step = min(step, d.touched_step)
-        d.step = step
         d.first, d.rejected_step = 1.0, 0.0
         d.last_norm, d.most_growth = LEAST_NORM, GROW
-        d.fresh = 0
-        begin(d)
-        return True
+        return step
 
     @kernel
     def error_norm(d, step):

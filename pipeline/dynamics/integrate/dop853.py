@@ -13,7 +13,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
-from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
+from flexclear.pipeline.dynamics.integrate.runge_kutta import make_dense, make_stages
 from flexclear.pipeline.dynamics.kernels import kernel
 
 #: stages of the step, and with those of its end and of the dense output
@@ -121,19 +121,7 @@ def error(d, step):
     return abs(step) * five / np.sqrt((five + 0.01 * three) * size)
 
 
-@kernel
-def interpolate(d, theta, out):
-    """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
-    size, dense = d.ny, d.at_dense
-    s = 1.0 - theta
-    for c in range(size):
-        v = d.w[dense + 6 * size + c] * theta
-        v = (v + d.w[dense + 5 * size + c]) * s
-        v = (v + d.w[dense + 4 * size + c]) * theta
-        v = (v + d.w[dense + 3 * size + c]) * s
-        v = (v + d.w[dense + 2 * size + c]) * theta
-        v = (v + d.w[dense + size + c]) * s
-        d.w[out + c] = d.w[dense + 7 * size + c] + (v + d.w[dense + c]) * theta
+extend_step, interpolate = make_dense(STAGES, D)
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
@@ -143,21 +131,9 @@ def make_kernels(evaluate: Callable, retract: Callable) -> tuple:
     @kernel
     def extend(d, step):
         """Prepare the dense output of the step to Y_NEW, whose slope is in row STAGES."""
-        size, dense = d.ny, d.at_dense
         for i in range(STAGES + 1, EXTENDED):
             stage(d, step, i)
-        first, last = slope(d, 0), slope(d, STAGES)
-        for c in range(size):
-            delta = d.y_new[c] - d.y[c]
-            d.w[dense + c] = delta
-            d.w[dense + size + c] = step * d.w[first + c] - delta
-            d.w[dense + 2 * size + c] = 2.0 * delta - step * (d.w[last + c] + d.w[first + c])
-            for k in range(4):
-                total = 0.0
-                for j in range(EXTENDED):
-                    total += D[k, j] * d.w[first + j * size + c]
-                d.w[dense + (3 + k) * size + c] = step * total
-            d.w[dense + 7 * size + c] = d.y[c]
+        extend_step(d, step)
 
     return begin_afresh, proceed, error, extend, keep_nothing
 

@@ -13,7 +13,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.integrators import INTEGRATORS
 from flexclear.pipeline.dynamics.integrate.method import Method, begin_afresh, keep_nothing, slope
 from flexclear.pipeline.dynamics.integrate.norms import error_scale
-from flexclear.pipeline.dynamics.integrate.runge_kutta import make_stages
+from flexclear.pipeline.dynamics.integrate.runge_kutta import make_dense, make_stages
 from flexclear.pipeline.dynamics.kernels import kernel
 
 STAGES, ERROR_ORDER = 6, 4
@@ -29,24 +29,17 @@ C = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0])
 E = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
 D = np.array(
     [
-        -12715105075 / 11282082432,
-        0.0,
-        87487479700 / 32700410799,
-        -10690763975 / 1880347072,
-        701980252875 / 199316789632,
-        -1453857185 / 822651844,
-        69997945 / 29380423,
+        [
+            -12715105075 / 11282082432,
+            0.0,
+            87487479700 / 32700410799,
+            -10690763975 / 1880347072,
+            701980252875 / 199316789632,
+            -1453857185 / 822651844,
+            69997945 / 29380423,
+        ]
     ]
 )
-
-
-@kernel
-def weighted(d, weights, c):
-    """Weighted sum of the slopes of state variable c."""
-    total = 0.0
-    for j in range(STAGES + 1):
-        total += weights[j] * d.w[slope(d, j) + c]
-    return total
 
 
 @kernel
@@ -54,32 +47,14 @@ def error(d, step):
     """Norm of the local error, 1 at the tolerance."""
     total = 0.0
     for c in range(d.ny):
-        total += (step * weighted(d, E, c) / error_scale(d, c)) ** 2
+        weighted = 0.0
+        for j in range(STAGES + 1):
+            weighted += E[j] * d.w[slope(d, j) + c]
+        total += (step * weighted / error_scale(d, c)) ** 2
     return np.sqrt(total / d.ny)
 
 
-@kernel
-def extend(d, step):
-    """Prepare the dense output of the step to Y_NEW."""
-    size, dense = d.ny, d.at_dense
-    for c in range(size):
-        delta = d.y_new[c] - d.y[c]
-        bend = step * d.w[slope(d, 0) + c] - delta
-        d.w[dense + c] = d.y[c]
-        d.w[dense + size + c] = delta
-        d.w[dense + 2 * size + c] = bend
-        d.w[dense + 3 * size + c] = delta - step * d.w[slope(d, STAGES) + c] - bend
-        d.w[dense + 4 * size + c] = step * weighted(d, D, c)
-
-
-@kernel
-def interpolate(d, theta, out):
-    """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
-    size, dense, s = d.ny, d.at_dense, 1.0 - theta
-    for c in range(size):
-        v = d.w[dense + 3 * size + c] + s * d.w[dense + 4 * size + c]
-        v = d.w[dense + size + c] + s * (d.w[dense + 2 * size + c] + theta * v)
-        d.w[out + c] = d.w[dense + c] + theta * v
+extend, interpolate = make_dense(STAGES, D)
 
 
 def make_kernels(evaluate: Callable, retract: Callable) -> tuple:

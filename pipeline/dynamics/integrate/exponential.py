@@ -40,9 +40,19 @@ C = np.array([(5.0 - np.sqrt(5.0)) / 10.0, (5.0 + np.sqrt(5.0)) / 10.0, 1.0])
 #: coefficient of theta^(k + 1) in the cubic that is zero at the start and 1 at node j alone
 CUBIC = np.linalg.inv(np.array([[c ** (k + 1) for k in range(NODES)] for c in C]))
 #: error estimates: what the cubic does that the parabola through all nodes but the second inner one does not, and the
-#: straight line through the ends; weights of (k - 1)! phi_k, the second for two coefficients of the cubic
-CUBIC_OR_PARABOLA = np.array([0.0, C[0], -(1.0 + C[0]), 1.0])
-PARABOLA_OR_LINE, CUBIC_OR_LINE = np.array([0.0, -1.0, 1.0, 0.0]), np.array([0.0, -1.0, 0.0, 1.0])
+#: straight line through the ends; coefficients of theta to theta^3 for coefficients of the cubic
+CUBIC_OR_PARABOLA = np.array([C[0], -(1.0 + C[0]), 1.0])
+PARABOLA_OR_LINE, CUBIC_OR_LINE = np.array([-1.0, 1.0, 0.0]), np.array([-1.0, 0.0, 1.0])
+#: quadratures of the departures: up to each node, up to the share last asked for, and the error estimates
+ANYWHERE, THIRD, FOURTH, N_QUADRATURES = NODES, NODES + 1, NODES + 2, NODES + 3
+#: of each the coefficient of theta^(k + 1) for each departure
+POLYNOMIALS = np.array(
+    [
+        *[CUBIC] * (NODES + 1),
+        np.outer(PARABOLA_OR_LINE, CUBIC[1]) + np.outer(CUBIC_OR_LINE, CUBIC[2]),
+        np.outer(CUBIC_OR_PARABOLA, CUBIC[2]),
+    ]
+)
 FACTORIALS = np.array([1.0 * factorial(k) for k in range(NODES + 2)])
 MOST_SWEEPS = 10
 #: how much of the slowest convergence is forgotten from step to step
@@ -63,15 +73,15 @@ OF_SLOPE, OF_STATE, TOTAL, SPARE, N_PAIRS = range(NODES, NODES + 5)
 #: sources of a state within the step: the departures and the slope at its start
 SOURCES = NODES + 1
 PHI = 2 * phi_functions.PHI_COUNT
-#: floats of an oscillator at a node: its phi functions, and what each source adds to (z, z') by them
-AT_NODE = PHI + 2 * SOURCES
+#: floats of an oscillator in a quadrature: its phi functions, and what each source adds to (z, z') by them
+OF_QUADRATURE = PHI + 2 * SOURCES
 
 
 def memory(h: np.ndarray) -> int:
     """Floats kept between steps."""
     size = h[m.NV]
-    vectors, pairs, nodes = 2 * NODES * h[m.NY], 2 * N_PAIRS * size, (NODES + 1) * AT_NODE * size
-    return int(VECTORS + vectors + pairs + nodes + modal_basis.floats(h))
+    vectors, pairs, quadratures = 2 * NODES * h[m.NY], 2 * N_PAIRS * size, N_QUADRATURES * OF_QUADRATURE * size
+    return int(VECTORS + vectors + pairs + quadratures + modal_basis.floats(h))
 
 
 @kernel
@@ -88,37 +98,42 @@ def pair(d, i):
 
 @kernel
 def phi(d, j, i):
-    """Where w holds the phi functions of oscillator i at node j; at the share last asked for with j = NODES."""
-    return pair(d, N_PAIRS) + AT_NODE * (room(d) * j + i)
+    """Where w holds the phi functions of oscillator i in quadrature j."""
+    return pair(d, N_PAIRS) + OF_QUADRATURE * (room(d) * j + i)
 
 
 @kernel
 def share(d, j, i):
-    """Where w holds what the sources add to (z, z') of oscillator i at node j: per source weights of 1 and Lambda."""
+    """Where w holds what the sources add to (z, z') of oscillator i by quadrature j: weights of 1 and Lambda each."""
     return phi(d, j, i) + PHI
 
 
 @kernel
 def basis(d):
     """Where w holds the oscillators."""
-    return phi(d, NODES + 1, 0)
+    return phi(d, N_QUADRATURES, 0)
 
 
 # Exponential quadrature -----------------------------------------------------------------------------------------------
 @kernel
 def find_phi(d, j, step, theta):
-    """The phi functions of all oscillators at a fraction of the step, as of node j, and what the sources do there."""
-    o, tau = basis(d), theta * step
+    """The phi functions of all oscillators at a fraction of the step, for quadrature j, and what the sources add.
+
+    Error estimates are of the whole step, as its last node is, whose functions they take.
+    """
+    o, tau, whole = basis(d), theta * step, j >= THIRD
+    slope_too = 0.0 if whole else 1.0
     for i in range(count(d)):
-        at = phi(d, j, i)
-        phi_functions.phi_functions(d.w, at, d.w[square(d, o, i)] * tau * tau, d.w[damping(d, o, i)] * tau)
+        at = phi(d, NODES - 1 if whole else j, i)
+        if not whole:
+            phi_functions.phi_functions(d.w, at, d.w[square(d, o, i)] * tau * tau, d.w[damping(d, o, i)] * tau)
         first = share(d, j, i) + 2 * NODES
-        d.w[first], d.w[first + 1] = tau * (d.w[at + 2] - 1.0), tau * tau * d.w[at + 3]
+        d.w[first], d.w[first + 1] = slope_too * tau * (d.w[at + 2] - 1.0), slope_too * tau * tau * d.w[at + 3]
         for e in range(NODES):
             plain, turned, power = 0.0, 0.0, theta
             for k in range(NODES):
                 power *= theta
-                weight = step * FACTORIALS[k + 1] * power * CUBIC[k, e]
+                weight = step * FACTORIALS[k + 1] * power * POLYNOMIALS[j, k, e]
                 plain += weight * (d.w[at + 2 * k + 4] - 1.0 / FACTORIALS[k + 2])
                 turned += weight * d.w[at + 2 * k + 5]
             d.w[share(d, j, i) + 2 * e], d.w[share(d, j, i) + 2 * e + 1] = plain, tau * turned
@@ -126,7 +141,7 @@ def find_phi(d, j, step, theta):
 
 @kernel
 def combine(d, j):
-    """What all sources add at node j, as the pair TOTAL."""
+    """What all sources add by quadrature j, as the pair TOTAL."""
     o, apart = basis(d), room(d)
     for i in range(count(d)):
         if d.w[square(d, o, i)] == 0.0:
@@ -144,59 +159,33 @@ def combine(d, j):
 
 
 @kernel
-def clear(d):
-    """Nothing in the pair TOTAL."""
-    for i in range(2 * room(d)):
-        d.w[pair(d, TOTAL) + i] = 0.0
-
-
-@kernel
-def add_term(d, j, tau, k, weight, source, factor):
-    """Add weight (phi_k(tau Lambda) - 1/k!) factor (z, z') of pair `source` to the pair TOTAL."""
-    o, apart = basis(d), room(d)
-    for i in range(count(d)):
-        at = phi(d, j, i) + 2 * k
-        alpha, beta = d.w[at] - 1.0 / FACTORIALS[k], d.w[at + 1] * tau
-        z, rate = factor * d.w[pair(d, source) + i], factor * d.w[pair(d, source) + apart + i]
-        bend = -d.w[square(d, o, i)] * z - d.w[damping(d, o, i)] * rate
-        d.w[pair(d, TOTAL) + i] += weight * (alpha * z + beta * rate)
-        d.w[pair(d, TOTAL) + apart + i] += weight * (alpha * rate + beta * bend)
-
-
-@kernel
-def cubic_share(theta, e):
-    """Integral of the cubic that is 1 at node e alone, from the start to a fraction of the step, in steps."""
+def plain_weight(theta, j, e):
+    """Weight of departure e in quadrature j without oscillators, in steps."""
     total, power = 0.0, theta
     for k in range(NODES):
         power *= theta
-        total += power / (k + 2.0) * CUBIC[k, e]
+        total += power / (k + 2.0) * POLYNOMIALS[j, k, e]
     return total
 
 
 @kernel
-def advance_to(d, step, theta, j, out):
-    """State at a fraction of the step into w from place out, with the phi functions that stand at node j."""
-    first, tau = slope(d, 0), step * theta
+def add_departures(d, step, theta, j, out):
+    """Add what quadrature j makes of the departures, and of the slope, to what w holds from place out on."""
     a, b, c = vector(d, DEPARTURE), vector(d, DEPARTURE + 1), vector(d, DEPARTURE + 2)
-    wa, wb, wc = step * cubic_share(theta, 0), step * cubic_share(theta, 1), step * cubic_share(theta, 2)
+    wa, wb, wc = step * plain_weight(theta, j, 0), step * plain_weight(theta, j, 1), step * plain_weight(theta, j, 2)
     for i in range(d.ny):
-        d.w[out + i] = d.y[i] + tau * d.w[first + i] + (wa * d.w[a + i] + wb * d.w[b + i] + wc * d.w[c + i])
+        d.w[out + i] += wa * d.w[a + i] + wb * d.w[b + i] + wc * d.w[c + i]
     combine(d, j)
-    lift(d, basis(d), pair(d, TOTAL), tau, out)
+    lift(d, basis(d), pair(d, TOTAL), theta * step, out)
 
 
 @kernel
-def difference(d, step, coefficient, weights, out):
-    """Add the integral over the step of one coefficient of the cubic times a polynomial, given by weights of phi."""
-    for k in range(1, NODES + 1):
-        weight = step * weights[k] * FACTORIALS[k]
-        if weight == 0.0:
-            continue
-        for e in range(NODES):
-            add_term(d, NODES - 1, step, k + 1, weight, e, CUBIC[coefficient, e])
-            departure, plain = vector(d, DEPARTURE + e), weight / FACTORIALS[k + 1] * CUBIC[coefficient, e]
-            for c in range(d.ny):
-                d.w[out + c] += plain * d.w[departure + c]
+def advance_to(d, step, theta, j, out):
+    """State at a fraction of the step into w from place out, by quadrature j, whose phi functions are there."""
+    first, tau = slope(d, 0), step * theta
+    for i in range(d.ny):
+        d.w[out + i] = d.y[i] + tau * d.w[first + i]
+    add_departures(d, step, theta, j, out)
 
 
 # Departures -----------------------------------------------------------------------------------------------------------
@@ -249,8 +238,8 @@ def extend(d, step):
 def interpolate(d, theta, out):
     """State at the share `theta` of the step, stored in w from `out`."""
     step = d.memory[LENGTH]
-    find_phi(d, NODES, step, theta)
-    advance_to(d, step, theta, NODES, out)
+    find_phi(d, ANYWHERE, step, theta)
+    advance_to(d, step, theta, ANYWHERE, out)
 
 
 @kernel
@@ -261,18 +250,12 @@ def error(d, step):
     """
     out, size = slope(d, ESTIMATE), d.ny
     norms = (0.0, 0.0)
-    for which in range(2):
-        clear(d)
+    for j in range(THIRD, N_QUADRATURES):
         for c in range(size):
             d.w[out + c] = 0.0
-        if which == 0:
-            difference(d, step, 2, CUBIC_OR_PARABOLA, out)
-        else:
-            difference(d, step, 1, PARABOLA_OR_LINE, out)
-            difference(d, step, 2, CUBIC_OR_LINE, out)
-        lift(d, basis(d), pair(d, TOTAL), step, out)
+        add_departures(d, step, 1.0, j, out)
         norms = (norms[1], scaled_norm(d, out))
-    fourth, third = norms
+    third, fourth = norms
     d.most_growth = min(d.most_growth, np.sqrt(SWIFT / max(d.memory[SLOWEST], LEAST_CONTRACTION)))
     if fourth == 0.0:
         return 0.0
@@ -300,6 +283,8 @@ def make_kernels(evaluate: Callable, retract: Callable, complete: Callable) -> t
         if d.memory[PHI_STEP] != step:
             for e in range(NODES):
                 find_phi(d, e, step, C[e])
+            find_phi(d, THIRD, step, 1.0)
+            find_phi(d, FOURTH, step, 1.0)
             d.memory[PHI_STEP] = step
         read(d, basis(d), slope(d, 0), pair(d, OF_SLOPE))
         read(d, basis(d), d.at_y, pair(d, OF_STATE))

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.integrate.poses import never
+from flexclear.pipeline.dynamics.integrate.stepper import never
 from flexclear.pipeline.dynamics.integrate.within_step import make_evaluate_at, make_locate, make_repeat
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub

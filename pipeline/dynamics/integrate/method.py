@@ -68,16 +68,6 @@ def keep_nothing(d, step):
     """`keep` of a one-step method, which has nothing to remember."""
 
 
-def no_memory(h: np.ndarray) -> int:
-    """`memory` of a method that keeps nothing between steps."""
-    return 0
-
-
-def no_parameter(solver: Any) -> float:
-    """`parameter` of a method that has none."""
-    return 0.0
-
-
 @dataclass(frozen=True, kw_only=True)
 class Method:
     """An integration method.
@@ -100,7 +90,7 @@ class Method:
     ends: whether `attempt` leaves the work space evaluated at Y_NEW, its slope in row `last`.
     steady: a growth of the step below this is not worth another factorisation.
     memory: floats kept between steps, from the header with the mechanism's sizes.
-    parameter: the method's number in the scene's solver table.
+    parameter: the method's number in the scene's solver table, if it has one.
     stability: reach of the region of stability along the negative real axis, of an explicit method whose last
         stage is at the step's end and leaves its argument in Y_STAGE; None where stiffness is not looked for.
     """
@@ -115,8 +105,8 @@ class Method:
     staged: bool = False
     ends: bool = False
     steady: float = 1.0
-    memory: Callable[[np.ndarray], int] = no_memory
-    parameter: Callable[[Any], float] = no_parameter
+    memory: Callable[[np.ndarray], int] = lambda h: 0
+    parameter: Callable[[Any], float] = lambda solver: 0.0
     stability: float | None = None
 
     def room(self, h: np.ndarray) -> m.Room:

@@ -7,6 +7,9 @@ step, also where its end changes one.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -15,6 +18,30 @@ from flexclear.pipeline.dynamics.kernels import kernel
 #: second fraction, as it grows by so many times rtol: what a run left open itself need not cost an evaluation in every
 #: row
 RECORD_SHARE, MOST_SHARE, LOOSER_FACTOR = 1e-3, 0.1, 1e3
+
+
+class Record(NamedTuple):
+    """Rows of the record by what they hold, all views.
+
+    time: [s], shape (rows,).  modes, latched: 1 of closed contacts and 0 of open ones, and their impact rates [m/s];
+    shape (rows, contacts).  state: shape (rows, NY).
+    """
+
+    time: np.ndarray
+    modes: np.ndarray
+    latched: np.ndarray
+    state: np.ndarray
+
+
+def record(rows: np.ndarray, contacts: int) -> Record:
+    """Rows of the record, shape (rows, columns), by what they hold."""
+    mode, latched, state = m.columns_of_record(contacts)
+    return Record(rows[:, 0], rows[:, mode:latched], rows[:, latched:state], rows[:, state:])
+
+
+def empty_record(rows: int, contacts: int, ny: int) -> np.ndarray:
+    """Rows of the record, all zero, shape (rows, columns)."""
+    return np.zeros((rows, m.columns_of_record(contacts)[-1] + ny))
 
 
 def record_share(rtol: float) -> float:

@@ -1,4 +1,4 @@
-"""Stages and step of an explicit Runge-Kutta method, from its coefficients."""
+"""Stages, step and dense output of an explicit Runge-Kutta method, from its coefficients."""
 
 from __future__ import annotations
 
@@ -65,3 +65,41 @@ def make_stages(
         return await_rates(d, d.time + step, d.at_y_new, slope(d, count)) if ends else MADE
 
     return stage, proceed
+
+
+def make_dense(last: int, D: np.ndarray) -> tuple[Callable, Callable]:
+    """The kernels extend(d, step) and interpolate(d, theta, out) of dense output in products of theta and 1 - theta.
+
+    last: row of the slope at the end.  D: weights of the slopes in each coefficient beyond those of Hermite's cubic.
+    Source: Hairer, Norsett & Wanner, *Solving Ordinary Differential Equations I*, 2nd ed. (1993), sec. II.6.
+    """
+    more, slopes = D.shape
+
+    @kernel
+    def extend(d, step):
+        """Prepare the dense output of the step to Y_NEW, all slopes known."""
+        size, dense = d.ny, d.at_dense
+        first, final = slope(d, 0), slope(d, last)
+        for c in range(size):
+            delta = d.y_new[c] - d.y[c]
+            d.w[dense + c] = d.y[c]
+            d.w[dense + size + c] = delta
+            d.w[dense + 2 * size + c] = step * d.w[first + c] - delta
+            d.w[dense + 3 * size + c] = 2.0 * delta - step * (d.w[final + c] + d.w[first + c])
+            for k in range(more):
+                total = 0.0
+                for j in range(slopes):
+                    total += D[k, j] * d.w[first + j * size + c]
+                d.w[dense + (4 + k) * size + c] = step * total
+
+    @kernel
+    def interpolate(d, theta, out):
+        """State at the share `theta` of the step, stored in w from `out` (after `extend`)."""
+        size, dense, s = d.ny, d.at_dense, 1.0 - theta
+        for c in range(size):
+            v = d.w[dense + (3 + more) * size + c]
+            for k in range(2 + more, -1, -1):
+                v = v * (s if k % 2 == 1 else theta) + d.w[dense + k * size + c]
+            d.w[out + c] = v
+
+    return extend, interpolate

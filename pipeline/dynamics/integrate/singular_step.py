@@ -19,7 +19,6 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.envelope import base
 from flexclear.pipeline.dynamics.equations.projection import BLIND
-from flexclear.pipeline.dynamics.integrate.poses import Poses
 from flexclear.pipeline.dynamics.kernels import kernel
 
 NEVER = 1e300
@@ -254,6 +253,3 @@ def make_arrive(evaluate: Callable, project: Callable, attempt: Callable, method
             d.evaluation, d.left = m.OK, 0.0
 
     return arrive
-
-
-OVER_POSES = Poses(note, stand, steer, ready, done, make_foresee, make_along, make_arrive)

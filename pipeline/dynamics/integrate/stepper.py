@@ -16,7 +16,6 @@ from flexclear.pipeline.dynamics.equations.projection import keep_scales, larges
 from flexclear.pipeline.dynamics.fields import data
 from flexclear.pipeline.dynamics.integrate.method import AWAITS, LOST, await_rates, make_at_once, make_attempt
 from flexclear.pipeline.dynamics.integrate.norms import finite
-from flexclear.pipeline.dynamics.integrate.poses import NO_POSES, Poses, never
 from flexclear.pipeline.dynamics.integrate.recording import (
     hold_modes,
     holds_outputs,
@@ -57,6 +56,12 @@ def plan(d, step, following):
 
 
 @kernel
+def never(d):
+    """No contact is closed."""
+    return False
+
+
+@kernel
 def watch_nothing(d):
     """Do nothing: neither contacts nor guards are there."""
 
@@ -94,7 +99,7 @@ def make_advance(
     method: Any,
     stepping: Any,
     events: tuple[Callable, Callable, Callable] = NO_CONTACTS,
-    poses: Poses = NO_POSES,
+    poses: Any = None,
     complete: Callable | None = None,
 ) -> Callable:
     """The kernel advance(h, f, w, n, outputs, rows, events).
@@ -102,25 +107,27 @@ def make_advance(
     The kernels that it is made of take `d`, the arrays with named fields (`fields`), instead of h, f, w and n.
 
     complete: evaluates like `evaluate`, and leaves all of the evaluation; given to methods that read more than rates.
-    stepping: the module `adaptive` or `fixed`.
+    stepping: the module `adaptive` or `fixed`.  poses: `singular_step`, of mechanisms with loops; trees compile none of
+        it.
     events: watch_start, make_resolve_events and any_closed of `contact_events` or `step_end_events`.
     """
     given = (evaluate, retract, complete) if method.traits.reads_all else (evaluate, retract)
     begin, step_itself, error, extend_itself, keep = method.make_kernels(*given)
     proceed = step_itself if method.staged else make_at_once(step_itself)
     attempt_itself = make_attempt(evaluate, proceed) if method.staged else step_itself
-    attempt, extend, interpolate = poses.make_along(method, attempt_itself, extend_itself)
+    attempt, extend, interpolate, loops = attempt_itself, extend_itself, method.interpolate, poses is not None
+    foresee: Any = None
+    arrive: Any = None
+    if loops:
+        attempt, extend, interpolate = poses.make_along(method, attempt_itself, extend_itself)
+        foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, attempt, method)
     last, ends = method.last, method.ends
     watch_start, make_resolve_events, any_closed = events
     dense = replace(method, interpolate=interpolate)
     resolve_events = make_resolve_events(evaluate, attempt, extend, project, dense)
     record_outputs = make_record_outputs(extend, interpolate)
     detect_stiffness = make_detect_stiffness(method)
-    first_step, error_norm, after_rejection, next_step = stepping.make_step_control(
-        evaluate, (watch_start, any_closed), begin, error, method
-    )
-    note, stand, steer, ready, done = poses.note, poses.stand, poses.steer, poses.ready, poses.done
-    foresee, arrive = poses.make_foresee(evaluate), poses.make_arrive(evaluate, project, attempt, method)
+    first_step, error_norm, after_rejection, next_step = stepping.make_step_control(evaluate, any_closed, error, method)
 
     @kernel
     def must_stop(d, outputs, rows, events):
@@ -165,7 +172,8 @@ def make_advance(
         d.drift = max(d.drift, largest(d.residual, d.n_closure_rows))
         d.rate_drift = max(d.rate_drift, largest(d.residual_rate, d.n_closure_rows))
         used = project(d.h, d.f, d.w, d.n, t_new, d.at_y_new, slope, tolerance)
-        note(d)
+        if loops:
+            poses.note(d)
         if used > 0:
             d.evaluations += used
             d.projection_evaluations += used
@@ -200,7 +208,7 @@ def make_advance(
     @kernel
     def try_step(d, step, t_new, outputs):
         """Error norm of the step to Y_NEW, 1 at the tolerance; FAILED when it could not be made, or PENDING."""
-        if ready(d):
+        if loops and poses.ready(d):
             arrive(d, step, t_new)
             return 0.0
         norm = carry_on(d, step, t_new, outputs)
@@ -220,29 +228,32 @@ def make_advance(
         keep_scales(d)
 
     @kernel
-    def set_off(d):
-        """What `first_step` does for the contacts, before a step along a polynomial; True, for it can be made."""
+    def start(d):
+        """Begin at the start of a segment or after an event; False when the equations have no solution there."""
         evaluate(d, d.time, d.at_y, d.at_slopes)
         d.evaluations += 1
-        watch_start(d)
-        d.evaluation, d.fresh = m.OK, 0
-        return True
-
-    @kernel
-    def start(d):
-        """Begin at the start of a segment or after an event; False when that cannot be."""
-        if ready(d):
-            return set_off(d)
-        if not first_step(d):
+        along = loops and poses.ready(d)
+        if along:  # where the polynomial begins nothing need be solvable
+            d.evaluation = m.OK
+        elif d.evaluation != m.OK or not finite(d, d.at_slopes):
+            d.status = m.NOT_A_NUMBER if d.evaluation == m.OK else m.NO_START
             return False
-        note(d)
-        stand(d, d.time)
+        watch_start(d)
+        d.fresh = 0
+        if not along:
+            d.step = first_step(d)
+            begin(d)
+            if loops:
+                poses.note(d)
+                poses.stand(d, d.time)
         return True
 
     @kernel
     def choose_step(d, t):
         """Length of the step to try from t; 0, with the reason in `status`, when none can be."""
-        step = d.collocated if ready(d) else steer(d, t)
+        step = d.step
+        if loops:
+            step = d.collocated if poses.ready(d) else poses.steer(d, t)
         if step == 0.0:
             d.status = m.SINGULAR_AHEAD
             return 0.0
@@ -282,7 +293,7 @@ def make_advance(
                 if not after_rejection(d, step, norm):
                     return False
                 continue
-            along = ready(d)
+            along = loops and poses.ready(d)
             following = d.step if along else next_step(d, step, norm)
             hold_modes(d)
             happened, known, t_end, step = resolve_events(d, step, t_new, rows, events)
@@ -299,10 +310,11 @@ def make_advance(
             keep(d, step)
             accept(d, t_end)
             plan(d, step, following)
-            if along:
-                done(d, t_end)
-            elif t_end == t_new:  # how independent the rows are has been noted at the end that was tried
-                foresee(d, t_end)
+            if loops:
+                if along:
+                    poses.done(d, t_end)
+                elif t_end == t_new:  # how independent the rows are has been noted at the end that was tried
+                    foresee(d, t_end)
             if happened > 0 or along:
                 hold_modes(d)
                 snapshot(d, rows, t_end, d.at_y)

@@ -1,12 +1,12 @@
 """Joint types. To add one: a module here that is called like the type, and that type in core/scene/parts; the family
 tests pick it up.
 
-Each module has the kernels
+Each is a module, or an object of `turn_and_slide`, with the kernels
 - ``motion(w, x, u, S) -> R_FG, p_FG, bias``: pose of the second frame in the first, motion subspace and bias
   (see `spherical.motion`);
 - ``position_rate(w, x, u, rate)``: rates of the positions at the speeds;
 
-and one class, `RotationVector` for 'rotation-vector', with
+and with
 - ``POSITIONS``, ``SPEEDS``: coordinates of a tree joint of this type, one letter each (r, t);
 - ``TRANSLATIONS``: axes of the first frame along which a closure forbids displacement;
 - ``ROTATIONS``: pairs (axis of the first frame, axis of the second) that a closure keeps perpendicular;
@@ -19,14 +19,9 @@ from flexclear.pipeline.core.scene.parts import IDEAL
 from flexclear.pipeline.core.scene.registry import module_name
 
 KIND = "joint type"
-#: a class in a module of the same name; paths alone make a joint that no scene can name
-NAMES = {name: f"{module_name(name)}:{name.title().replace('-', '')}" for name in (*IDEAL, "rotation-vector")}
-CONTACTS = {
-    "clearance-spherical": "clearance_spherical:ClearanceSpherical",
-    "clearance-revolute": "clearance_revolute:ClearanceRevolute",
-    "clearance-slot": "clearance_slot:ClearanceSlot",
-    "ball-on-plane": "ball_on_plane:BallOnPlane",
-}
+#: paths alone make a joint that no scene can name
+NAMES = {name: module_name(name) for name in (*IDEAL, "rotation-vector")}
+NAMES |= {n: f"turn_and_slide:{n.upper()}" for n in ("fixed", "revolute", "prismatic", "cylindrical", "planar")}
 #: joints that are always one link; others may become chains of those in CHAIN (see `model.chain`)
 WHOLE = ("fixed", "prismatic", "revolute", "spherical", "rotation-vector", "free")
 CHAIN = ("fixed", "prismatic", "revolute", "rotation-vector", "spherical")

@@ -45,6 +45,16 @@ class Coordinate:
         """Joint type with this freedom alone, about or along its z axis."""
         return "revolute" if self.turning else "prismatic"
 
+    def along(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Its axis, shape (..., 3), at the frames F and G: named fields of SITE_FRAMES, shape (...)."""
+        axis: np.ndarray = (b if self.side else a)["axes"][..., :, self.axis]
+        return axis
+
+    def wrench(self, a: np.ndarray, b: np.ndarray, size: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Moment about the kernels' origin and force of what acts along it on G with a size, shapes (..., 3)."""
+        push = size[..., None] * self.along(a, b)
+        return (push, np.zeros_like(push)) if self.turning else (np.cross(b["origin"], push), push)
+
     @property
     def axes(self) -> np.ndarray:
         """Axes of a frame whose z is this freedom's axis, as columns in F, shape (3, 3)."""

@@ -30,15 +30,12 @@ def position_rate(w, x, u, rate):
     put(w, rate + 4, at(w, u + 3))
 
 
-class Free:
-    """Everything is free; as a closure it would demand nothing."""
+POSITIONS, SPEEDS = "rrrrttt", "rrrttt"  #: r: rotation [rad or -], t: translation [m]
+TRANSLATIONS: tuple[int, ...] = ()
+ROTATIONS: tuple[tuple[int, int], ...] = ()
+COORDINATES: tuple[Coordinate, ...] = ()
 
-    POSITIONS, SPEEDS = "rrrrttt", "rrrttt"  #: r: rotation [rad or -], t: translation [m]
-    TRANSLATIONS: tuple[int, ...] = ()
-    ROTATIONS: tuple[tuple[int, int], ...] = ()
-    COORDINATES: tuple[Coordinate, ...] = ()
 
-    @staticmethod
-    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Quaternion and position, shape (7,)."""
-        return np.concatenate([matrix_to_quaternion(R), p])
+def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Quaternion and position, shape (7,)."""
+    return np.concatenate([matrix_to_quaternion(R), p])

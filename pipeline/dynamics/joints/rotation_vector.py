@@ -13,7 +13,7 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import ZERO, add, at, cross, dot, put, scale
+from flexclear.pipeline.dynamics.vectors import ZERO, about, add, at, cross, dot, put, scale
 
 #: angle^2 below which the functions are taken from their series; their next terms are below rounding there
 SERIES_ANGLE = 1e-2
@@ -41,17 +41,6 @@ def motion(w, x, u, S):
     """Motion of frame G in frame F: the rotation vector stored from x (see `spherical.motion`)."""
     v, r = at(w, x), at(w, u)
     c, a, b, da, db = _functions(dot(v, v))
-    R = (
-        1.0 - a * (v[1] * v[1] + v[2] * v[2]),
-        a * v[0] * v[1] - c * v[2],
-        a * v[0] * v[2] + c * v[1],
-        a * v[0] * v[1] + c * v[2],
-        1.0 - a * (v[0] * v[0] + v[2] * v[2]),
-        a * v[1] * v[2] - c * v[0],
-        a * v[0] * v[2] - c * v[1],
-        a * v[1] * v[2] + c * v[0],
-        1.0 - a * (v[0] * v[0] + v[1] * v[1]),
-    )
     for k in range(3):
         unit = (1.0 if k == 0 else 0.0, 1.0 if k == 1 else 0.0, 1.0 if k == 2 else 0.0)
         vu = cross(v, unit)
@@ -59,7 +48,7 @@ def motion(w, x, u, S):
         put(w, S + 6 * k + 3, ZERO)
     vr, ds = cross(v, r), 2.0 * dot(v, r)
     bias = add(add(scale(da * ds, vr), scale(db * ds, cross(v, vr))), scale(b, cross(r, vr)))
-    return R, ZERO, bias, ZERO
+    return about(v, c, a), ZERO, bias, ZERO
 
 
 @kernel
@@ -68,17 +57,14 @@ def position_rate(w, x, u, rate):
     put(w, rate, at(w, u))
 
 
-class RotationVector:
-    """Three rotations, held by a path; a joint of this type in a scene is `spherical`."""
+POSITIONS, SPEEDS = "rrr", "rrr"  #: r: rotation [rad or -], t: translation [m]
+TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
+ROTATIONS: tuple[tuple[int, int], ...] = ()
+COORDINATES: tuple[Coordinate, ...] = ()
 
-    POSITIONS, SPEEDS = "rrr", "rrr"  #: r: rotation [rad or -], t: translation [m]
-    TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
-    ROTATIONS: tuple[tuple[int, int], ...] = ()
-    COORDINATES: tuple[Coordinate, ...] = ()
 
-    @staticmethod
-    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Rotation vector [rad] of an angle up to pi, shape (3,)."""
-        q = matrix_to_quaternion(R)
-        half = np.linalg.norm(q[1:])
-        return q[1:] * (2.0 if half == 0.0 else 2.0 * np.arctan2(half, q[0]) / half)
+def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Rotation vector [rad] of an angle up to pi, shape (3,)."""
+    q = matrix_to_quaternion(R)
+    half = np.linalg.norm(q[1:])
+    return q[1:] * (2.0 if half == 0.0 else 2.0 * np.arctan2(half, q[0]) / half)

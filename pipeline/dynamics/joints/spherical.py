@@ -31,15 +31,12 @@ def position_rate(w, x, u, rate):
     quaternion_rate(w, x, u, rate)
 
 
-class Spherical:
-    """Three rotations are free; a closure keeps the two origins together."""
+POSITIONS, SPEEDS = "rrrr", "rrr"  #: r: rotation [rad or -], t: translation [m]
+TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
+ROTATIONS: tuple[tuple[int, int], ...] = ()
+COORDINATES: tuple[Coordinate, ...] = ()
 
-    POSITIONS, SPEEDS = "rrrr", "rrr"  #: r: rotation [rad or -], t: translation [m]
-    TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
-    ROTATIONS: tuple[tuple[int, int], ...] = ()
-    COORDINATES: tuple[Coordinate, ...] = ()
 
-    @staticmethod
-    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Quaternion of R_FG, shape (4,); the offset p is the closure's business."""
-        return matrix_to_quaternion(R)
+def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Quaternion of R_FG, shape (4,); the offset p is the closure's business."""
+    return matrix_to_quaternion(R)

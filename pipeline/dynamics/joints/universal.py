@@ -24,19 +24,15 @@ def motion(w, x, u, S):
 
 position_rate = rates_are_speeds(2)
 
+POSITIONS, SPEEDS = "rr", "rr"  #: r: rotation [rad or -], t: translation [m]
+TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
+ROTATIONS: tuple[tuple[int, int], ...] = ((0, 1),)
+COORDINATES = (
+    Coordinate("first", True, axis=0, sine=(2, 1), cosine=(1, 1)),
+    Coordinate("second", True, axis=1, side=1, sine=(0, 2), cosine=(0, 0)),
+)
 
-class Universal:
-    """Two rotations about crossing axes at right angles: x of the first frame and y of the second."""
 
-    POSITIONS, SPEEDS = "rr", "rr"  #: r: rotation [rad or -], t: translation [m]
-    TRANSLATIONS: tuple[int, ...] = (0, 1, 2)
-    ROTATIONS: tuple[tuple[int, int], ...] = ((0, 1),)
-    COORDINATES = (
-        Coordinate("first", True, axis=0, sine=(2, 1), cosine=(1, 1)),
-        Coordinate("second", True, axis=1, side=1, sine=(0, 2), cosine=(0, 0)),
-    )
-
-    @staticmethod
-    def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Angles about x of the first and y of the second frame [rad] in (-pi, pi], shape (2,)."""
-        return np.array([np.arctan2(R[2, 1], R[1, 1]), np.arctan2(R[0, 2], R[0, 0])])
+def coordinates(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Angles about x of the first and y of the second frame [rad] in (-pi, pi], shape (2,)."""
+    return np.array([np.arctan2(R[2, 1], R[1, 1]), np.arctan2(R[0, 2], R[0, 0])])

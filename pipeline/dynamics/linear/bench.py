@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TypeVar
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
@@ -25,9 +26,9 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT
 from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias, mass_factor
 from flexclear.pipeline.dynamics.run.run import begun, driven
+from flexclear.pipeline.dynamics.run.states import rows_of
 
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
+Pose = TypeVar("Pose")
 
 #: drives reach the requested pose in strides of this fraction of the mechanism's size, or this angle
 STRIDE = 0.05
@@ -105,10 +106,7 @@ def hold(
     if not moving:
         last[:, 1] = 0.0
     for name, value in (drives or {}).items():
-        if name not in model.drives:
-            remedy = suggestion(name, list(model.drives)) if model.drives else "the scene has no drives"
-            raise InputError(f"drive '{name}'", "there is no such drive", remedy)
-        k = model.drives.index(name)
+        k = drive_number(model, name)
         last[k, 0] = model.drive_signs[k] * value
     engine.modes[:], engine.latched[:] = 1, NO_IMPACT
     first[:, 1] = 0.0
@@ -117,6 +115,14 @@ def hold(
     q = carry(bench, closed(bench, start[: model.nq]), last[:, 0])
     set_drives(bench, last)
     return replace(bench, drives=last), q
+
+
+def drive_number(model: Model, name: str) -> int:
+    """Number of a drive; InputError where there is none of this name."""
+    if name not in model.drives:
+        remedy = suggestion(name, list(model.drives)) if model.drives else "the scene has no drives"
+        raise InputError(f"drive '{name}'", "there is no such drive", remedy)
+    return model.drives.index(name)
 
 
 def drive_state(engine: Engine, time: float) -> np.ndarray:
@@ -140,22 +146,36 @@ def set_drives(bench: Bench, drives: np.ndarray) -> None:
 
 def carry(bench: Bench, q: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Positions after the drives have gone to `target` in strides, the loops closed after each."""
-    origin, fraction, stride = bench.drives[:, 0], 0.0, 1.0
     if not bench.model.closures:
-        fraction = 1.0
-    else:
-        way = float(np.max(np.abs(target - origin) / bench.units, initial=0.0))
-        stride = min(1.0, STRIDE / way) if way > 0.0 else 1.0
+        return q
+    origin = bench.drives[:, 0]
+    way = float(np.max(np.abs(target - origin) / bench.units, initial=0.0))
+
+    def at(fraction: float, start: np.ndarray) -> np.ndarray:
+        set_drives(bench, np.stack([origin + fraction * (target - origin), 0.0 * target], axis=1))
+        return closed(bench, start)
+
+    return in_strides(at, q, min(1.0, STRIDE / way) if way > 0.0 else 1.0, SHORTEST_STRIDE)
+
+
+def in_strides(at: Callable[[float, Pose], Pose], pose: Pose, longest: float, shortest: float) -> Pose:
+    """The pose at the end of a way, from that at its start, by `at` of fractions of the way and the pose before.
+
+    A stride is halved where `at` raises SolverError; that is raised where one of the shortest is still too long.
+    """
+    fraction = 0.0
     while fraction < 1.0:
-        attempt = min(1.0, fraction + stride)
-        try:
-            set_drives(bench, np.stack([origin + attempt * (target - origin), 0.0 * target], axis=1))
-            q, fraction = closed(bench, q), attempt
-        except SolverError:
-            stride *= 0.5
-            if stride < SHORTEST_STRIDE:
-                raise
-    return q
+        stride = min(longest, 1.0 - fraction)
+        while True:
+            try:
+                pose = at(min(1.0, fraction + stride), pose)
+                break
+            except SolverError:
+                stride *= 0.5
+                if stride < shortest:
+                    raise
+        fraction = min(1.0, fraction + stride)
+    return pose
 
 
 def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarray:
@@ -170,11 +190,7 @@ def state(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> np.ndarra
 
 def rows(bench: Bench, states: np.ndarray) -> np.ndarray:
     """Rows of the record for states; contacts act as they are."""
-    contacts = len(bench.model.contacts)
-    made = m.empty_record(len(states), contacts, bench.model.ny)
-    record = m.record(made, contacts)
-    record.time[:], record.modes[:], record.latched[:], record.state[:] = bench.time, 1, NO_IMPACT, states
-    return made
+    return rows_of(bench.engine, states, bench.time, 1.0, NO_IMPACT)
 
 
 def observe(bench: Bench, states: np.ndarray) -> Observed:
@@ -209,14 +225,15 @@ def balance(bench: Bench, q: np.ndarray, v: np.ndarray | None = None) -> Balance
     forces = bias(engine)
     if not np.all(np.isfinite(forces)):
         raise SolverError(f"at t = {bench.time:.6g} s: the forces are not numbers in this pose")
+    slip = engine.view(m.RESIDUAL_RATE)[selection.kept_places(engine.model, engine.h)]
+    return Balance(modes_of(engine.model.arrays) @ forces, *inertia(engine), slip)
+
+
+def inertia(engine: Engine) -> tuple[np.ndarray, np.ndarray]:
+    """Mass and Jacobian of the rows solved for in the state evaluated last, shapes (nv, nv) and (rows, nv)."""
     modes = modes_of(engine.model.arrays)
     L = modes @ mass_factor(engine)
-    return Balance(
-        modes @ forces,
-        L @ L.T,
-        engine.rows(m.JACOBIAN) @ modes.T,
-        engine.view(m.RESIDUAL_RATE)[selection.kept_places(engine.model, engine.h)],
-    )
+    return L @ L.T, engine.rows(m.JACOBIAN) @ modes.T
 
 
 def balancing(bench: Bench) -> float:

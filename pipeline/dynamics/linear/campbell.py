@@ -11,26 +11,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 from scipy.optimize import linear_sum_assignment
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.schema import CAMPBELL, conform
-from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress
-from flexclear.pipeline.dynamics.linear.bench import Bench, hold, observe, set_drives, state
+from flexclear.pipeline.dynamics.linear.bench import Bench, drive_number, hold, observe, set_drives, state
 from flexclear.pipeline.dynamics.linear.dataset import equilibrium, motions
-from flexclear.pipeline.dynamics.linear.equilibrium import Equilibrium
-from flexclear.pipeline.dynamics.linear.steady import steady_near
+from flexclear.pipeline.dynamics.linear.equilibrium import Equilibrium, steady_near
 from flexclear.pipeline.dynamics.linear.vibrations import Vibrations
 from flexclear.pipeline.dynamics.record.dataset import attributes, subject
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: fraction of a vibration's displacements, or of its energy, that decides what it is
 DECISIVE = 0.8
@@ -117,9 +112,7 @@ def campbell(
 def _drive(bench: Bench, name: str | None) -> int:
     names, moving = list(bench.model.drives), np.flatnonzero(bench.drives[:, 1])
     if name is not None:
-        if name not in names:
-            raise InputError(f"drive '{name}'", "there is no such drive", suggestion(name, names))
-        return names.index(name)
+        return drive_number(bench.model, name)
     if len(names) == 1 or len(moving) == 1:
         return 0 if len(names) == 1 else int(moving[0])
     raise InputError(

@@ -19,28 +19,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import SuperLU, splu
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics.effects import CONTACTS, NORMAL_LAWS
+from flexclear.pipeline.dynamics.effects import NORMAL_LAWS, SURFACES
 from flexclear.pipeline.dynamics.model.closing import misfit
-from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands
+from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: the motion is examined so often
 BOUND_TIMES = 32
@@ -53,21 +50,10 @@ KNOCK = 10.0
 OF_POSE = ("position", "orientation")
 
 
-@dataclass(frozen=True)
-class Bounds:
-    """Largest influences of clearances over the motion, in SI, by joint, of each quantity.
+def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Mapping[str, Mapping[str, float]]:
+    """Largest influences of a scene's clearances over its motion, in SI, by joint, of each quantity.
 
-    load: largest force of each joint with clearance in the ideal motion [N].
-    """
-
-    clearance: Mapping[str, Mapping[str, float]]
-    load: Mapping[str, float]
-
-
-def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Bounds:
-    """Bounds for the clearances of a scene from the run of its ideal mechanism.
-
-    Of `chosen` those that the pose decides are bounded.
+    run: of its ideal mechanism.  Of `chosen` those that the pose decides are bounded.
     """
     model, seen = run.model, run.observed
     loose = [name for name in full.contacts() if name in model.scene.joint]
@@ -90,7 +76,7 @@ def bounds(full: Scene, run: Run, chosen: Sequence[Quantity]) -> Bounds:
             for name in loose:
                 reach = lever.clearance(name, adjoint.rows) * _play(full.contacts()[name], load[name])
                 clearance[name][q.name] = max(clearance[name][q.name], reach)
-    return Bounds(clearance, load)
+    return clearance
 
 
 def is_whole(model: Model) -> bool:
@@ -103,7 +89,7 @@ def _play(joint: Clearance, force: float) -> float:
     """How far the points may separate [m]: the clearance, and how deep a force presses the surfaces."""
     law = lookup(NORMAL_LAWS, joint.normal.law, where="[normal]")
     exponent = law.exponent if joint.normal.exponent is None else joint.normal.exponent
-    stiffness = lookup(CONTACTS, joint.type, where="[joint]").stiffness(joint, exponent)
+    stiffness = lookup(SURFACES, joint.type, where="[joint]").stiffness(joint, exponent)
     return float(joint.clearance + (KNOCK * force / stiffness) ** (1.0 / exponent))
 
 
@@ -112,15 +98,14 @@ class Lever:
     """How openings of the joints move the links, in one pose.
 
     gradient: rates of all joints' residuals, (rows, 6 (links - 1)).  normal: of the least-squares solution, factored.
-    joints: of each joint, where its demands begin.  axes: wrenches of each joint's demands and driven coordinates.
-    length: by which openings are reported as fractions.
+    joints: of each joint, where its demands begin, and the wrenches of these and of its driven coordinates, in units of
+    the residuals.  length: by which openings are reported as fractions.
     """
 
     gradient: sparse.csc_array
     normal: SuperLU
-    joints: Mapping[str, tuple[Constraint, slice]]
+    joints: Mapping[str, tuple[Constraint, slice, np.ndarray]]
     length: float
-    axes: Mapping[str, np.ndarray]
 
     def adjoint(self, shown: np.ndarray) -> Adjoint:
         """The adjoint solution of what is shown, (3, 6 (links - 1)): what unit loads on it do in the joints."""
@@ -130,7 +115,7 @@ class Lever:
 
     def clearance(self, name: str, rows: np.ndarray) -> float:
         """Largest motion of what an adjoint solution describes, per metre of separation of a joint's points."""
-        constraint, mine = self.joints[name]
+        constraint, mine, _ = self.joints[name]
         count = 2 if constraint.edge.kind == "revolute" else 3
         first = rows[:, mine][:, :count] / self.length
         return float(np.linalg.svd(first, compute_uv=False).max(initial=0.0))
@@ -150,18 +135,17 @@ def lever_of(model: Model, joints: Sequence[Constraint], poses: Sequence[Placeme
     normal = (G.T @ G).tocsc()
     least = SQUARED_RANK * float(normal.diagonal().max(initial=1.0))
     factored = splu(normal + least * sparse.eye_array(normal.shape[0], format="csc"))
-    where, axes, row = {}, {}, 0
+    where, row, length = {}, 0, model.mechanism.length
     for joint in joints:
-        wrench = _wrenches(joint, poses)
-        where[joint.name], axes[joint.name] = (joint, slice(row, row + len(wrench))), wrench
-        row += len(wrench)
-    return Lever(G, factored, where, model.mechanism.length, axes)
+        wrenches = _wrenches(joint, poses)
+        unit = np.where(np.any(wrenches[:, 3:] != 0.0, axis=1), 1.0 / length, 1.0)
+        where[joint.name] = joint, slice(row, row + len(wrenches)), unit[:, None] * wrenches
+        row += len(wrenches)
+    return Lever(G, factored, where, length)
 
 
 def _wrenches(joint: Constraint, poses: Sequence[Placement]) -> np.ndarray:
     """Wrenches of all rows that a joint has in `misfit`: its demands, then its driven coordinates."""
-    from flexclear.pipeline.dynamics.model.constraints import prescribed
-
     A, B = joint.frames(poses)
     demanded = demands(joint.edge.kind, A, B)[1]
     return np.vstack([demanded, prescribed(joint.edge.kind, A, B, joint.values)[1]]) if joint.values else demanded
@@ -198,18 +182,17 @@ def modal_forces(
     name: str,
     bundle: Labelled,
     loads: Mapping[str, tuple[np.ndarray, np.ndarray]],
-    rows: slice,
 ) -> np.ndarray:
     """Forces of its joints, its inertia and gravity along the elastic coordinates of a body, shape (rows, mode) [N]."""
     i = model.mechanism.link_of[name]
-    R_WB = motions.link(i).R[rows] @ model.mechanism.links[i].places[name].R
+    R_WB = motions.link(i).R @ model.mechanism.links[i].places[name].R
     shapes, turns = bundle["frame_translation_shape"].values, bundle["frame_rotation_shape"].values
     frames = [str(frame) for frame in bundle["frame"].values]
-    accelerations = np.einsum("tji,tj->ti", R_WB, motions.link(i).a[rows] - model.gravity)
+    accelerations = np.einsum("tji,tj->ti", R_WB, motions.link(i).a - model.gravity)
     forces = -accelerations @ bundle["modal_first_moment"].values
     for joint, (frame, sign) in _ports(model.scene, name).items():
         k = frames.index(frame)
-        moment, force = (sign * np.einsum("tji,tj->ti", R_WB, part[rows]) for part in loads[joint])
+        moment, force = (sign * np.einsum("tji,tj->ti", R_WB, part) for part in loads[joint])
         forces = forces + force @ shapes[k] + moment @ turns[k]
     return np.asarray(forces)
 
@@ -243,12 +226,11 @@ def openings(
         at = placement.of(Placement(bundle["frame_position"].values[k])).p
         carried[body] = Carried(at, theta, u)
         twist = np.vstack([theta, u - np.cross(theta, at, axisa=0, axisb=0).T])
-        for joint_name, (constraint, rows) in lever.joints.items():
-            wrench = lever.axes[joint_name]
-            unit = np.where(np.any(wrench[:, 3:] != 0.0, axis=1), 1.0 / lever.length, 1.0)
+        for constraint, rows, wrenches in lever.joints.values():
             for end, sign in ((constraint.edge.frame_a, -1.0), (constraint.edge.frame_b, 1.0)):
-                if _held_by(end, body, name, frame):
-                    matrix[rows] += sign * unit[:, None] * (wrench @ twist)
+                # a frame moves with what is carried: a body, or one frame of the flexible body itself
+                if body in (end, end.partition(".")[0]):
+                    matrix[rows] += sign * (wrenches @ twist)
     return matrix, carried
 
 
@@ -283,8 +265,3 @@ def _carried(scene: Scene, name: str) -> dict[str, str]:
                     open_ends.append(other)
     own = [frame for joint, (frame, _) in _ports(scene, name).items() if scene.joint[joint].type != "fixed"]
     return carriers | {f"{name}.{frame}": frame for frame in own}
-
-
-def _held_by(end: str, carried: str, name: str, frame: str) -> bool:
-    """Whether a joint's frame moves with what is carried: a body, or one frame of the flexible body itself."""
-    return end == f"{name}.{frame}" if carried == f"{name}.{frame}" else end.partition(".")[0] == carried

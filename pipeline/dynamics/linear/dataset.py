@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.schema import EQUILIBRIUM, LINEAR, conform
 from flexclear.pipeline.core.numerics.rotations import first_largest
 from flexclear.pipeline.core.scene.parts import RigidBody
@@ -18,9 +19,6 @@ from flexclear.pipeline.dynamics.record.dataset import attributes, dataset, subj
 from flexclear.pipeline.dynamics.record.motion import Motion, Motions
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 PARTS = ("real", "imaginary")
 

@@ -1,31 +1,39 @@
-r"""Static equilibrium: positions in which the forces along all free motions vanish.
+r"""Poses in balance: static equilibrium, where the forces along all free motions vanish, and steady motion, where they
+balance, those of inertia included, while the drives keep their speed.
 
-Newton's method on those forces, in the metric of the mass. The stiffness enters by the magnitude of its eigenvalues, so
-that a step goes downhill also where a mechanism is about to tip over; it is limited in length, and a line search on the
-power of the unbalanced force along the step halves it until it no longer shoots far past the balance. The power, not
-an energy, because a force need not have a potential; a ball finds the floor of its socket, where the stiffness jumps
-from nothing to 1e8 N/m, in some thirty steps.
+Static equilibrium by Newton's method in the metric of the mass. The stiffness enters by the magnitude of its
+eigenvalues, so that a step goes downhill also where a mechanism is about to tip over; it is limited in length, and a
+line search on the power of the unbalanced force along the step halves it until it no longer shoots far past the
+balance. The power, not an energy, because a force need not have a potential; a ball finds the floor of its socket,
+where the stiffness jumps from nothing to 1e8 N/m, in some thirty steps.
 
-Source: line search by the power: Crisfield, *Non-linear Finite Element Analysis*, vol. 1, sec. 9.2.
+Steady motion by full steps, because it need not be a minimum of anything: above its critical speed an unbalanced rotor
+is held by gyroscopic forces in a pose from which the forces alone push away (self-centring). Where a single start does
+not lead there, the speed grows in strides from rest, each starting from the pose before; a stride may pass a critical
+speed, at which an undamped rotor has no steady motion. Stability is judged afterwards, by the eigenvalues.
+
+Source: line search by the power: Crisfield, *Non-linear Finite Element Analysis*, vol. 1, sec. 9.2; strides: Allgower &
+Georg (2003), Introduction to Numerical Continuation Methods, ch. 2; self-centring: Genta (2005), Dynamics of Rotating
+Systems, sec. 2.4.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
+from flexclear.pipeline.core.scene.loads import Bushing
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
-from flexclear.pipeline.dynamics.linear.bench import Bench, closed, hold
-from flexclear.pipeline.dynamics.linear.tangent import Tangent, magnitude, stiffness, tangent
+from flexclear.pipeline.dynamics.linear.bench import Bench, balance, balancing, closed, hold, in_strides, set_drives
+from flexclear.pipeline.dynamics.linear.tangent import EPSILON, Tangent, magnitude, stiffness, tangent
+from flexclear.pipeline.dynamics.linear.vibrations import ZERO_EIGENVALUE, Vibrations, vibrations
 from flexclear.pipeline.dynamics.model.model import Model
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
+from flexclear.pipeline.dynamics.run.evaluation.closure_rows import built_rows
 
 #: iterations before giving up
 MOST_MOVES = 200
@@ -39,6 +47,16 @@ STALLED = 1e-8
 LIMP = 1e-12
 #: a step may end with this fraction of the starting power turned against it
 OVERSHOOT = 0.5
+#: corrections of one pose; each is at most this fraction of the one before, else a stride has to be shorter
+CORRECTIONS, CONTRACTION = 20, 0.5
+#: corrections below this fraction of the mechanism's size, or of a radian, that shrink no more are rounding
+STALLED_CORRECTION = 1e-8
+#: shortest stride, as a fraction of the drives' speed: narrow against the way between two critical speeds
+SHORTEST = 1.0 / 256.0
+#: speeds of the loops, and change of the forces on the way of the drives, that steady motion may show, relative
+STEADY = 1e-9
+#: how far the drives are moved to see whether the forces stay the same, in radians or fractions of the mechanism's size
+PROBE = 0.1
 
 
 @dataclass(frozen=True)
@@ -48,19 +66,6 @@ class Equilibrium:
     at: Tangent
     residual: float
     iterations: int
-
-
-def equilibrium(
-    scene: Scene,
-    bundles: Mapping[str, Labelled],
-    progress: Progress,
-    time: float | None,
-    drives: Mapping[str, float] | None,
-) -> tuple[Bench, Equilibrium]:
-    """The bench of a scene and its equilibrium, drives held; see `pipeline.dynamics.equilibrium`."""
-    bench, q = hold(scene, bundles, progress, time, drives, False)
-    progress(None, "Computing the equilibrium")
-    return bench, descend(bench, q)
 
 
 def descend(bench: Bench, q: np.ndarray) -> Equilibrium:
@@ -142,3 +147,160 @@ def _leading(model: Model, motion: np.ndarray, mass: np.ndarray) -> str:
         if link.flexible:
             fractions[f"deformation of {link.flexible}"] = float(energy[model.numbering.modal_coordinates[i]].sum())
     return max(fractions, key=lambda name: fractions[name])
+
+
+def balanced(
+    scene: Scene,
+    bundles: Mapping[str, Labelled],
+    progress: Progress,
+    time: float | None = None,
+    drives: Mapping[str, float] | None = None,
+    moving: bool = False,
+) -> tuple[Bench, Equilibrium, Vibrations | None]:
+    """The bench of a scene, its equilibrium or steady motion, and of the latter the vibrations about it.
+
+    Arguments as of `pipeline.dynamics.equilibrium`.
+    """
+    bench, q = hold(scene, bundles, progress, time, drives, moving)
+    progress(None, f"Computing the {'steady motion' if moving else 'equilibrium'}")
+    return (bench, *steady_near(bench, q)) if moving else (bench, descend(bench, q), None)
+
+
+def steady_near(bench: Bench, q: np.ndarray) -> tuple[Equilibrium, Vibrations]:
+    """The steady motion near positions q (loops closed), and the vibrations about it.
+
+    Where the one that Newton's method reaches is unstable, a stable one that the forces lead to is preferred, as of a
+    governor whose arms rise.  Raises SolverError where there is none, or the motion is not steady.
+    """
+    reached, failure = list[tuple[Equilibrium, Vibrations]](), None
+    # angles with their turns, which the search follows, belong to the pose
+    internal, kept = bench.internal.copy(), list[np.ndarray]()
+    for find in (_continued, descend) if np.any(bench.drives[:, 1]) else (descend,):
+        bench.internal[:] = internal
+        try:
+            rest = find(bench, q)
+            reached.append((rest, vibrations(bench, rest.at)))
+            kept.append(bench.internal.copy())
+        except SolverError as error:
+            failure = failure or error
+            continue
+        if reached[-1][1].stable:
+            break
+    if not reached:
+        assert failure is not None
+        bench.internal[:] = internal
+        _require_turning_frames(bench)
+        raise failure
+    best = next((k for k, (_, small) in enumerate(reached) if small.stable), 0)
+    bench.internal[:] = kept[best]
+    _require_steady(bench, reached[best][0].at)
+    return reached[best]
+
+
+def _continued(bench: Bench, q: np.ndarray) -> Equilibrium:
+    """The steady motion by Newton's method, at once or with the drives' speed growing from rest."""
+    internal = bench.internal.copy()
+    try:
+        return newton(bench, q)
+    except SolverError:
+        bench.internal[:] = internal
+
+    def at(fraction: float, before: Equilibrium) -> Equilibrium:
+        set_drives(bench, bench.drives * [1.0, fraction])
+        internal = bench.internal.copy()
+        try:
+            return newton(bench, before.at.q)
+        except SolverError:
+            bench.internal[:] = internal
+            raise
+
+    try:
+        set_drives(bench, bench.drives * [1.0, 0.0])
+        return in_strides(at, descend(bench, q), 1.0, SHORTEST)
+    finally:
+        set_drives(bench, bench.drives)
+
+
+def newton(bench: Bench, q: np.ndarray) -> Equilibrium:
+    """The pose in balance that full steps of Newton's method reach from q; SolverError where they do not contract."""
+    at, last, iteration = tangent(bench, q), np.inf, 0
+    size = bench.model.speed_scales
+    for iteration in range(1, CORRECTIONS + 1):
+        forces = at.forces * float(np.linalg.norm(np.abs(at.Z).T @ (1.0 / size)))
+        step = _correction(bench, at, BALANCED * forces)
+        length = float(np.max(np.abs(step) / size, initial=0.0))
+        if length <= SHORT_MOVE or (length <= STALLED_CORRECTION and length > CONTRACTION * last):
+            return Equilibrium(at, residual(bench, at), iteration)
+        if not length <= min(LONGEST_MOVE, CONTRACTION * last):
+            break
+        at, last = tangent(bench, closed(bench, at.q + at.moves @ step)), length
+    raise SolverError(
+        f"at t = {bench.time:.6g} s: no steady motion was reached from this pose in {iteration} corrections; a force "
+        f"of {residual(bench, at):.3g} N stays unbalanced"
+    )
+
+
+def _correction(bench: Bench, at: Tangent, negligible: float) -> np.ndarray:
+    """Newton's step of all coordinates, shape (nv,); motions that nothing drives back stay where they are."""
+    if not at.Z.shape[1]:
+        return np.zeros(len(at.bias))
+    first, _ = stiffness(bench, at, at.Z)
+    # along the principal motions soft ones are not lost in the rounding of stiff ones
+    motions = at.Z @ np.linalg.svd(first)[2].T
+    K, error = stiffness(bench, at, motions)
+    size, forces = np.linalg.norm(K, axis=0), motions.T @ at.bias
+    firm = size > np.maximum(ZERO_EIGENVALUE * error, np.finfo(float).tiny)
+    along = -np.linalg.lstsq(K[:, firm] / size[firm], forces, rcond=None)[0] / size[firm]
+    left = float(np.linalg.norm(forces + K[:, firm] @ along))
+    if left > max(negligible, STALLED_CORRECTION * float(np.linalg.norm(forces))):
+        raise SolverError(
+            f"at t = {bench.time:.6g} s: nothing holds a motion against a force of {residual(bench, at):.3g} N"
+        )
+    return motions[:, firm] @ along
+
+
+def _require_steady(bench: Bench, at: Tangent) -> None:
+    """SolverError unless the pose stays in balance, and the loops closed, while the drives move on."""
+    fastest = bench.fastest
+    if fastest == 0.0:
+        return
+    model, before = bench.model, balance(bench, at.q)
+    forces = balancing(bench)
+    along = built_rows(model, bench.engine.h) == 0
+    loops = float(np.max(np.abs(before.slip) / np.where(along, model.length, 1.0), initial=0.0))
+    if loops <= STEADY * fastest:
+        set_drives(
+            bench, bench.drives + np.stack([PROBE * bench.drives[:, 1] / fastest, 0.0 * bench.drives[:, 1]], axis=1)
+        )
+        after = balance(bench, at.q)
+        forces = max(forces, balancing(bench))
+        set_drives(bench, bench.drives)
+        change = float(np.max(np.abs(after.bias - before.bias) * model.speed_scales, initial=0.0))
+        if change <= STEADY * forces + _rounding(bench, at):
+            return
+    _require_turning_frames(bench)
+    raise SolverError(
+        f"at t = {bench.time:.6g} s: the drives' motion is not steady: the forces on the free coordinates change "
+        "as they go on; hold the drives instead"
+    )
+
+
+def _rounding(bench: Bench, at: Tangent) -> float:
+    """What rounding of positions does to stiff forces along the free motions that balance, as moments [N m]."""
+    K, _ = stiffness(bench, at, at.Z)
+    forces = at.mass @ at.Z @ K @ at.Z.T @ at.mass
+    size = bench.model.speed_scales
+    return EPSILON * float(np.max(size * (np.abs(forces) @ size), initial=0.0))
+
+
+def _require_turning_frames(bench: Bench) -> None:
+    """SolverError for a body that only a bushing connects to others: its coordinates do not move with the drives."""
+    loose = {name for link in bench.model.links[1:] if link.branch.edge is None for name in link.places}
+    for name, load in bench.scene.forces().items():
+        mounted = loose & {frame.partition(".")[0] for frame in load.between} if isinstance(load, Bushing) else ()
+        for body in mounted:
+            raise SolverError(
+                f"at t = {bench.time:.6g} s: {body} is held by no joint: its coordinates ignore the drives, and "
+                f"no pose of it is steady; give it a joint of type `free` with the frames of the bushing {name}: "
+                f'between = ["{load.between[0]}", "{load.between[1]}"]'
+            )

@@ -20,11 +20,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.linalg
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.parts import RigidBody
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.dynamics.linear import clearance_response
@@ -34,9 +34,6 @@ from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.run import Run
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: poses at which the vibrations are examined
 RESPONSE_POSES = 8
@@ -81,14 +78,12 @@ def response(
     if not bundles or not clearance_response.is_whole(model):
         return unknown
     once = np.concatenate([[True], np.diff(time) > 0.0])  # a break of a drive may be recorded from both its sides
-    time, every = time[once], slice(0, len(time))
+    time = time[once]
     held = [
         n for n, joint in model.scene.joint.items() if any(end.partition(".")[0] in bundles for end in joint.between)
     ]
     loads = joint_wrenches(motions, held)
-    forces = np.hstack(
-        [clearance_response.modal_forces(model, motions, n, b, loads, every)[once] for n, b in bundles.items()]
-    )
+    forces = np.hstack([clearance_response.modal_forces(model, motions, n, b, loads)[once] for n, b in bundles.items()])
     joints, responses = constraints(model.mechanism), list[Response]()
     for row in np.unique(np.linspace(0, len(once) - 1, RESPONSE_POSES).astype(int)):
         poses = [Placement(frame["origin"], frame["axes"]) for frame in motions.seen.links[row]]
@@ -271,6 +266,5 @@ def _reaction(assembled: _Assembled, joint: str) -> np.ndarray:
     """Force of a joint per acceleration of each vibration, (3, vibrations): what holds the momenta that it moves."""
     lever = assembled.lever
     multipliers = lever.gradient @ lever.normal.solve(assembled.momenta @ assembled.modes)
-    rows, axes = lever.joints[joint][1], lever.axes[joint]
-    unit = np.where(np.any(axes[:, 3:] != 0.0, axis=1), 1.0 / lever.length, 1.0)
-    return np.asarray((unit[:, None] * axes[:, 3:]).T @ multipliers[rows])
+    _, rows, wrenches = lever.joints[joint]
+    return np.asarray(wrenches[:, 3:].T @ multipliers[rows])

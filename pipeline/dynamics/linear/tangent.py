@@ -3,18 +3,40 @@ r"""The motions that closures leave free, and forces along them.
 With :math:`Z` such that :math:`JZ = 0` and :math:`Z^TMZ = 1`, small motions are :math:`Z z`, and the loops' multipliers
 do no work on them. The stiffness is the derivative of :math:`Z^T(\mathrm{bias} - J^T\lambda)` at fixed
 :math:`\lambda`: forces in the loops stiffen or weaken a mechanism as the tension of a string does.
+
+Changes of forces are exact: the kernels of the right-hand side, run on numbers with their derivatives. Forces of one
+mechanism change over lengths from a millimetre (gravity, springs) to a nanometre (a contact that is just closed). No
+step width fits all, and none is needed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 import scipy.linalg
 
 from flexclear.pipeline.core.system.errors import SolverError
-from flexclear.pipeline.dynamics.linear.bench import Bench, acting, balance, balancing, displacement_map, set_drives
-from flexclear.pipeline.dynamics.linear.changes import force_changes
+from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.compile import sources
+from flexclear.pipeline.dynamics.effects import Parts
+from flexclear.pipeline.dynamics.linear.bench import (
+    Bench,
+    acting,
+    balance,
+    balancing,
+    displacement_map,
+    set_drives,
+    state,
+)
+from flexclear.pipeline.dynamics.model import selection
+from flexclear.pipeline.dynamics.model.interface_basis import modes_of
+from flexclear.pipeline.dynamics.run.evaluation import closure_rows
+from flexclear.pipeline.dynamics.run.evaluation.tree_factor import bias
+from flexclear.pipeline.dynamics.specialise import dual
 
 #: singular values of the closures below this fraction of the largest are redundant rows
 REDUNDANT_ROW = 1e-9
@@ -27,7 +49,7 @@ class Tangent:
     """A pose of a mechanism and the free motions about it.
 
     q: positions.  Z: speeds per free motion, shape (nv, mobility).  moves: positions per coordinate, (nq, nv).
-    bias, mass, multipliers: as in `bench.Balance`; multipliers balance `bias` best.  slip: rates of the loops.
+    bias, mass, multipliers: as in `bench.Balance`; multipliers balance `bias` best.
     forces: that balance (`bench.balancing`).
     """
 
@@ -37,7 +59,6 @@ class Tangent:
     bias: np.ndarray
     mass: np.ndarray
     multipliers: np.ndarray
-    slip: np.ndarray
     redundant: int
     forces: float
 
@@ -51,25 +72,32 @@ def tangent(bench: Bench, q: np.ndarray) -> Tangent:
     """The free motions at positions q whose loops are closed; SolverError where these are far beyond any real pose."""
     b, forces = balance(bench, q), balancing(bench)
     try:
-        lower = np.linalg.cholesky(b.mass)
+        Z, lower, spread = free_motions(b.mass, b.jacobian)
     except np.linalg.LinAlgError:
         raise SolverError(
             f"at t = {bench.time:.6g} s: bodies are so far deformed that the mass matrix is not positive definite"
         ) from None
-    spread = scipy.linalg.solve_triangular(lower, b.jacobian.T, lower=True).T
-    scale = np.linalg.norm(spread, axis=1)
-    rows = spread[scale > 0.0] / scale[scale > 0.0, None]
-    rank, free = 0, np.eye(len(b.bias))
-    if len(rows):
-        _, values, axes = np.linalg.svd(rows)
-        rank = int(np.sum(values > REDUNDANT_ROW * values[0]))
-        free = axes[rank:].T
-    Z = scipy.linalg.solve_triangular(lower.T, free)
     load = scipy.linalg.solve_triangular(lower, b.bias, lower=True)
     multipliers = np.linalg.lstsq(spread.T, load, rcond=REDUNDANT_ROW)[0] if len(spread) else np.zeros(0)
     moves = displacement_map(bench, q)
-    redundant = len(b.jacobian) - rank + bench.engine.mobility.redundant
-    return Tangent(q, Z, moves, b.bias, b.mass, multipliers, b.slip, redundant, forces)
+    redundant = len(b.jacobian) - (len(b.bias) - Z.shape[1]) + bench.engine.mobility.redundant
+    return Tangent(q, Z, moves, b.bias, b.mass, multipliers, redundant, forces)
+
+
+def free_motions(mass: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Z, shape (nv, mobility); the mass' factor L, and J L^-T.
+
+    Raises LinAlgError for a mass that is not positive definite.
+    """
+    lower = np.linalg.cholesky(mass)
+    spread = scipy.linalg.solve_triangular(lower, jacobian.T, lower=True).T
+    scale = np.linalg.norm(spread, axis=1)
+    rows = spread[scale > 0.0] / scale[scale > 0.0, None]
+    free = np.eye(len(mass))
+    if len(rows):
+        _, values, axes = np.linalg.svd(rows)
+        free = axes[int(np.sum(values > REDUNDANT_ROW * values[0])) :].T
+    return scipy.linalg.solve_triangular(lower.T, free), lower, spread
 
 
 def stiffness(bench: Bench, at: Tangent, motions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -116,3 +144,31 @@ def _rounding(bench: Bench, motions: np.ndarray, changes: np.ndarray, forces: fl
 def magnitude(motions: np.ndarray, bias: np.ndarray) -> float:
     """Size of the terms of which the forces along motions are sums."""
     return float(np.linalg.norm(np.abs(motions).T @ np.abs(bias)))
+
+
+def force_changes(bench: Bench, q: np.ndarray, directions: np.ndarray, multipliers: np.ndarray) -> np.ndarray:
+    """Changes of bias - J^T multipliers at rest in positions q, along directions; shape (directions, nv).
+
+    directions: changes of the state, (directions, NY).  multipliers: constant, (rows,).  Raises SolverError where the
+    equations are singular.
+    """
+    engine, model, count = bench.engine, bench.model, len(directions)
+    y = state(bench, q)
+    # leaves the laws of time, and what each stretch holds, in the work space
+    closure_rows.evaluate(engine, y, bench.time)
+    h, w = engine.h.tolist(), list(engine.w)
+    w[h[m.Y] : h[m.Y] + len(y)] = dual.seeded(y, directions)
+    with np.errstate(all="ignore"):  # as in compiled code, what is not used may be infinite
+        _rates(model.parts)(h, list(model.arrays.f), w, engine.n.tolist(), h[m.Y], h[m.SLOPES])
+
+    o = h[m.JACOBIAN]
+    rows = selection.dense(model, engine.h, dual.changes(w[o : o + engine.lengths[m.JACOBIAN]], count))
+    forces = dual.changes(bias(engine, np.array(w, dtype=object)), count)
+    return (forces - multipliers @ rows) @ modes_of(model.arrays).T
+
+
+@cache
+def _rates(parts: Parts) -> Callable:
+    scope: dict[str, Any] = {}
+    exec(sources.rates(parts), scope)
+    return dual.plain(scope["rates"])

@@ -5,10 +5,12 @@ A load between two sites acts on both by one wrench, with opposite signs: it lea
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from flexclear.pipeline.dynamics import gauge
 from flexclear.pipeline.dynamics.bodies.rigid import apply_wrench
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.vectors import scale
+from flexclear.pipeline.dynamics.vectors import cross, dot, scale, turn
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -23,6 +25,12 @@ def number(d, k, which):
 def law(d, k, which):
     """Present value of a law of load k."""
     return d.law[d.loads[k].law0 + which].value
+
+
+@kernel
+def laws(d, k):
+    """Present values of three laws of load k, as a vector."""
+    return (law(d, k, 0), law(d, k, 1), law(d, k, 2))
 
 
 @kernel
@@ -48,3 +56,28 @@ def act(d, k, moment, force, value, rate, stored, power, loss):
 def measure(d, k):
     """Joint coordinate of load k, its rate, and the wrench (moment, force) of a unit force along it."""
     return gauge.counted(d, d.loads[k].gauge)
+
+
+def along_coordinate(size: Callable) -> Callable:
+    """The kernel `apply` of loads along a joint coordinate by size(d, k) [N or N m]; all of its power is work."""
+
+    @kernel
+    def apply(d, k):
+        value, rate, moment, force = measure(d, k)
+        pushing = size(d, k)
+        act(d, k, scale(pushing, moment), scale(pushing, force), value, rate, 0.0, pushing * rate, 0.0)
+
+    return apply
+
+
+def at_origin(given: Callable) -> Callable:
+    """The kernel `apply` of loads at the origin of a frame by the vector given(d, k) [N]; all of its power is work."""
+
+    @kernel
+    def apply(d, k):
+        frame, force = d.site_frames[d.loads[k].b], given(d, k)
+        if d.loads[k].follows:
+            force = turn(frame.axes, force)
+        act(d, k, cross(frame.origin, force), force, 0.0, 0.0, 0.0, dot(force, frame.velocity), 0.0)
+
+    return apply

@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.scene.loads import JointForce as Declared
+from flexclear.pipeline.core.scene.loads import JointForce
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import act, law, measure
+from flexclear.pipeline.dynamics.loads.fields import along_coordinate, law
 from flexclear.pipeline.dynamics.loads.row import Row
-from flexclear.pipeline.dynamics.vectors import scale
 
 
 @kernel
-def apply(d, k):
-    """Apply load k."""
-    value, rate, moment, force = measure(d, k)
-    size = law(d, k, 0)
-    act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, size * rate, 0.0)
+def given(d, k):
+    """The force of load k."""
+    return law(d, k, 0)
 
 
-class JointForce:
-    """See the module's text."""
+apply = along_coordinate(given)
 
-    apply = staticmethod(apply)
 
-    @staticmethod
-    def row(load: Declared, path: str, coordinate: Coordinate) -> Row:
-        """One law [N or N m]."""
-        return Row(joint=load.joint, laws=((load.force, coordinate.force, f"{path[:-1]}.force]"),))
+def row(load: JointForce, path: str, coordinate: Coordinate) -> Row:
+    """One law [N or N m]."""
+    return Row(joint=load.joint, laws=((load.force, coordinate.force, f"{path[:-1]}.force]"),))

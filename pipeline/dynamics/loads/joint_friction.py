@@ -6,7 +6,7 @@ regularised coefficient.
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.scene.loads import JointFriction as Declared
+from flexclear.pipeline.core.scene.loads import JointFriction
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.contact.friction.modified_coulomb import coefficient
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
@@ -28,31 +28,25 @@ def apply(d, k):
     act(d, k, scale(size, moment), scale(size, force), value, rate, 0.0, 0.0, -size * rate)
 
 
-class JointFriction:
-    """See the module's text."""
-
-    apply = staticmethod(apply)
-
-    @staticmethod
-    def row(load: Declared, path: str, coordinate: Coordinate) -> Row:
-        """Viscous coefficient [N s/m or N m s/rad], static and dynamic friction [N or N m], their speeds."""
-        viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
-        if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
-            raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")
-        dry, kinks = (0.0, 0.0, 1.0, 2.0), (0.0, 0.0)
-        if load.coulomb is not None:
-            speed, c = "angular velocity" if coordinate.turning else "velocity", load.coulomb
-            forces = (quantity(c.static, coordinate.force), quantity(c.dynamic, coordinate.force))
-            kinks = (quantity(c.v_static, speed), quantity(c.v_dynamic, speed))
-            dry = (*forces, *kinks)
-            if not 0.0 <= dry[1] <= dry[0]:
-                raise ValueError(
-                    "coulomb: dynamic must not be negative, nor exceed static; "
-                    f"dynamic = {dry[1]:.6g}, static = {dry[0]:.6g}"
-                )
-            if not 0.0 < dry[2] < dry[3]:
-                raise ValueError(
-                    "coulomb: v_static must be positive and below v_dynamic; "
-                    f"v_static = {dry[2]:.6g}, v_dynamic = {dry[3]:.6g}"
-                )
-        return Row(joint=load.joint, numbers=(viscous, *dry), bends=(kinks if load.coulomb else (),))
+def row(load: JointFriction, path: str, coordinate: Coordinate) -> Row:
+    """Viscous coefficient [N s/m or N m s/rad], static and dynamic friction [N or N m], their speeds."""
+    viscous = quantity(load.viscous, "torsional damping" if coordinate.turning else "damping")
+    if viscous < 0.0 or (viscous == 0.0 and load.coulomb is None):
+        raise ValueError(f"viscous must not be negative, nor zero without coulomb; viscous = {viscous:.6g}")
+    dry, kinks = (0.0, 0.0, 1.0, 2.0), (0.0, 0.0)
+    if load.coulomb is not None:
+        speed, c = "angular velocity" if coordinate.turning else "velocity", load.coulomb
+        forces = (quantity(c.static, coordinate.force), quantity(c.dynamic, coordinate.force))
+        kinks = (quantity(c.v_static, speed), quantity(c.v_dynamic, speed))
+        dry = (*forces, *kinks)
+        if not 0.0 <= dry[1] <= dry[0]:
+            raise ValueError(
+                "coulomb: dynamic must not be negative, nor exceed static; "
+                f"dynamic = {dry[1]:.6g}, static = {dry[0]:.6g}"
+            )
+        if not 0.0 < dry[2] < dry[3]:
+            raise ValueError(
+                "coulomb: v_static must be positive and below v_dynamic; "
+                f"v_static = {dry[2]:.6g}, v_dynamic = {dry[3]:.6g}"
+            )
+    return Row(joint=load.joint, numbers=(viscous, *dry), bends=(kinks if load.coulomb else (),))

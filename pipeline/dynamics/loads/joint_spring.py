@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.scene.loads import JointSpring as Declared
+from flexclear.pipeline.core.scene.loads import JointSpring
 from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.kernels import kernel
@@ -21,20 +21,14 @@ def apply(d, k):
     act(d, k, scale(size, moment), scale(size, force), value, rate, stored, 0.0, damped * rate)
 
 
-class JointSpring:
-    """See the module's text."""
-
-    apply = staticmethod(apply)
-
-    @staticmethod
-    def row(load: Declared, path: str, coordinate: Coordinate) -> Row:
-        """Stiffness [N/m or N m/rad], damping [N s/m or N m s/rad], rest value [m or rad]."""
-        kind = "torsional " if coordinate.turning else ""
-        stiffness, damping = quantity(load.stiffness, f"{kind}stiffness"), quantity(load.damping, f"{kind}damping")
-        if stiffness < 0.0 or damping < 0.0 or stiffness == damping == 0.0:
-            raise ValueError(
-                "stiffness and damping must not be negative, and not both be zero; "
-                f"stiffness = {stiffness:.6g}, damping = {damping:.6g}"
-            )
-        numbers = (stiffness, damping, quantity(load.rest, coordinate.dimension))
-        return Row(joint=load.joint, numbers=numbers, counts_turns=coordinate.turning)
+def row(load: JointSpring, path: str, coordinate: Coordinate) -> Row:
+    """Stiffness [N/m or N m/rad], damping [N s/m or N m s/rad], rest value [m or rad]."""
+    kind = "torsional " if coordinate.turning else ""
+    stiffness, damping = quantity(load.stiffness, f"{kind}stiffness"), quantity(load.damping, f"{kind}damping")
+    if stiffness < 0.0 or damping < 0.0 or stiffness == damping == 0.0:
+        raise ValueError(
+            "stiffness and damping must not be negative, and not both be zero; "
+            f"stiffness = {stiffness:.6g}, damping = {damping:.6g}"
+        )
+    numbers = (stiffness, damping, quantity(load.rest, coordinate.dimension))
+    return Row(joint=load.joint, numbers=numbers, counts_turns=coordinate.turning)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 from flexclear.pipeline.core.scene.formulas import Formula
-from flexclear.pipeline.core.scene.loads import LineExpression as Declared
+from flexclear.pipeline.core.scene.loads import LineExpression
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act
 from flexclear.pipeline.dynamics.loads.looks import line
@@ -28,10 +28,6 @@ def applying(formula: Callable) -> SimpleNamespace:
     return SimpleNamespace(apply=apply)
 
 
-class LineExpression:
-    """See the module's text."""
-
-    @staticmethod
-    def row(load: Declared, path: str, formula: Formula) -> Row:
-        """What the expression reads, and its numbers."""
-        return by_formula(formula, path, frames=load.between)
+def row(load: LineExpression, path: str, formula: Formula) -> Row:
+    """What the expression reads, and its numbers."""
+    return by_formula(formula, path, frames=load.between)

@@ -6,31 +6,16 @@ from collections.abc import Callable
 from types import SimpleNamespace
 
 from flexclear.pipeline.core.scene.formulas import Formula
-from flexclear.pipeline.core.scene.loads import PointExpression as Declared
-from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import act
+from flexclear.pipeline.core.scene.loads import PointExpression
+from flexclear.pipeline.dynamics.loads.fields import at_origin
 from flexclear.pipeline.dynamics.loads.row import Row, by_formula
-from flexclear.pipeline.dynamics.vectors import cross, dot, turn
 
 
 def applying(formula: Callable) -> SimpleNamespace:
     """The kernel `apply` of loads whose expressions the kernel formula(d, k) computes, as a vector."""
-
-    @kernel
-    def apply(d, k):
-        frame = d.site_frames[d.loads[k].b]
-        force = formula(d, k)
-        if d.loads[k].follows:
-            force = turn(frame.axes, force)
-        act(d, k, cross(frame.origin, force), force, 0.0, 0.0, 0.0, dot(force, frame.velocity), 0.0)
-
-    return SimpleNamespace(apply=apply)
+    return SimpleNamespace(apply=at_origin(formula))
 
 
-class PointExpression:
-    """See the module's text."""
-
-    @staticmethod
-    def row(load: Declared, path: str, formula: Formula) -> Row:
-        """What the expressions read, and their numbers."""
-        return by_formula(formula, path, frames=(load.frame,), follows=load.axes == "frame")
+def row(load: PointExpression, path: str, formula: Formula) -> Row:
+    """What the expressions read, and their numbers."""
+    return by_formula(formula, path, frames=(load.frame,), follows=load.axes == "frame")

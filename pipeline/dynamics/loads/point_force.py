@@ -2,31 +2,14 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.scene.loads import PointForce as Declared
-from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import act, law
+from flexclear.pipeline.core.scene.loads import PointForce
+from flexclear.pipeline.dynamics.loads.fields import at_origin, laws
 from flexclear.pipeline.dynamics.loads.row import Row
-from flexclear.pipeline.dynamics.vectors import cross, dot, turn
+
+apply = at_origin(laws)
 
 
-@kernel
-def apply(d, k):
-    """Apply load k."""
-    frame = d.site_frames[d.loads[k].b]
-    force = (law(d, k, 0), law(d, k, 1), law(d, k, 2))
-    if d.loads[k].follows:
-        force = turn(frame.axes, force)
-    power = dot(force, frame.velocity)
-    act(d, k, cross(frame.origin, force), force, 0.0, 0.0, 0.0, power, 0.0)
-
-
-class PointForce:
-    """See the module's text."""
-
-    apply = staticmethod(apply)
-
-    @staticmethod
-    def row(load: Declared, path: str) -> Row:
-        """Three laws [N]."""
-        laws = tuple((c, "force", f"{path[:-1]}.force]") for c in load.force)
-        return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")
+def row(load: PointForce, path: str) -> Row:
+    """Three laws [N]."""
+    laws = tuple((c, "force", f"{path[:-1]}.force]") for c in load.force)
+    return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")

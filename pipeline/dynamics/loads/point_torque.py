@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.scene.loads import PointTorque as Declared
+from flexclear.pipeline.core.scene.loads import PointTorque
 from flexclear.pipeline.dynamics.kernels import kernel
-from flexclear.pipeline.dynamics.loads.fields import ZERO, act, law
+from flexclear.pipeline.dynamics.loads.fields import ZERO, act, laws
 from flexclear.pipeline.dynamics.loads.row import Row
 from flexclear.pipeline.dynamics.vectors import dot, turn
 
@@ -13,19 +13,13 @@ from flexclear.pipeline.dynamics.vectors import dot, turn
 def apply(d, k):
     """Apply load k."""
     frame = d.site_frames[d.loads[k].b]
-    torque = (law(d, k, 0), law(d, k, 1), law(d, k, 2))
+    torque = laws(d, k)
     if d.loads[k].follows:
         torque = turn(frame.axes, torque)
     act(d, k, torque, ZERO, 0.0, 0.0, 0.0, dot(torque, frame.omega), 0.0)
 
 
-class PointTorque:
-    """See the module's text."""
-
-    apply = staticmethod(apply)
-
-    @staticmethod
-    def row(load: Declared, path: str) -> Row:
-        """Three laws [N m]."""
-        laws = tuple((c, "torque", f"{path[:-1]}.torque]") for c in load.torque)
-        return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")
+def row(load: PointTorque, path: str) -> Row:
+    """Three laws [N m]."""
+    laws = tuple((c, "torque", f"{path[:-1]}.torque]") for c in load.torque)
+    return Row(frames=(load.frame,), laws=laws, follows=load.axes == "frame")

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.loads import SpringDamper as Declared
+from flexclear.pipeline.core.scene.loads import SpringDamper
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.loads.fields import act, number
 from flexclear.pipeline.dynamics.loads.row import Row
@@ -33,12 +33,6 @@ def apply(d, k):
     act(d, k, cross(p, force), force, length, rate, stored, 0.0, damped * rate)
 
 
-class SpringDamper:
-    """See the module's text."""
-
-    apply = staticmethod(apply)
-
-    @staticmethod
-    def row(load: Declared, path: str) -> Row:
-        """Stiffness [N/m], damping [N s/m], free length [m]."""
-        return Row(frames=load.between, numbers=(load.stiffness, load.damping, load.free_length or 0.0))
+def row(load: SpringDamper, path: str) -> Row:
+    """Stiffness [N/m], damping [N s/m], free length [m]."""
+    return Row(frames=load.between, numbers=(load.stiffness, load.damping, load.free_length or 0.0))

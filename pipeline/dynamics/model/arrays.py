@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 
 
 class WorkSpace(NamedTuple):
@@ -55,7 +55,7 @@ class Arrays:
         room: what the integration method needs, from the header.
         """
         h, end = self.h.copy(), 0
-        lengths = _work_lengths(h, room, self.columns)
+        lengths = _work_lengths(h, room(h), self.columns)
         for index, length in lengths.items():
             h[index] = end
             end += length
@@ -132,79 +132,12 @@ def envelope_size(envelope: np.ndarray) -> int:
     return int(envelope["origin"][last] + last + 1)
 
 
-def _work_lengths(h: np.ndarray, room: Callable[[np.ndarray], m.Room], columns: int) -> dict[int, int]:
-    known, contacts, ny, nv = (int(h[index]) for index in (m.N_DRIVES, m.N_CONTACTS, m.NY, m.NV))
-    closure_rows, links, nq = int(h[m.N_CLOSURE_ROWS]), int(h[m.N_LINKS]), int(h[m.NQ])
-    coordinates, positions = nv + known, nq + known
-    requested = room(h)
-    tables = {
-        m.LINK_FRAMES: links,
-        m.SITE_FRAMES: int(h[m.N_SITES]),
-        m.SUBSPACE: 6,
-        m.OWN: links,
-        m.INERTIA: links,
-        m.WRENCH: links,
-        m.COLUMNS: columns,
-        m.MOMENTA: columns,
-        m.DEFORMATION: nv,
-        m.ARTICULATED: links,
-        m.TRANSMITTED: links,
-        m.LOCAL: nv + known,
-        m.GAIN: nv,
-        m.ROWS: closure_rows + int(h[m.SIZES["n_couplings"]]),
-        m.TOUCH: contacts,
-        m.CLOSURE_WRENCH: int(h[m.N_CLOSURES]),
-        m.ENERGY: int(h[m.N_COMPONENTS]),
-        m.LAW: int(h[m.N_LAWS]),
-        m.LOAD: int(h[m.N_LOADS]),
-        m.LOAD_BENDS: int(h[m.N_LOAD_BENDS]),
-        m.WATCH: contacts,
-        m.GUARDED: int(h[m.N_GUARDS]),
-    }
-    lengths = {table.place: table.size * count for table, count in tables.items()} | {
-        m.X: positions,
-        m.U: coordinates,
-        m.DU: coordinates,
-        m.INTERFACE_X: nv,
-        m.INTERFACE_U: nv,
-        m.BIAS: coordinates,
-        m.MODAL_BIAS: nv,
-        m.MODAL: 25 * int(h[m.MOST_MODES]),
-        m.SCRATCH: 18,
-        m.MASS: int(h[m.MASS_SIZE]),
-        m.FORCE: nv,
-        m.RESIDUAL: closure_rows,
-        m.RESIDUAL_RATE: closure_rows,
-        m.GAMMA: closure_rows,
-        m.JACOBIAN: int(h[m.JACOBIAN_SIZE]),
-        m.SPREAD: int(h[m.JACOBIAN_SIZE]),
-        m.SCHUR: int(h[m.SCHUR_SIZE]),
-        m.ROW_SCALE: 2 * closure_rows,
-        m.PIVOT: m.PIVOT_SIZE,
-        m.MULTIPLIER: closure_rows,
-        m.INDEPENDENCE: 3 * closure_rows,
-        m.COLLOCATION: m.COLLOCATION_ROWS * ny if closure_rows else 0,
-        m.INTERNAL: int(h[m.N_INTERNAL]),
-        m.DRIVE_FORCE: known,
-        m.LEDGER_RATE: int(h[m.N_LEDGER]),
-        m.POSITION_RATE: positions,
-        m.Y: ny,
-        m.Y_NEW: ny,
-        m.Y_STAGE: ny,
-        m.SLOPES: requested.slopes * ny,
-        m.DENSE: requested.dense * ny,
-        m.MEMORY: requested.memory,
-        m.MAGNITUDE: int(h[m.N_GROUPS]),
-        m.CORRECTION: nv,
-        m.LATCHED: contacts,
-        m.CONTROL: m.N_CONTROLS,
-    }
-    return dict(sorted((lengths | _lengths_of_effects(h)).items()))
+def _work_lengths(h: np.ndarray, room: m.Room, columns: int) -> dict[int, int]:
+    """Of the stretches and tables of w, by their indices in the header, in their order."""
+    known = {name: int(h[index]) for name, index in m.SIZES.items()} | vars(room) | {"columns": columns}
 
+    def count(text: str) -> int:
+        terms = (term.split("*") for term in text.split("+"))
+        return sum(prod(int(one) if one.isdigit() else known[one] for one in factors) for factors in terms)
 
-def _lengths_of_effects(h: np.ndarray) -> dict[int, int]:
-    lengths = {}
-    for name, length in ((name, length) for effect in EFFECTS for name, length in effect.lengths.items()):
-        index, size = (m.NAMED[name].place, m.NAMED[name].size) if name in m.NAMED else (m.STRETCHES[name], 1)
-        lengths[index] = size * length(lambda name: int(h[m.SIZES[name]]))
-    return lengths
+    return {index: size * count(text) for index, (size, text) in sorted(m.LENGTHS.items())}

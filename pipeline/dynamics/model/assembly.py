@@ -14,8 +14,8 @@ from flexclear.pipeline.dynamics.model import fitting, given_start
 from flexclear.pipeline.dynamics.model.chain import path_positions
 from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY, close, far_apart, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands
-from flexclear.pipeline.dynamics.model.deformation import start_place
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
+from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
 from flexclear.pipeline.dynamics.model.laws import NONE
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -120,7 +120,7 @@ def chain_positions(mechanism: Mechanism, link: Link, poses: Sequence[Placement]
         whole = path_positions(edge, G.R, G.p + mechanism.origin)
     else:
         relative = at(edge.frame_a).inverse().of(G)
-        whole = joint_class(edge.kind).coordinates(relative.R, relative.p)
+        whole = joint_type(edge.kind).coordinates(relative.R, relative.p)
     return np.asarray(joint.sign * whole[list(joint.positions)])
 
 

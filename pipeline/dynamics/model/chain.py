@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.tree import PATH, Edge
 
 #: x, y and z of the origin, then Cardan angles about x, y and z
@@ -53,7 +53,7 @@ def chain(edge: Edge, reverse: bool, port_near: bool, port_far: bool) -> list[In
 
 
 def _joint(edge: Edge, reverse: bool) -> list[InboardJoint]:
-    declared, sign = joint_class(edge.kind), -1.0 if reverse else 1.0
+    declared, sign = joint_type(edge.kind), -1.0 if reverse else 1.0
     count, driven = len(declared.POSITIONS), tuple(d for d in edge.drives if d is not None)
     one_axis = len({c.axis for c in declared.COORDINATES}) <= 1
     if count <= 1 or (not driven and (one_axis or not reverse)):
@@ -86,7 +86,7 @@ def _path(edge: Edge) -> list[InboardJoint]:
 def path_positions(edge: Edge, R: np.ndarray, p: np.ndarray) -> np.ndarray:
     """Positions of a path's chain for a pose in the world: origin [m], then quaternion or Cardan angles [rad]."""
     if not any(edge.drives[3:]):
-        return np.concatenate([p, joint_class("spherical").coordinates(R, p)])
+        return np.concatenate([p, joint_type("spherical").coordinates(R, p)])
     # R = Rx(a) Ry(b) Rz(c)
     angles = [np.arctan2(-R[1, 2], R[2, 2]), np.arcsin(np.clip(R[0, 2], -1.0, 1.0)), np.arctan2(-R[0, 1], R[0, 0])]
     return np.concatenate([p, angles])

@@ -11,7 +11,7 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix, skew
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model.constraints import Constraint, demands, prescribed
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 
@@ -196,7 +196,7 @@ def opposite(joints: Sequence[Constraint], poses: Sequence[Placement]) -> InputE
     """What is wrong about axes that a joint keeps parallel, if some face each other; coordinates count about them."""
     for joint in joints:
         A, B = joint.frames(poses)
-        pairs = joint_class(joint.edge.kind).ROTATIONS
+        pairs = joint_type(joint.edge.kind).ROTATIONS
         for k in range(3):
             others = {other for axis, other in pairs if axis == k} | {axis for axis, other in pairs if other == k}
             if len(others - {k}) == 2 and A.R[:, k] @ B.R[:, k] < SAME_WAY:

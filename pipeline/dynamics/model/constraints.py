@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.model.deformation import start_place
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
+from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
 from flexclear.pipeline.dynamics.model.laws import NONE, drive_laws
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -39,6 +39,13 @@ class Constraint:
     def frames(self, poses: Sequence[Placement]) -> tuple[Placement, Placement]:
         """Both frames in the world, from the poses of all links."""
         return poses[self.link_a].of(self.place_a), poses[self.link_b].of(self.place_b)
+
+    def coordinates(self, poses: Sequence[Placement]) -> dict[tuple[str, int], float]:
+        """Where its named coordinates are [m or rad], by its name and their numbers."""
+        A, B = self.frames(poses)
+        declared, relative = joint_type(self.edge.kind), A.inverse().of(B)
+        now = declared.coordinates(relative.R, relative.p)
+        return {(self.name, k): float(now[k]) for k in range(len(declared.COORDINATES))}
 
 
 def constraints(
@@ -75,7 +82,7 @@ def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarr
     A wrench times the twist of B relative to A (angular velocity; velocity of the point at the origin) is the
     residual's rate.
     """
-    declared = joint_class(kind)
+    declared = joint_type(kind)
     residuals, wrenches = [], []
     for k in declared.TRANSLATIONS:
         along = A.R[:, k]
@@ -89,7 +96,7 @@ def demands(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndarr
 
 def prescribed(kind: str, A: Placement, B: Placement, values: Mapping[int, float]) -> tuple[np.ndarray, np.ndarray]:
     """The same for the driven coordinates of a joint."""
-    declared, relative = joint_class(kind), A.inverse().of(B)
+    declared, relative = joint_type(kind), A.inverse().of(B)
     now = declared.coordinates(relative.R, relative.p)
     residuals, wrenches = [], []
     for k, value in values.items():
@@ -116,7 +123,7 @@ def freedoms(kind: str, A: Placement, B: Placement) -> tuple[np.ndarray, np.ndar
 
     Shapes (turns, 3) and (slides, 3), orthonormal each; turns come first in the joint's speeds.
     """
-    declared, (_, wrenches) = joint_class(kind), demands(kind, A, B)
+    declared, (_, wrenches) = joint_type(kind), demands(kind, A, B)
     turning = wrenches[len(declared.TRANSLATIONS) :, :3]
     turns = np.linalg.svd(turning)[2][len(turning) :] if len(turning) else np.eye(3)
     return np.asarray(turns), A.R.T[[k for k in range(3) if k not in declared.TRANSLATIONS]]

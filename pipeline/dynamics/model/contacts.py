@@ -11,7 +11,7 @@ from flexclear.pipeline.core.scene.clearance import Clearance
 from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.effects import CONTACTS, FRICTION_LAWS, NORMAL_LAWS, Parts
+from flexclear.pipeline.dynamics.effects import FRICTION_LAWS, NORMAL_LAWS, SURFACES, Parts
 from flexclear.pipeline.dynamics.effects.stops.model import End, ends_an_angle
 from flexclear.pipeline.dynamics.model.components import Floors, Group
 from flexclear.pipeline.dynamics.model.gauges import Gauges
@@ -106,21 +106,14 @@ def friction_law(name: str, joint: Any) -> Any:
 
 def _resolve(mechanism: Mechanism, contact: Contact) -> Resolved:
     joint, path = contact.joint, f"[{contact.place}.normal]"
-    masses = [mechanism.links[site.link].mass for site in (contact.outer, contact.inner)]
     normal = lookup(NORMAL_LAWS, joint.normal.law, where=path)
-    if isinstance(joint, End):
-        return _resolved(normal, joint, joint.normal.stiffness, None, path)
-    surfaces = lookup(CONTACTS, joint.type, where=path)
-    exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
+    surfaces = None if isinstance(joint, End) else lookup(SURFACES, joint.type, where=path)
+    stiffness, mass = joint.normal.stiffness, None
     try:
-        stiffness = surfaces.stiffness(joint, exponent)
-    except ValueError as error:
-        raise InputError(path, str(error)) from None
-    return _resolved(normal, joint, stiffness, _reduced_mass(masses), path)
-
-
-def _resolved(normal: Any, joint: Clearance | End, stiffness: float | None, mass: float | None, path: str) -> Resolved:
-    try:
+        if surfaces is not None:
+            exponent = normal.exponent if joint.normal.exponent is None else joint.normal.exponent
+            stiffness = surfaces.stiffness(joint, exponent)
+            mass = _reduced_mass([mechanism.links[site.link].mass for site in (contact.outer, contact.inner)])
         law: Resolved = normal.resolve(joint.normal, stiffness, mass)
     except ValueError as error:
         raise InputError(path, str(error)) from None

@@ -10,6 +10,7 @@ from flexclear.pipeline.core.scene.clearance import CONTACTS
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.registry import lookup, suggestion
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.effects import JOINTS
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
@@ -26,9 +27,23 @@ class Prescribed:
 
 
 @cache
-def joint_class(kind: str) -> Any:
-    """The class that declares a joint type; asked for some hundred times per link while a mechanism is built."""
+def joint_type(kind: str) -> Any:
+    """What declares a joint type; asked for some hundred times per link while a mechanism is built."""
     return lookup(JOINTS, kind, where="joint")
+
+
+def measured(value: Any, dimension: str, path: str) -> float:
+    """A number of a scene in SI; InputError, placed at `path`, for one of another dimension."""
+    try:
+        return quantity(value, dimension)
+    except ValueError as error:
+        raise InputError(path, str(error)) from None
+
+
+def label(joint: str, kind: str, k: int) -> str:
+    """Name in records and in ``[start.joint]`` of coordinate k of a joint of some type."""
+    declared: tuple[Coordinate, ...] = joint_type(kind).COORDINATES
+    return joint if len(declared) == 1 else f"{joint}.{declared[k].name}"
 
 
 def prescribed(scene: Scene) -> list[Prescribed]:
@@ -54,7 +69,7 @@ def coordinate_of(scene: Scene, joint: str, name: str | None, path: str) -> tupl
         raise InputError(
             f"{path[:-1]}.joint]", f"the {kind} joint '{joint}' has no coordinate", "name a joint with a free motion"
         )
-    known = joint_class(kind).COORDINATES
+    known = joint_type(kind).COORDINATES
     names = [c.name for c in known]
     if not names:
         raise InputError(
@@ -93,7 +108,7 @@ def joint_drives(scene: Scene) -> dict[str, tuple[str | None, ...]]:
         if isinstance(drive, PathDrive):
             continue
         joint, k, coordinate = coordinate_of(scene, drive.joint, drive.coordinate, f"[drive.{name}]")
-        drives = driven.get(joint) or (None,) * len(joint_class(scene.joint[joint].type).COORDINATES)
+        drives = driven.get(joint) or (None,) * len(joint_type(scene.joint[joint].type).COORDINATES)
         if drives[k] is not None:
             raise InputError(
                 f"[drive.{name}.joint]",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.core.scene.parts import FlexibleBody, RatioPerMode, Rayleigh
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
@@ -16,7 +17,8 @@ from flexclear.pipeline.dynamics.model.interface_basis import (
     frame_shapes,
     mass_coupled,
 )
-from flexclear.pipeline.dynamics.model.mechanism import Mechanism
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism, Site
+from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 if TYPE_CHECKING:
@@ -221,3 +223,15 @@ def _ports(numbering: Numbering, shortened: bool) -> tuple[list[Any], list[Any],
         data += chunks
         start += sum(len(chunk) for chunk in chunks)
     return rows, reals, np.concatenate([*data, np.zeros(0)])
+
+
+def start_place(mechanism: Mechanism, site: Site) -> Placement:
+    """A site in the frame of its link, moved by the deformation with which the scene lets its body begin."""
+    q, bundle = mechanism.deformation.get(site.link), mechanism.links[site.link].bundle
+    if q is None or bundle is None or site.frame is None:
+        return site.place
+    label = site.frame.partition(".")[2]
+    _, moves, turns = frame_shapes(bundle, label)
+    rest = np.zeros((1, len(q)))
+    shifted, _, _ = shift(moves, bow(mechanism, site.link, label), q[None], rest, rest)
+    return Placement(site.place.p + shifted[0], rotation_vector_to_matrix(turns @ q) @ site.place.R)

@@ -13,8 +13,8 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
 from flexclear.pipeline.dynamics.model.chain import path_positions
 from flexclear.pipeline.dynamics.model.constraints import Constraint, prescribed
-from flexclear.pipeline.dynamics.model.deformation import start_place
-from flexclear.pipeline.dynamics.model.driving import coordinate_of, joint_class
+from flexclear.pipeline.dynamics.model.driving import coordinate_of, joint_type, label
+from flexclear.pipeline.dynamics.model.flexible_bodies import start_place
 from flexclear.pipeline.dynamics.model.laws import drive_laws
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -98,17 +98,14 @@ def given_links(mechanism: Mechanism) -> set[int]:
 
 
 def _of_joint(joint: Constraint, poses: Sequence[Placement]) -> Iterator[Miss]:
-    A, B = joint.frames(poses)
-    relative, declared = A.inverse().of(B), joint_class(joint.edge.kind)
-    now = declared.coordinates(relative.R, relative.p)
-    for (k, value), difference in zip(
-        joint.values.items(), prescribed(joint.edge.kind, A, B, joint.values)[0], strict=True
-    ):
-        coordinate, drive = declared.COORDINATES[k], joint.edge.drives[k] if joint.edge.drives else None
-        what = f"joint '{joint.name}'" if len(declared.COORDINATES) == 1 else f"'{joint.name}.{coordinate.name}'"
+    now, kind = joint.coordinates(poses), joint.edge.kind
+    differences = prescribed(kind, *joint.frames(poses), joint.values)[0]
+    for (k, value), difference in zip(joint.values.items(), differences, strict=True):
+        coordinate, named = joint_type(kind).COORDINATES[k], label(joint.name, kind, k)
+        drive = joint.edge.drives[k] if joint.edge.drives else None
+        what = f"joint '{named}'" if named == joint.name else f"'{named}'"
         # the angle nearest to the law's, where turns are counted
-        start = value + float(difference) if coordinate.turning else float(now[k])
-        named = joint.name if len(declared.COORDINATES) == 1 else f"{joint.name}.{coordinate.name}"
+        start = value + float(difference) if coordinate.turning else now[joint.name, k]
         path = f"[drive.{drive}.law]" if drive else f"[start.joint.{named}.position]"
         rule = f"the law of drive '{drive}'" if drive else "its own start"
         yield Miss(drive, path, rule, what, start, value, coordinate.turning)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,15 +11,16 @@ from flexclear.pipeline.core.scene.loads import SpringDamper
 from flexclear.pipeline.core.scene.parts import FlexibleBody, Ground, MeshedRigidBody, RigidBody
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.gears.model import Coupling
+from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
 from flexclear.pipeline.dynamics.model.assembly import chain_positions
 from flexclear.pipeline.dynamics.model.constraints import outboard_place
-from flexclear.pipeline.dynamics.model.deformation import start_place
-from flexclear.pipeline.dynamics.model.driving import joint_class
-from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift
+from flexclear.pipeline.dynamics.model.driving import joint_type
+from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift, start_place
 from flexclear.pipeline.dynamics.model.gauges import angles
-from flexclear.pipeline.dynamics.model.given_rates import given_rates
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism
 from flexclear.pipeline.dynamics.model.model import Model
+from flexclear.pipeline.dynamics.model.start_table import given_coordinates, given_modes
 
 #: state -> frames of all links and sites, named fields of LINK_FRAMES and SITE_FRAMES, and rates at which the loops
 #: open, (closure rows,)
@@ -41,7 +42,7 @@ def start_state(model: Model) -> np.ndarray:
     """State at the start as the scene gives it, before the loops are closed; shape (NY,)."""
     y = np.zeros(model.ny)
     for i, link in enumerate(model.links[1:], start=1):
-        if not link.drives and joint_class(link.kind).POSITIONS:
+        if not link.drives and joint_type(link.kind).POSITIONS:
             y[model.numbering.positions[i]] = _positions(model.mechanism, link)
     for i, q in model.mechanism.deformation.items():
         y[model.numbering.modal_positions[i]] = q
@@ -56,7 +57,66 @@ def _positions(mechanism: Mechanism, link: Link) -> np.ndarray:
     assert link.inboard is not None
     F = starts[link.inboard.link].of(start_place(mechanism, link.inboard))
     relative = F.inverse().of(link.start.of(outboard_place(mechanism, link)))
-    return np.asarray(joint_class(link.kind).coordinates(relative.R, relative.p))
+    return np.asarray(joint_type(link.kind).coordinates(relative.R, relative.p))
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A rate that is given: `requested` [m/s or rad/s], where the scene says so, and what counts as much.
+
+    speed, sign: of which free coordinate it is the speed, times the sign; of a joint that closes a loop none.
+    sites: of the two frames of such a joint, `coordinate` which of its motions.
+    """
+
+    place: str
+    requested: float
+    size: float
+    speed: int | None = None
+    sign: float = 1.0
+    sites: tuple[int, int] = (0, 0)
+    coordinate: Coordinate | None = None
+
+    def of(self, sites: np.ndarray, u: np.ndarray) -> float:
+        """Its value at free speeds u, with the sites' frames, named fields of SITE_FRAMES."""
+        if self.speed is not None:
+            return self.sign * float(u[self.speed])
+        assert self.coordinate is not None
+        a, b = sites[self.sites[0]], sites[self.sites[1]]
+        along = self.coordinate.along(a, b)
+        if self.coordinate.turning:
+            return float(along @ (b["omega"] - a["omega"]))
+        arm = b["origin"] - a["origin"]
+        return float(along @ (b["velocity"] - a["velocity"] - np.cross(a["omega"], arm)))
+
+
+def given_rates(model: Model) -> list[Rate]:
+    """All rates that the scene gives, but those of driven coordinates."""
+    return [*_of_joints(model), *_of_modes(model)]
+
+
+def _of_joints(model: Model) -> Iterator[Rate]:
+    closures = model.arrays.table(m.CLOSURES)
+    for start in given_coordinates(model.scene):
+        if start.velocity is None:
+            continue
+        path, size = f"{start.place[:-1]}.velocity]", 1.0 if start.coordinate.turning else model.length
+        for i, link in enumerate(model.links):
+            edge = link.branch.edge
+            if edge is not None and edge.name == start.joint and not link.drives:
+                numbers = dict(zip(link.joint.positions, model.numbering.coordinates[i], strict=True))
+                if start.number in numbers:
+                    yield Rate(path, start.velocity, size, numbers[start.number], link.joint.sign)
+        for row, closure in zip(closures, model.closures, strict=True):
+            if not isinstance(closure, Coupling) and closure.edge.name == start.joint:
+                sites = int(row["site_a"]), int(row["site_b"])
+                yield Rate(path, start.velocity, size, sites=sites, coordinate=start.coordinate)
+
+
+def _of_modes(model: Model) -> Iterator[Rate]:
+    bundles = {link.flexible: link.bundle for link in model.links if link.flexible and link.bundle is not None}
+    for name, values in given_modes(model.scene, bundles, "velocity").items():
+        for c, value in zip(model.numbering.modal_coordinates[model.mechanism.link_of[name]], values, strict=True):
+            yield Rate(f"[start.modal.{name}.velocity]", float(value), float(model.speed_scales[c]), c)
 
 
 @dataclass(frozen=True)

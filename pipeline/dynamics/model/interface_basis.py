@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.model.mechanism import Mechanism, named_frames
+from flexclear.pipeline.dynamics.model.components import joined
+from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
@@ -52,9 +53,7 @@ def interface_basis(mechanism: Mechanism, link: int) -> InterfaceBasis:
     n = bundle.sizes["mode"]
     if mass_coupled(bundle) or any(body.stiffening is not None for body in mechanism.scene.flexible().values()):
         return InterfaceBasis(np.eye(n), 0)
-    scene = mechanism.scene
-    parts = (*scene.joint.values(), *scene.load.values(), *scene.drive.values())
-    used = {frame for part in parts for frame in named_frames(part) if frame.partition(".")[0] == name}
+    used = {frame for part in joined(mechanism.scene) for frame in part if frame.partition(".")[0] == name}
     return basis(_motions(bundle, sorted(used)), np.diag(bundle["modal_stiffness"].values))
 
 

@@ -15,7 +15,7 @@ from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.effects.stops.model import STOP, End, ends
 from flexclear.pipeline.dynamics.model.chain import InboardJoint, chain
-from flexclear.pipeline.dynamics.model.components import Components, components
+from flexclear.pipeline.dynamics.model.components import Components, components, joined
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.merge import (
     Frame,
@@ -370,8 +370,7 @@ def require_bodies(scene: Scene) -> None:
     moving = [*scene.rigid(), *scene.flexible()]
     if not moving:
         raise InputError("[body]", "the scene has no body that could move", "add a rigid or flexible body")
-    frames = [f for part in (scene.joint, scene.load, scene.drive) for p in part.values() for f in named_frames(p)]
-    held = {f.partition(".")[0] for f in frames}
+    held = {frame.partition(".")[0] for part in joined(scene) for frame in part}
     for name in moving:
         if scene.joint and name not in held:
             raise InputError(
@@ -379,10 +378,3 @@ def require_bodies(scene: Scene) -> None:
                 f"'{name}' is joined to nothing: no joint, load or path names a frame of it",
                 'join it to another body; if it is to fly freely, add a joint of type "free"',
             )
-
-
-def named_frames(part: object) -> tuple[str, ...]:
-    """Frames that a joint, load or drive names."""
-    between = getattr(part, "between", None)
-    frame = getattr(part, "frame", None)
-    return tuple(between) if between is not None else (frame,) if frame is not None else ()

@@ -19,10 +19,10 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.model.assembly import settled
 from flexclear.pipeline.dynamics.model.closing import LEAST_GYRATION, close
-from flexclear.pipeline.dynamics.model.constraints import constraints
+from flexclear.pipeline.dynamics.model.constraints import constraints, demands
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.model.rates import Rates, motions, rates, row_axes, row_unit, sites, unit_wrench
+from flexclear.pipeline.dynamics.model.rates import Rates, motions, rates, row_unit, sites, unit_wrench
 
 #: displacements, in radians and fractions of the mechanism's size, of the poses nearby; how many are searched for, and
 #: how many are enough; fraction of the displacement that such a pose must keep when its loops are closed
@@ -174,11 +174,8 @@ def _undetermined(model: Model, here: Rates, poses: Sequence[Placement]) -> froz
             row += 1
             continue
         edge, a, b = closure
-        along, about, force = row_axes(closure, poses)
-        point = sites(closure, poses)[1].p
-        wrenches = np.where(
-            force[:, None], np.hstack([np.cross(point, along) / L, along]), np.hstack([about, 0 * along])
-        )
+        _, wrenches = demands(edge.kind, *sites(closure, poses))
+        wrenches[:, :3] /= np.where(np.any(wrenches[:, 3:] != 0.0, axis=1), L, 1.0)[:, None]
         fraction = stresses[:, row : row + len(wrenches)]
         wrench = wrenches.T @ fraction.T
         carried[a.link] -= wrench

@@ -20,11 +20,10 @@ from flexclear.pipeline.dynamics.model import filling, flexible_bodies, guards, 
 from flexclear.pipeline.dynamics.model import loads as loading
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.model.assembly import assembled
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.gauges import Gauges
 from flexclear.pipeline.dynamics.model.loads import Load
 from flexclear.pipeline.dynamics.model.mechanism import Closure, Contact, Link, Mechanism
-from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.numbering import Numbering, number
 
 if TYPE_CHECKING:
@@ -113,44 +112,43 @@ def filled(
     gravity = loading.gravity(mechanism.scene)
     parts = _parts(numbering, normals, any(law.harmonic for law in [*drive_laws, *loaded.laws]))
     slots = filling.slots(mechanism, parts)
-    contacts = contacting.fill(numbering, parts, normals, touching, gauges, slots["bristles"])
-    effects = filling.tables(filling.Filling(numbering, parts, ordered, gauges, slots))
-    groups, floors = _error_groups(numbering, parts, gauges)
     books = _books(slots)
-    arrays = pack(
-        {
-            m.NQ: numbering.nq,
-            m.N_LEDGER: len(groups) - numbering.nq - numbering.nv,
-            m.N_DRIVES: numbering.known,
-            m.N_INTERNAL: gauges.internal,
-            m.N_LOAD_BENDS: len(loaded.bends),
-            m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
-            **{m.SIZES[f"{effect.name}_slot"]: slots[effect.name] for effect in parts.present if effect.ledger},
-            m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
-        },
-        {
-            m.LINK_NUMBERS: [_link_numbers(*one) for one in zip(mechanism.links, _borne(mechanism), strict=True)],
-            **(_wired(numbering, parts, books) | looped if like is None else {t: like.arrays.rows(t) for t in WIRED}),
-            **contacts,
-            **laws.fill([*in_tree, *loaded.laws]),
-            **loaded.tables,
-            m.LOADS: _booked(mechanism, loaded, books),
-            **effects,
-            **guards.fill(mechanism, parts, loaded),
-            **_recorded(mechanism),
-            m.GAUGES: gauges.rows,
-            m.GRAVITY: gravity,
-            m.GROUPS: groups,
-            m.FLOORS: floors,
-            m.BOOKS: books,
-            m.DRIVES: _drives(mechanism, books),
-            m.CLOSURE_NUMBERS: _closure_weights(mechanism, ordered),
-        },
-        numbering.columns,
-    )
+    tables = {
+        m.LINK_NUMBERS: [_link_numbers(*one) for one in zip(mechanism.links, _borne(mechanism), strict=True)],
+        **contacting.fill(numbering, parts, normals, touching, gauges, slots["bristles"]),
+        **laws.fill([*in_tree, *loaded.laws]),
+        **loaded.tables,
+        m.LOADS: _booked(mechanism, loaded, books),
+        **filling.tables(filling.Filling(numbering, parts, ordered, gauges, slots)),
+        **guards.fill(mechanism, parts, loaded),
+        **_recorded(mechanism),
+        m.GAUGES: gauges.rows,
+        m.GRAVITY: gravity,
+        m.BOOKS: books,
+        m.DRIVES: _drives(mechanism, books),
+        m.CLOSURE_NUMBERS: _closure_weights(mechanism, ordered),
+    }
+    tables[m.GROUPS], tables[m.FLOORS] = _error_groups(numbering, parts, gauges)
+    if like is None:
+        tables |= _wired(numbering, parts, books) | looped
+    else:
+        wired = {table for array in ("h", "f") for table in m.TABLES[array]} - tables.keys()
+        tables |= {table: like.arrays.rows(table) for table in wired}
+    ny = len(tables[m.GROUPS])
+    sizes = {
+        m.NQ: numbering.nq,
+        m.N_LEDGER: ny - numbering.nq - numbering.nv,
+        m.N_DRIVES: numbering.known,
+        m.N_INTERNAL: gauges.internal,
+        m.N_LOAD_BENDS: len(loaded.bends),
+        m.N_SURFACES: sum(contact.joint.type != STOP for contact in mechanism.contacts),
+        **{m.SIZES[f"{effect.name}_slot"]: slots[effect.name] for effect in parts.present if effect.ledger},
+        m.MOST_MODES: max((len(modes) for modes in numbering.modal_positions.values()), default=0),
+    }
+    arrays = pack(sizes, tables, numbering.columns)
     of_mechanism = (mechanism.drives, mechanism.drive_signs, gravity, mechanism.length)
     made = (mechanism, numbering, parts, arrays, mechanism.scene, mechanism.links, ordered, mechanism.contacts, normals)
-    return Model(*made, loaded.loads, *of_mechanism, numbering.nq, numbering.nv, len(groups))
+    return Model(*made, loaded.loads, *of_mechanism, numbering.nq, numbering.nv, ny)
 
 
 def _recorded(mechanism: Mechanism) -> dict[Any, Any]:
@@ -183,31 +181,14 @@ def _symmetric(J: np.ndarray) -> list[float]:
 #: root mean square, over the free coordinates, of how many there are from each to the ground, itself counted, up to
 #: which the mass matrix is factored as a matrix: beyond it, articulated inertias take less time (docs/engine.md)
 DEEP_TREE = 8.0
-#: tables that follow from links, joints, frames and flexible bodies alone
-WIRED = (
-    *(m.LINKS, m.SITES, m.SITE_NUMBERS, m.FLEXES, m.BASIS, m.MOMENTS, m.MOMENT_ROWS, m.PORTS, m.PAIRS, m.KNOWN_PAIRS),
-    *(
-        m.ENVELOPE,
-        m.CLOSURES,
-        m.CLOSURE_ROWS,
-        m.SUPPORT,
-        m.PATHS,
-        m.ENTRIES,
-        m.KNOWN_ENTRIES,
-        m.CLOSURE_PAIRS,
-        m.COMMON,
-    ),
-    *(m.CLOSURE_ENVELOPE, m.FLEX_NUMBERS, m.FLEX_DATA, m.MOMENT_VALUES, m.PORT_NUMBERS, m.PORT_DATA),
-    *(m.BASIS_VALUES, m.INTERFACE_DATA),
-)
 
 
 def _wired(numbering: Numbering, parts: Parts, books: Books) -> dict[Any, Any]:
-    """Those of the tables `WIRED` that are not of the closures."""
+    """Tables that follow from links, joints, frames and flexible bodies alone, but for those of the closures."""
     return {
         m.LINKS: _links(numbering, parts),
         m.SITES: [(s.link, numbering.port_of(k)) for k, s in enumerate(numbering.sites)],
-        m.SITE_NUMBERS: [_pose_row(s.place) for s in numbering.sites],
+        m.SITE_NUMBERS: [np.concatenate([s.place.p, s.place.R.ravel()]) for s in numbering.sites],
         **flexible_bodies.fill(numbering, [book.loss for book in books]),
         **wiring.mass_entries(numbering, parts.articulated),
     }
@@ -237,10 +218,6 @@ def articulated(numbering: Numbering) -> bool:
         depths += [before[link.branch.parent] + k for k in range(1, len(own) + 1)]
         before[i] = before[link.branch.parent] + len(own)
     return bool(np.sqrt(np.mean(np.square(depths))) > DEEP_TREE)
-
-
-def _pose_row(placement: Placement) -> np.ndarray:
-    return np.concatenate([placement.p, placement.R.ravel()])
 
 
 def _links(numbering: Numbering, parts: Parts) -> list[tuple[int, ...]]:
@@ -278,7 +255,7 @@ def _borne(mechanism: Mechanism) -> np.ndarray:
             sums[i] += mass, mass * np.linalg.norm(com), mass * com @ com + 0.5 * np.trace(J)
         mass, first, second = sums[i]
         a = float(np.linalg.norm(link.start.p - above.start.p))
-        if "t" in joint_class(link.kind).SPEEDS:
+        if "t" in joint_type(link.kind).SPEEDS:
             a = max(a, mechanism.length)
         sums[link.branch.parent] += mass, first + mass * a, second + a * (2.0 * first + mass * a)
     return sums[:, ::2]
@@ -360,7 +337,7 @@ def _floors(
             target[places[k]] = len(rows) - 1
 
     for i, link in enumerate(mechanism.links[1:], start=1):
-        declared = joint_class(link.kind)
+        declared = joint_type(link.kind)
         if not link.drives:
             fill(q_group, numbering.positions[i], declared.POSITIONS, of_link[i])
             fill(v_group, numbering.coordinates[i], declared.SPEEDS, of_link[i])
@@ -370,14 +347,10 @@ def _floors(
                 target[mine] = len(rows) - 1
     groups = [*q_group, *v_group]
     tail = [group for block in filling.blocks(mechanism, parts, energies, lengths).values() for group in block]
-    tail += [(1.0, 1, _part_of_sites(numbering, *sites)) for sites in gauges.owners]
+    acting = ([numbering.sites[site].link for site in sites if site >= 0] for sites in gauges.owners)  # -1: the world
+    tail += [(1.0, 1, mechanism.components.of(*links)) for links in acting]
     for floor, count, part in tail:
         rows.append((floor, part))
         groups += [len(rows) - 1] * count
     floors, owners = zip(*rows, strict=True)
     return np.array(groups, dtype=np.int64), np.array(floors), np.array(owners)
-
-
-def _part_of_sites(numbering: Numbering, *sites: int) -> int:
-    """The independent mechanism of what acts between sites; -1 is the world."""
-    return numbering.mechanism.components.of(*(numbering.sites[site].link for site in sites if site >= 0))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.interface_basis import InterfaceBasis, interface_basis
 from flexclear.pipeline.dynamics.model.mechanism import Link, Mechanism, Site
 
@@ -99,6 +99,11 @@ def number(mechanism: Mechanism) -> Numbering:
     numbering = Numbering(mechanism)
     _number_positions(numbering, mechanism.links)
     _number_coordinates(numbering, mechanism.links)
+    for i, link in enumerate(mechanism.links):
+        if link.drives:  # of which there are as many as positions and speeds
+            first, count = mechanism.drives.index(link.drives[0]), len(link.drives)
+            numbering.positions[i] = range(numbering.nq + first, numbering.nq + first + count)
+            numbering.coordinates[i] = range(numbering.nv + first, numbering.nv + first + count)
     numbering.columns = numbering.nv + numbering.known
     for link in mechanism.links[1:]:
         assert link.inboard is not None
@@ -106,25 +111,16 @@ def number(mechanism: Mechanism) -> Numbering:
     return numbering
 
 
-def _drive(mechanism: Mechanism, link: Link) -> int:
-    """Number of the first drive of a link whose joint is prescribed."""
-    return mechanism.drives.index(link.drives[0])
-
-
 def _number_positions(numbering: Numbering, links: list[Link]) -> None:
     numbering.positions = [range(0)] * len(links)
     for i, link in enumerate(links[1:], start=1):
         if not link.drives:
-            numbering.positions[i] = range(numbering.nq, numbering.nq + len(joint_class(link.kind).POSITIONS))
+            numbering.positions[i] = range(numbering.nq, numbering.nq + len(joint_type(link.kind).POSITIONS))
             numbering.nq = numbering.positions[i].stop
         if link.bundle is not None:
             numbering.modal_positions[i] = range(numbering.nq, numbering.nq + link.bundle.sizes["mode"])
             numbering.bases[i] = interface_basis(numbering.mechanism, i)
             numbering.nq = numbering.modal_positions[i].stop
-    for i, link in enumerate(links):
-        if link.drives:
-            first = numbering.nq + _drive(numbering.mechanism, link)
-            numbering.positions[i] = range(first, first + len(joint_class(link.kind).POSITIONS))
 
 
 def _number_coordinates(numbering: Numbering, links: list[Link]) -> None:
@@ -141,11 +137,7 @@ def _number_coordinates(numbering: Numbering, links: list[Link]) -> None:
             numbering.modal_coordinates[i] = range(numbering.nv, numbering.nv + len(numbering.modal_positions[i]))
             numbering.nv = numbering.modal_coordinates[i].stop
         if i and not links[i].drives:
-            numbering.coordinates[i] = range(numbering.nv, numbering.nv + len(joint_class(links[i].kind).SPEEDS))
+            numbering.coordinates[i] = range(numbering.nv, numbering.nv + len(joint_type(links[i].kind).SPEEDS))
             numbering.nv = numbering.coordinates[i].stop
 
     visit(0)
-    for i, link in enumerate(links):
-        if link.drives:
-            first = numbering.nv + _drive(numbering.mechanism, link)
-            numbering.coordinates[i] = range(first, first + len(joint_class(link.kind).SPEEDS))

@@ -15,7 +15,7 @@ import numpy as np
 from flexclear.pipeline.core.numerics.rotations import rotation_vector_to_matrix
 from flexclear.pipeline.dynamics.model.closing import close, misfit, opposite
 from flexclear.pipeline.dynamics.model.constraints import Constraint
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type, label
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.start_table import Given
@@ -46,9 +46,7 @@ def opened(
     mechanism: Mechanism, joints: Sequence[Constraint], placed: set[int], starts: Sequence[Given]
 ) -> list[Placement]:
     """Poses of all links where one joint each puts those without a pose; loops may stay open.  Arguments as below."""
-    hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
-    known = {(j.name, k): value for j in joints for k, value in j.values.items()}
-    return _guess(mechanism, joints, placed, hints | known, None, 0.0)
+    return _guess(mechanism, joints, placed, _targets(joints, starts)[1], None, 0.0)
 
 
 def assemblies(
@@ -58,13 +56,12 @@ def assemblies(
 
     placed: links that have a pose.  Empty when none was found.
     """
-    hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
-    known = {(j.name, k): value for j in joints for k, value in j.values.items()}
+    hints, targets = _targets(joints, starts)
     random, distinct, aim = np.random.default_rng(0), list[Assembly](), dict[tuple[str, int], float]()
     for k in range(GUESSES):
-        guess = _guess(mechanism, joints, placed, hints | known, random if k else None, k / GUESSES)
+        guess = _guess(mechanism, joints, placed, targets, random if k else None, k / GUESSES)
         if k == 0:
-            aim = _coordinates(joints, guess) | hints
+            aim = {**_coordinates(joints, guess), **hints}
         poses = close(mechanism, joints, guess, placed)
         if poses is None and len(placed) > 1:
             poses = close(mechanism, joints, guess)
@@ -94,21 +91,26 @@ def chosen(
     first = candidates[0]
     if len(candidates) < 2 or not _isolated(mechanism, list(joints), first.poses):
         return ""
-    hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
+    hints, _ = _targets(joints, starts)
     distances = [_distance(mechanism, joints, one.coordinates, hints) for one in candidates]
     if hints and distances[1] - distances[0] > SAME_ASSEMBLY:
         return ""
-    units = {(j.name, k): c for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
     differences = {key: abs(first.coordinates[key] - candidates[1].coordinates[key]) for key in first.coordinates}
     name, k = max(differences, key=lambda key: differences[key])
-    coordinate, several = units[name, k], len([key for key in units if key[0] == name]) > 1
-    label = f"{name}.{coordinate.name}" if several else name
+    kind = next(joint.edge.kind for joint in joints if joint.name == name)
+    coordinate, called = joint_type(kind).COORDINATES[k], label(name, kind, k)
     values = ", ".join(f"{one.coordinates[name, k]:.4g}" for one in candidates[1:])
     return (
         f"the joints can be assembled in {len(candidates)} ways, and the scene does not say in which: it starts with "
-        f"{label} at {first.coordinates[name, k]:.4g} {coordinate.unit}, elsewhere it is at {values}; "
-        f"[start.joint.{label}] near = ... selects one"
+        f"{called} at {first.coordinates[name, k]:.4g} {coordinate.unit}, elsewhere it is at {values}; "
+        f"[start.joint.{called}] near = ... selects one"
     )
+
+
+def _targets(joints: Sequence[Constraint], starts: Sequence[Given]) -> tuple[Hints, Hints]:
+    """Where coordinates are to be about, by hints alone, and with what is prescribed of them."""
+    hints = {(s.joint, s.number): s.near for s in starts if s.near is not None}
+    return hints, hints | {(j.name, k): value for j in joints for k, value in j.values.items()}
 
 
 def _guess(
@@ -122,7 +124,7 @@ def _guess(
     """Poses of all links, those not placed each put where a joint to a known one has it."""
     poses, known = [link.start for link in mechanism.links], set(placed)
     # joints with few degrees of freedom are best
-    order = sorted(joints, key=lambda joint: len(joint_class(joint.edge.kind).SPEEDS) - len(joint.values))
+    order = sorted(joints, key=lambda joint: len(joint_type(joint.edge.kind).SPEEDS) - len(joint.values))
     while True:
         joint = next((j for j in order if (j.link_a in known) != (j.link_b in known)), None)
         if joint is None:
@@ -140,7 +142,7 @@ def _motion(
     mechanism: Mechanism, joint: Constraint, values: Hints, random: np.random.Generator | None, spread: float
 ) -> Placement:
     """Pose of a joint's second frame in its first, its coordinates moved one after the other."""
-    coordinates = joint_class(joint.edge.kind).COORDINATES
+    coordinates = joint_type(joint.edge.kind).COORDINATES
     pose = Placement()
     if not coordinates and random is not None and joint.edge.kind == "spherical":
         return Placement(R=rotation_vector_to_matrix(np.pi * spread * random.normal(size=3)))
@@ -155,18 +157,12 @@ def _motion(
 
 
 def _coordinates(joints: Sequence[Constraint], poses: Sequence[Placement]) -> dict[tuple[str, int], float]:
-    coordinates = dict[tuple[str, int], float]()
-    for joint in joints:
-        A, B = joint.frames(poses)
-        declared, relative = joint_class(joint.edge.kind), A.inverse().of(B)
-        now = declared.coordinates(relative.R, relative.p)
-        coordinates |= {(joint.name, k): float(now[k]) for k in range(len(declared.COORDINATES))}
-    return coordinates
+    return {key: value for joint in joints for key, value in joint.coordinates(poses).items()}
 
 
 def _distance(mechanism: Mechanism, joints: Sequence[Constraint], one: Hints, other: Hints) -> float:
     """Largest difference of coordinates that both have, in radians or fractions of the mechanism's size."""
-    turning = {(j.name, k): c.turning for j in joints for k, c in enumerate(joint_class(j.edge.kind).COORDINATES)}
+    turning = {(j.name, k): c.turning for j in joints for k, c in enumerate(joint_type(j.edge.kind).COORDINATES)}
     differences = [0.0]
     for key in one.keys() & other.keys():
         way = one[key] - other[key]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -103,8 +102,8 @@ def length(metres: float) -> str:
 
 def unused_frames(mechanism: Mechanism) -> list[str]:
     """Frames that the scene names nowhere outside of its bodies."""
-    named = _named(mechanism.scene)
-    return [name for name in mechanism.frames if name not in named]
+    written = mechanism.scene.model_dump_json(exclude={"body", "title", "description"}, exclude_none=True)
+    return [name for name in mechanism.frames if name not in written]
 
 
 def forgotten(mechanism: Mechanism) -> list[tuple[str, str, str]]:
@@ -120,24 +119,6 @@ def forgotten(mechanism: Mechanism) -> list[tuple[str, str, str]]:
             remedy = f'add a joint with between = ["{a}", "{b}"], or remove the frames'
             result.append((mechanism.frames[a].body, text, remedy))
     return result
-
-
-def _named(scene: Scene) -> str:
-    """All texts of a scene outside of its bodies, which name what is used."""
-    table = scene.model_dump(mode="json", exclude={"body", "title", "description"}, exclude_none=True)
-    return " ".join(_texts(table))
-
-
-def _texts(node: Any) -> Iterator[str]:
-    if isinstance(node, dict):
-        for key, value in node.items():
-            yield key
-            yield from _texts(value)
-    elif isinstance(node, list):
-        for value in node:
-            yield from _texts(value)
-    elif isinstance(node, str):
-        yield node
 
 
 def _pairs(scene: Scene) -> Iterator[tuple[str, str]]:

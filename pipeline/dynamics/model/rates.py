@@ -114,8 +114,9 @@ def rates(model: Model, poses: Sequence[Placement]) -> Rates:
             J[first], sizes[first] = _coupling_row(model, closure, poses, motion)
             first += 1
             continue
-        B = sites(closure, poses)[1]
-        along, about, force = row_axes(closure, poses)
+        A, B = sites(closure, poses)
+        _, wrenches = demands(closure.edge.kind, A, B)
+        along, about, force = wrenches[:, 3:], wrenches[:, :3], np.any(wrenches[:, 3:] != 0.0, axis=1)
         route = uncommon(closure_route(numbering, int(line["site_a"]), int(line["site_b"])))
         mine = slice(first, first + len(force))
         for coordinate, column, sign in route:
@@ -172,13 +173,6 @@ def sites(closure: Closure, poses: Sequence[Placement]) -> tuple[Placement, Plac
     """Both frames of a closure."""
     _, a, b = closure
     return poses[a.link].of(a.place), poses[b.link].of(b.place)
-
-
-def row_axes(closure: Closure, poses: Sequence[Placement]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Directions along which the rows of a closure forbid displacement, about which turns; and which do the former."""
-    _, wrenches = demands(closure.edge.kind, *sites(closure, poses))
-    force = np.any(wrenches[:, 3:] != 0.0, axis=1)
-    return wrenches[:, 3:], wrenches[:, :3], force
 
 
 def motions(model: Model, poses: Sequence[Placement]) -> Motions:

@@ -15,13 +15,13 @@ import numpy as np
 from flexclear.pipeline.core.scene.fields import Part
 from flexclear.pipeline.core.scene.formulas import formula
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import pieces_of
 from flexclear.pipeline.dynamics.effects.declared import EFFECTS
 from flexclear.pipeline.dynamics.model.closing import CLOSED_EXACTLY
 from flexclear.pipeline.dynamics.model.driving import Prescribed, prescribed
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, sizes
 from flexclear.pipeline.dynamics.model.merge import rigid_inertia
+from flexclear.pipeline.dynamics.model.mobility import moves
 from flexclear.pipeline.dynamics.model.model import Model, filled
 
 #: keys of a table, or of its parts, that decide numbers of a model but neither its links nor what is wired to what
@@ -150,10 +150,4 @@ def _at_start(one: Prescribed, scene: Scene) -> float:
 
 def _moving(model: Model) -> tuple[bool, ...]:
     """Which of the drives are not constant."""
-    tables, moving = model.arrays.table(m.PIECES), list[bool]()
-    harmonics = model.arrays.table(m.PIECE_HARMONICS)["n_harmonics"]
-    for first, count in model.arrays.table(m.LAWS)[: len(model.drives)]:
-        values = tables["coefficients"][first : first + count]
-        changes = np.any(values[:, 1:] != 0.0) or np.ptp(values[:, 0]) > 0.0
-        moving.append(bool(changes or np.any(harmonics[first : first + count] > 0)))
-    return tuple(moving)
+    return tuple(moves(model, name) for name in model.drives)

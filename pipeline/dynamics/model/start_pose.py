@@ -15,7 +15,7 @@ from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.model import given_start
 from flexclear.pipeline.dynamics.model.assembly import assembled, settled
 from flexclear.pipeline.dynamics.model.constraints import Constraint, constraints, demands, prescribed
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import label
 from flexclear.pipeline.dynamics.model.mechanism import Mechanism, build
 from flexclear.pipeline.dynamics.model.merge import Placement
 from flexclear.pipeline.dynamics.model.placing import opened
@@ -134,7 +134,11 @@ def _data(mechanism: Mechanism, drawn: Mapping[str, xr.Dataset]) -> xr.Dataset:
         "frame_position": (("time", "frame", "axis"), np.array(list(frames.values())).reshape(1, -1, 3)),
         "modal_coordinate": (("time", "mode"), np.zeros((1, len(drawn)))),
     }
-    joints = dict(_coordinates(mechanism))
+    joints = {
+        label(joint.name, joint.edge.kind, k): value
+        for joint in constraints(mechanism)
+        for (_, k), value in joint.coordinates([link.start for link in mechanism.links]).items()
+    }
     data["joint_position"] = (("time", "coordinate"), np.array(list(joints.values())).reshape(1, -1))
     coordinates = {
         "time": [scene.time.start],
@@ -154,15 +158,3 @@ def _pose(mechanism: Mechanism, body: str) -> Placement:
     link = mechanism.links[mechanism.link_of[body]]
     here = link.start.of(link.places[body])
     return here if link is mechanism.links[0] else Placement(here.p + mechanism.origin, here.R)
-
-
-def _coordinates(mechanism: Mechanism) -> list[tuple[str, float]]:
-    """Names of joint coordinates, as records call them, and where they are [m or rad]."""
-    poses, result = [link.start for link in mechanism.links], list[tuple[str, float]]()
-    for joint in constraints(mechanism):
-        A, B = joint.frames(poses)
-        declared, relative = joint_class(joint.edge.kind), A.inverse().of(B)
-        now, names = declared.coordinates(relative.R, relative.p), [one.name for one in declared.COORDINATES]
-        labels = [joint.name] if len(names) == 1 else [f"{joint.name}.{name}" for name in names]
-        result += [(label, float(value)) for label, value in zip(labels, now, strict=False)]
-    return result

@@ -10,10 +10,9 @@ import numpy as np
 
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import coordinate_of
+from flexclear.pipeline.dynamics.model.driving import coordinate_of, measured
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
@@ -52,7 +51,7 @@ def given_coordinates(scene: Scene) -> list[Given]:
             _, number, coordinate = coordinate_of(scene, joint, name or None, path)
             rate = "angular velocity" if coordinate.turning else "velocity"
             values = [
-                _measure(getattr(start, key), dimension, f"{path[:-1]}.{key}]")
+                None if getattr(start, key) is None else measured(getattr(start, key), dimension, f"{path[:-1]}.{key}]")
                 for key, dimension in (
                     ("position", coordinate.dimension),
                     ("near", coordinate.dimension),
@@ -63,30 +62,14 @@ def given_coordinates(scene: Scene) -> list[Given]:
     return rows
 
 
-def _measure(value: float | str | None, dimension: str, path: str) -> float | None:
-    try:
-        return None if value is None else quantity(value, dimension)
-    except ValueError as error:
-        raise InputError(path, str(error)) from None
-
-
-def given_modes(scene: Scene, bundles: Mapping[str, Labelled]) -> dict[str, np.ndarray]:
-    """Modal coordinates at the start of the flexible bodies that the scene gives some, [m], shape (mode,).
+def given_modes(scene: Scene, bundles: Mapping[str, Labelled], key: str = "coordinate") -> dict[str, np.ndarray]:
+    """Modal coordinates [m], or by another key velocities [m/s], of the bodies that the scene gives some; (mode,).
 
     Raises InputError for bodies that are not flexible, and for more numbers than modes.
     """
     given = scene.start.modal if scene.start is not None else {}
-    return {name: _padded(scene, bundles, name, "coordinate", start.coordinate) for name, start in given.items()}
-
-
-def given_modal_velocities(scene: Scene, bundles: Mapping[str, Labelled]) -> dict[str, np.ndarray]:
-    """The same for their rates [m/s], of the bodies that the scene gives some."""
-    given = scene.start.modal if scene.start is not None else {}
-    return {
-        name: _padded(scene, bundles, name, "velocity", start.velocity)
-        for name, start in given.items()
-        if start.velocity is not None
-    }
+    values = {name: getattr(start, key) for name, start in given.items()}
+    return {name: _padded(scene, bundles, name, key, one) for name, one in values.items() if one is not None}
 
 
 def _padded(

@@ -9,7 +9,7 @@ from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.joints import HELD
-from flexclear.pipeline.dynamics.model.driving import joint_class, joint_drives
+from flexclear.pipeline.dynamics.model.driving import joint_drives, joint_type
 from flexclear.pipeline.dynamics.model.merge import Frame, Group, find_frame
 
 #: kind of an edge that is no joint of the scene: a frame's pose in the world, prescribed in part or whole
@@ -139,4 +139,4 @@ def span(groups: list[Group], joints: list[Edge]) -> tuple[list[Branch], list[Ed
 def _freedom(edge: Edge) -> int:
     if edge.kind == PATH:
         return edge.drives.count(None)
-    return len(joint_class(edge.kind).SPEEDS) - sum(d is not None for d in edge.drives)
+    return len(joint_type(edge.kind).SPEEDS) - sum(d is not None for d in edge.drives)

@@ -10,7 +10,7 @@ import numpy as np
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.model import arrays, flexible_bodies
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.numbering import Numbering
 
 
@@ -129,7 +129,7 @@ def _path(numbering: Numbering, slots: list[int], sites: list[int]) -> list[tupl
 
 def _rows(kind: str) -> list[tuple[int, int, int]]:
     """Rows of the table CLOSURE_ROWS of a joint type."""
-    declared = joint_class(kind)
+    declared = joint_type(kind)
     return [(0, axis, 0) for axis in declared.TRANSLATIONS] + [(1, k, n) for k, n in declared.ROTATIONS]
 
 

@@ -10,15 +10,12 @@ so the number that an accuracy calls for follows.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.plan_decisions import Mesh
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: twice as many elements are compared with; errors fall with this power of their length
 TWICE, ORDER = 2, 4

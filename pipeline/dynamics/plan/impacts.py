@@ -13,6 +13,7 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.effect_size import Influence
 from flexclear.pipeline.core.artifacts.points import Point
+from flexclear.pipeline.core.scene.integrators import DEFAULT
 from flexclear.pipeline.core.scene.variants import Effect, effects
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
 from flexclear.pipeline.dynamics.plan.screening_runs import LEAST_PART, MEMBERS, OF_TIGHT, TAKES_LONG, shorter
@@ -58,16 +59,16 @@ def bent(search: Search, soft: Sequence[Effect]) -> None:
         search.judge(effect, small, "with or without bending the loose joints do the same", most, effect_sizes)
 
 
-def quickest(search: Search, usual: str) -> Chosen:
-    """The cheapest way to integrate what is left of a scene with contacts; by `usual`, tighter, where none is shown
-    to do.
+def quickest(search: Search) -> Chosen:
+    """The cheapest way to integrate what is left of a scene with contacts; the pilots' method, tighter, where none is
+    shown to do.
 
-    All are compared with `usual` at a tolerance that is TIGHTER than that of the pilots.
+    All are compared with that at a tolerance that is TIGHTER than the pilots'.
     """
     pilots, gone = search.pilots, search.gone
     loose, fraction = pilots.loose(pilots.variant(gone)), pilots.part(gone)
     tight, most = max(TIGHTER * loose, TIGHTEST), OF_TIGHT * pilots.extent.most
-    unknown = Chosen(usual, tight, dict.fromkeys(search.requested, np.nan))
+    unknown = Chosen(DEFAULT, tight, dict.fromkeys(search.requested, np.nan))
     levels = _levels(search)
     if levels and fraction < LEAST_SEEN:
         if pilots.point(gone, fraction=LEAST_SEEN, rtol=tight, evaluations=most).refused:
@@ -93,7 +94,7 @@ def quickest(search: Search, usual: str) -> Chosen:
             if level is not None and _by_modes(search, errors, pilots.between(tried, there)):
                 break
     errors = _errors(search, whole, there, fraction)
-    return Chosen(usual, loose, errors) if search.fits(errors) else unknown
+    return Chosen(DEFAULT, loose, errors) if search.fits(errors) else unknown
 
 
 def _errors(search: Search, tried: Point, there: Point, fraction: float) -> dict[str, float]:

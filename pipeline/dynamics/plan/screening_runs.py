@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.effect_size import Influence, influence, recorded, same_starts, with_members
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.quantity import Quantity
@@ -21,9 +21,6 @@ from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import tabulate
 from flexclear.pipeline.dynamics.record.point import Runner
 from flexclear.pipeline.dynamics.run.run import placed
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: starts of pilots with contacts: enough to see whether the motion parts
 MEMBERS = 3

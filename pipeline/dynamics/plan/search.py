@@ -11,37 +11,36 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts import effect_size
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.points import Point
-from flexclear.pipeline.core.scene.coupling import lessened, uncoupled
-from flexclear.pipeline.core.scene.integrators import DEFAULT
+from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.plan_decisions import BOUND, NO_CHEAPER, NONE, NOT_WORTH, PILOT, RESPONSE, Mesh, Plan
-from flexclear.pipeline.core.scene.quantity import KINDS, OF_CLEARANCE, parse
+from flexclear.pipeline.core.scene.quantity import KINDS, OF_CLEARANCE, Quantity, parse
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects
+from flexclear.pipeline.core.scene.variants import CLEARANCE, FLEXIBILITY, Effect, effects, lessened, uncoupled
+from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.dynamics.linear.clearance_response import OF_POSE, bounds
 from flexclear.pipeline.dynamics.linear.response import Response, response
 from flexclear.pipeline.dynamics.plan.budget import BUDGET, WHOLE, Chosen, Search, with_doubt
 from flexclear.pipeline.dynamics.plan.elements import mesh
 from flexclear.pipeline.dynamics.plan.impacts import bent, quickest
-from flexclear.pipeline.dynamics.plan.requested_accuracy import requested_in
 from flexclear.pipeline.dynamics.plan.screening_runs import BEGINNING, MEMBERS, RTOL, Pilots
 from flexclear.pipeline.dynamics.plan.tolerance import as_it_is, no_dearer, smooth
 from flexclear.pipeline.dynamics.run.run import Run, integrate
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: what bounds of clearances, which hold whatever happens, may use up of the budget
 BY_BOUND = 0.9
 #: by how much the first-order response of flexible bodies counts for more: it leaves out that the pose turns meanwhile,
 #: and that loads follow the vibration; next to runs it is 0.7 to 10 times what is true
 OF_RESPONSE = 2.0
+#: peaks of forces between flexible bodies are at least this fraction of those between rigid ones
+SOFTER = 0.5
 #: effects that cost nothing to keep are dropped below this fraction of the requested accuracy
 FREE, NEGLIGIBLE = ("gravity", "damping", "stiffening"), 0.02
 #: the planned run is that of the scene: its integrator and tolerance stay
@@ -80,7 +79,7 @@ def plan(
     inner = [effect for effect in every if effect.within]
     within_bodies = [e for e in inner if e.within.startswith("body.")]
     ideal = pilots.point([*loose, *soft, *inner], rtol=RTOL)
-    search = Search(pilots, requested_in(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
+    search = Search(pilots, _requested(scene, quantities, ideal, lambda: pilots.point([*soft, *within_bodies])))
     rigid = _rigid(search, [*loose, *soft, *inner]) if loose or soft else None
     _clearances(search, loose, [*soft, *inner], rigid)
     _interactions(search, soft, inner)
@@ -91,9 +90,49 @@ def plan(
 
 
 def _plain(scene: Scene) -> Scene:
-    from flexclear.pipeline.core.scene.load import edited
-
     return edited(scene, dict.fromkeys(("accuracy", "ensemble", "sections", "view")))
+
+
+def _requested(
+    scene: Scene, quantities: Sequence[Quantity], ideal: Point, rigid: Callable[[], Point]
+) -> dict[str, float]:
+    """What is requested by quantity [SI]; relative to the size that it has in the ideal mechanism, of contacts with
+    rigid bodies, half of it where bodies are flexible.
+
+    rigid: runs the scene with clearance and rigid bodies.
+    Raises InputError where a quantity never changes, or everything requested is above what the quantities do;
+    SolverError where the mechanism with rigid bodies cannot be run.
+    """
+    accuracies, sizes = {}, {}
+    where = f"{scene.path or scene.name} [accuracy]"
+    assert scene.accuracy is not None
+    for q in quantities:
+        of_contact = any(KINDS[term.kind].owner in OF_CLEARANCE for term in q.terms())
+        point = rigid() if of_contact else ideal
+        if point.refused:
+            raise SolverError(f"{scene.name}: the mechanism with rigid bodies cannot be run: {point.refused}")
+        sizes[q.name] = effect_size.size(point, q) * (SOFTER if of_contact and scene.flexible() else 1.0)
+        want = scene.accuracy.quantities[q.name]
+        accuracies[q.name] = want.absolute if want.absolute is not None else (want.relative or 0.0) * sizes[q.name]
+        if not accuracies[q.name] > 0.0:
+            raise InputError(
+                f"{where} {q.name}",
+                "a relative accuracy of a quantity that never changes in the ideal mechanism",
+                "give an absolute one, with a unit",
+            )
+    if all(accuracies[name] >= most for name, most in sizes.items()):
+        # forces and rates may come from impacts alone
+        more = rigid() if scene.contacts() or scene.stop else ideal
+        sizes = {q.name: max(sizes[q.name], 0.0 if more.refused else effect_size.size(more, q)) for q in quantities}
+    if all(accuracies[name] >= most for name, most in sizes.items()):
+        q = quantities[0]
+        raise InputError(
+            f"{where} {q.name}",
+            f"{accuracies[q.name]:.3g} {q.unit} is more than it changes ({sizes[q.name]:.3g} {q.unit}), "
+            "and so are all other requested accuracies: the plan would leave out everything, even the motion",
+            "ask for an accuracy below what the quantity does",
+        )
+    return accuracies
 
 
 def _rigid(search: Search, gone: Sequence[Effect]) -> Run:
@@ -114,7 +153,7 @@ def _clearances(search: Search, loose: Sequence[Effect], soft: Sequence[Effect],
         return
     pilots, bounded = search.pilots, dict[str, Mapping[str, float]]()
     if rigid is not None and any(q.kind in OF_POSE for q in pilots.chosen):
-        bounded = dict(bounds(pilots.scene, rigid, pilots.chosen).clearance)
+        bounded = dict(bounds(pilots.scene, rigid, pilots.chosen))
     reach = {effect.name: bounded.get(effect.owner, {}) for effect in free}
     total = summed(reach.values(), search.requested)
     if search.fits(total, BY_BOUND):
@@ -295,7 +334,7 @@ def _chosen(search: Search) -> Chosen:
     pilots, gone = search.pilots, search.gone
     scene = pilots.variant(gone)
     if scene.contacts() or scene.stop:
-        return quickest(search, DEFAULT)
+        return quickest(search)
     for level in range(len(pilots.fewer)):
         if not pilots.modes(level, scene.flexible()):
             continue

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.record.acting import on_frames
 from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches, path_wrenches
+from flexclear.pipeline.dynamics.record.wrenches import Acting, joint_wrenches, on_frames, path_wrenches
 
 
 @dataclass(frozen=True)
@@ -45,9 +44,9 @@ def motion_and_loads(motions: Motions, name: str) -> tuple[Motion, np.ndarray, n
     return Motion(a, omega, alpha, state.q, state.u, state.du), moment, force
 
 
-def _loads(motions: Motions, name: str) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def _loads(motions: Motions, name: str) -> list[Acting]:
     """What joints, paths and loads do to a body: its frame, moment about the kernels' origin, force, world axes."""
-    model, seen, acting = motions.model, motions.seen, list[tuple[str, np.ndarray, np.ndarray]]()
+    model, seen, acting = motions.model, motions.seen, list[Acting]()
     for joint, (n, f) in joint_wrenches(motions).items():
         between = model.scene.joint[joint].between
         about_origin = n + np.cross(motions.frame_positions[between[1]], f)

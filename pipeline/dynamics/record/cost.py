@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from time import process_time
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,7 +16,6 @@ import xarray as xr
 
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.dynamics.record.dataset import dataset
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
@@ -63,9 +63,9 @@ def measure(
     """
     engine, other = engines(scene, bundles, progress)
     start = consistent_start(engine)
-    begun, alone = journal.seconds(), brief or not engine.model.contacts
+    begun, alone = process_time(), brief or not engine.model.contacts
     last, trajectory, switched, perturbed = _followed(engine, start, progress, other, alone)
-    first = (journal.seconds() - begun,) if alone else ()
+    first = (process_time() - begun,) if alone else ()
     seen = observed(last, trajectory)
     if checked:
         require_closed(last.model, trajectory, seen)
@@ -104,6 +104,6 @@ def _repeated(task: Callable[[], object], most: int, first: tuple[float, ...] = 
 
 
 def _once(task: Callable[[], object]) -> float:
-    begun = journal.seconds()
+    begun = process_time()
     task()
-    return journal.seconds() - begun
+    return process_time() - begun

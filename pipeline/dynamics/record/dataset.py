@@ -24,7 +24,7 @@ from flexclear.pipeline.core.workflow.fingerprint import library_version
 from flexclear.pipeline.dynamics.compile.sources import named
 from flexclear.pipeline.dynamics.effects import RECORDS
 from flexclear.pipeline.dynamics.effects.stops.model import ends_an_angle
-from flexclear.pipeline.dynamics.equations.observation import Observed, Series
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series, Variables
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import forgotten
@@ -38,8 +38,6 @@ from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
 def dataset(run: Run) -> xr.Dataset:

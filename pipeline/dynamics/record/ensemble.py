@@ -20,6 +20,7 @@ from flexclear.pipeline.core.scene.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.schema import Ensemble, Scene
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress
+from flexclear.pipeline.core.workflow import journal
 from flexclear.pipeline.core.workflow.cores import side_by_side, width
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
@@ -31,12 +32,16 @@ from flexclear.pipeline.dynamics.run.evaluation.specialised import abreast
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, perturbed
 from flexclear.pipeline.dynamics.run.ledger import require_closed
+from flexclear.pipeline.dynamics.run.pieces import digest
 from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
 from flexclear.pipeline.dynamics.run.run import engines, follow, observed
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
+
+#: variables of one member by name, with the dimensions of the schema but `member`, and why its method was `switched`
+Member = dict[str, np.ndarray]
 
 
 def ensemble(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
@@ -63,31 +68,41 @@ def _members(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     jacobian = offset_jacobian(engine, start)
     offsets = ball_offsets(engine.model, requested, requested.members)
     starts = [perturbed(engine, start, jacobian, moved) for moved in offsets]
-    making, judges = Lock(), affordable(scene)
+    making, judges, stored = Lock(), affordable(scene), journal.current()
+    piece = digest(engine, *starts) if stored is not None else ""
 
     def heir(name: str) -> Engine:
         with making:
             return another(other(name))
 
-    def alone(k: int, alive: Progress, place: Place | None) -> tuple[xr.Dataset, str]:
+    def alone(k: int, alive: Progress, place: Place | None) -> Member:
         """A member on an engine of its own, so that it does not depend on who ran before."""
         mine = another(engine)
         mine.straight.place = place
         last, trajectory, switched = follow(mine, starts[k], alive, heir, judges and judges.run)
-        return _member(last, trajectory, names), switched
+        return _member(last, trajectory, names) | {"switched": np.array(switched)}
 
     def done(k: int) -> None:
         progress(k / requested.members, f"member {k} of {requested.members}")
 
     places = abreast(engine, requested.members, width(), progress)
 
-    def member(k: int, alive: Progress) -> tuple[xr.Dataset, str]:
+    def member(k: int, alive: Progress) -> Member:
+        name = f"member-{k}-{piece}"
+        if stored is not None and (earlier := stored.find(name)) is not None:
+            return earlier
         with places.place() if places else nullcontext() as place:
-            return alone(k, alive, place)
+            made = alone(k, alive, place)
+        if stored is not None:
+            stored.store(name, lambda: made)
+        return made
 
-    runs = side_by_side(member, requested.members, done, places.seats if places else 0)
-    members, reasons = [one for one, _ in runs], [switched for _, switched in runs if switched]
-    made = xr.concat(members, dim="member").assign_coords(member=np.arange(requested.members))
+    members = side_by_side(member, requested.members, done, places.seats if places else 0)
+    reasons = [text for one in members if (text := str(one.pop("switched")))]
+    variables = {name: (ENSEMBLE[name].dims, np.stack([one[name] for one in members])) for name in members[0]}
+    time = engine.output_times(scene.output.interval)
+    coordinates = {"member": np.arange(requested.members), "time": time, "body": names, **contact_names(engine.model)}
+    made = xr.Dataset(variables, coords=coordinates)
     facts = {"switched": f"{len(reasons)} of {requested.members} members, the first {reasons[0]}"} if reasons else {}
     facts |= attributes(scene) | {"title": f"{requested.members} motions of {subject(scene)}"}
     return conform(made, ENSEMBLE, **facts, seed=requested.seed, perturbation=requested.perturbation)
@@ -113,7 +128,7 @@ def kept_bodies(model: Model, requested: tuple[str, ...] | None, path: str) -> l
     return list(requested)
 
 
-def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Dataset:
+def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> Member:
     model = engine.model
     regular = engine.output_times(model.scene.output.interval)
     peak, count, fraction = _contact_statistics(engine, trajectory)
@@ -121,17 +136,16 @@ def _member(engine: Engine, trajectory: Trajectory, names: list[str]) -> xr.Data
     seen = observed(engine, trajectory)
     require_closed(model, trajectory, seen)
     series = motion_series(Motions(model, seen).several(names), model.mechanism.origin)
-    variables = {
-        **{name: (dims, values[rows]) for name, (dims, values) in series.items()},
+    return {
+        **{name: values[rows] for name, (_, values) in series.items()},
         # of the rows at events, too: an impact is shorter than the output interval
-        "peak_acceleration": (("body", "axis"), np.abs(series["acceleration"][1]).max(axis=0)),
-        "contact_normal_force": (("time", "contact"), seen.touch["normal_force"][rows]),
-        "contact_offset": (("time", "contact", "axis"), seen.touch["offset"][rows]),
-        "impact_count": (("contact",), count),
-        "peak_force": (("contact",), peak),
-        "contact_time_share": (("contact",), fraction),
+        "peak_acceleration": np.abs(series["acceleration"][1]).max(axis=0),
+        "contact_normal_force": seen.touch["normal_force"][rows],
+        "contact_offset": seen.touch["offset"][rows],
+        "impact_count": count,
+        "peak_force": peak,
+        "contact_time_share": fraction,
     }
-    return xr.Dataset(variables, coords={"time": regular, "body": names, **contact_names(model)})
 
 
 def _contact_statistics(engine: Engine, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Observed, Variables
 from flexclear.pipeline.dynamics.model.model import Model
 
 
-def load_series(model: Model, seen: Observed) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+def load_series(model: Model, seen: Observed) -> Variables:
     """Forces and moments on the (second) frame, lengths and powers, loads in the order of the scene."""
     force, moment = seen.loads["force"], seen.loads["moment"]
     wiring = model.arrays.table(m.LOADS)

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexclear.pipeline.core.numerics.rotations import continued, cross, turned
 from flexclear.pipeline.core.scene.parts import RigidBody
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Observed, Variables
 from flexclear.pipeline.dynamics.model.flexible_bodies import bow, shift
 from flexclear.pipeline.dynamics.model.interface_basis import frame_index
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -207,7 +207,7 @@ def _angular_velocity(theta: np.ndarray, rate: np.ndarray) -> np.ndarray:
     return rate + first * swing + second * cross(theta, swing)
 
 
-def motion_series(bodies: Bodies, origin: np.ndarray) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+def motion_series(bodies: Bodies, origin: np.ndarray) -> Variables:
     """Position, orientation, velocities and acceleration of several bodies over time, by variable."""
     series = {
         ("position", "axis"): shifted(bodies.position, origin),

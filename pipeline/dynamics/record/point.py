@@ -27,7 +27,6 @@ from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.ensemble import ball_offsets
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.record.sections import section_period
-from flexclear.pipeline.dynamics.run.alike import engines_alike
 from flexclear.pipeline.dynamics.run.evaluation.batched_evaluation import Place, Places
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
@@ -35,7 +34,7 @@ from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian, per
 from flexclear.pipeline.dynamics.run.horizon.periods import Cursor, periods, require_periodic, stretches
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.progress_rate import DearError, affordable, unverified
-from flexclear.pipeline.dynamics.run.run import follow, observed, require_shallow
+from flexclear.pipeline.dynamics.run.run import engines_alike, follow, observed, require_shallow
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -133,9 +132,7 @@ class Runner:
         for one in self.recorded:
             if one.quantity.over_time:
                 series = quantities.series(run, one.quantity)
-                regular = series[np.minimum(after, len(time) - 1)]
-                value = regular if one.reduction == "series" else reduced(time, series, one.reduction)
-                values[one.name] = value if one.quantity.dim or one.reduction in MAGNITUDES else value[..., 0]
+                values[one.name] = _recorded(one, time, series, np.minimum(after, len(time) - 1))
             elif one.quantity.kind == "impact_times":
                 values[one.name] = np.asarray(of_impacts(quantities.events(run, one.quantity), one.reduction))
             else:
@@ -192,13 +189,15 @@ def _kept(scene: Scene, engine: Engine, trajectory: Trajectory, kept: Sequence[R
             continue
         if one.quantity.name not in series:
             series[one.quantity.name] = quantities.series(arrays, one.quantity)
-        recorded = series[one.quantity.name]
-        if one.reduction == "series":
-            value = recorded[_regular(engine, trajectory.time)]
-        else:
-            value = reduced(trajectory.time, recorded, one.reduction)
-        values[one.name] = value if one.quantity.dim or one.reduction in MAGNITUDES else value[..., 0]
+        regular = _regular(engine, trajectory.time)
+        values[one.name] = _recorded(one, trajectory.time, series[one.quantity.name], regular)
     return values
+
+
+def _recorded(one: Recorded, time: np.ndarray, series: np.ndarray, regular: np.ndarray) -> np.ndarray:
+    """What is recorded of a series, shape (time, ...); regular: rows of the regular output times."""
+    value = series[regular] if one.reduction == "series" else reduced(time, series, one.reduction)
+    return np.asarray(value if one.quantity.dim or one.reduction in MAGNITUDES else value[..., 0])
 
 
 def _sections(scene: Scene, engine: Engine, recorded: Sequence[Recorded], alive: Progress) -> tuple[Values, int]:

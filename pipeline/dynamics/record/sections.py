@@ -17,8 +17,8 @@ from flexclear.pipeline.core.scene.schema import Scene, Sections
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import journal
-from flexclear.pipeline.core.workflow.journal import Journal, State
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.equations.observation import Variables
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.dataset import attributes, contact_names, subject
 from flexclear.pipeline.dynamics.record.ensemble import kept_bodies
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
 
 #: of impacts, known when they end
 LATER = ("peak_force", "duration")
-Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 
 def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> xr.Dataset:
@@ -68,11 +67,12 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
     count = requested.transient + requested.periods
     followed = range(requested.transient, min(count, requested.transient + requested.exponent_periods))
     tape, begin = _Tape(names, engine.start + requested.phase), Cursor()
-    recorder = _Recorder.of(engine, start)
-    if recorder is not None and recorder.state is not None:
-        remember(engine, recorder.state.arrays)
-        tape.unpack(recorder.state.arrays)
-        begin = Cursor.unpacked(recorder.state.arrays)
+    stored, name = journal.current(), f"periods-{digest(engine, start)}"
+    arrays = stored.find(name) if stored is not None else None
+    if arrays is not None:  # what an earlier attempt left
+        remember(engine, arrays)
+        tape.unpack(arrays)
+        begin = Cursor.unpacked(arrays)
     for done in periods(parts, start, followed, begin):
         progress((done.number + 1) / count, f"period {done.number + 1} of {count}")
         if done.number >= requested.transient:
@@ -80,8 +80,9 @@ def sections(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) 
         if done.number + 1 == count:
             tape.orbit = tape.motion_at_waypoints(parts, done)
             break
-        if recorder is not None:
-            recorder.keep({**memory(engine), **done.after.packed()}, tape)
+        if stored is not None:  # the tape is as it is until the next period
+            state = {**memory(engine), **done.after.packed()}
+            stored.store(name, lambda state=state: {**state, **tape.packed()})  # type: ignore[misc]
     growth = np.array(tape.growth[: len(followed)])
     facts = {"period": period, "phase": requested.phase, "transient": requested.transient, "neighbour_lost": tape.lost}
     variables = tape.variables(engine.model) | {"growth": (("followed",), growth)}
@@ -113,30 +114,6 @@ def section_period(scene: Scene) -> float:
             "give a time from 0 to below the period",
         )
     return period
-
-
-@dataclass
-class _Recorder:
-    """What the task's journal knows of these sections: what an earlier attempt left, if anything."""
-
-    journal: Journal
-    name: str
-    begun: float
-    state: State | None
-
-    @staticmethod
-    def of(engine: Engine, start: np.ndarray) -> _Recorder | None:
-        """None where nothing is recorded."""
-        current, begun = journal.current(), journal.seconds()
-        if current is None:
-            return None
-        name = current.name(digest(engine, start))
-        return _Recorder(current, name, begun, current.find(name))
-
-    def keep(self, arrays: Mapping[str, np.ndarray], tape: _Tape) -> None:
-        """From here on the work can continue without the pieces that led here; the tape is as it is until the next."""
-        seconds = journal.seconds() - self.begun
-        self.journal.cover(self.name, lambda: State({**arrays, **tape.packed()}, {}, np.zeros(0), seconds))
 
 
 @dataclass

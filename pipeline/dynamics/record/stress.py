@@ -21,15 +21,16 @@ import numpy as np
 
 from flexclear.pipeline.core.numerics.rotations import components, first_largest, matrices, principal, skew, von_mises
 from flexclear.pipeline.core.system.errors import InputError
+from flexclear.pipeline.dynamics.equations.observation import Series, Variables
 from flexclear.pipeline.dynamics.record.body_loads import Motion, motion_and_loads
 from flexclear.pipeline.dynamics.record.motion import Motions
-from flexclear.pipeline.dynamics.record.solid_stress import factors, gauge_nodes, largest
 from flexclear.pipeline.dynamics.record.wrenches import Wrench
 
 if TYPE_CHECKING:
     from flexclear.pipeline.core.artifacts.labelled import Labelled
 
-Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
+#: components of stress of solids that are held at once; bounds the memory
+COMPONENTS_AT_ONCE = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Gauged:
     position: np.ndarray
 
 
-def record(motions: Motions, names: tuple[str, ...]) -> tuple[Variables, dict[str, object]]:
+def record(motions: Motions, names: tuple[str, ...]) -> Series:
     """Stresses of the bodies `names`, rods and solids: variables and coordinates of the run dataset.
 
     InputError for a bundle that was made without what this needs.
@@ -61,7 +62,7 @@ def record(motions: Motions, names: tuple[str, ...]) -> tuple[Variables, dict[st
     return variables | more, coordinates | named
 
 
-def _of_gauges(gauged: Mapping[str, Gauged]) -> tuple[Variables, dict[str, object]]:
+def _of_gauges(gauged: Mapping[str, Gauged]) -> Series:
     stress = np.concatenate([body.stress for body in gauged.values()], axis=1)
     dims = ("time", "gauge")
     variables: Variables = {"von_mises_stress": (dims, von_mises(stress))}
@@ -77,9 +78,7 @@ def _of_gauges(gauged: Mapping[str, Gauged]) -> tuple[Variables, dict[str, objec
     }
 
 
-def _of_solids(
-    motions: Motions, solids: Mapping[str, Labelled], gauged: dict[str, Gauged]
-) -> tuple[Variables, dict[str, object]]:
+def _of_solids(motions: Motions, solids: Mapping[str, Labelled], gauged: dict[str, Gauged]) -> Series:
     """The factors of the stress fields; what follows from them into `gauged`."""
     every, fields, owners = [], list[str](), list[str]()
     for body, bundle in solids.items():
@@ -97,9 +96,7 @@ def _of_solids(
     }
 
 
-def _of_rods(
-    motions: Motions, rods: Mapping[str, Labelled], gauged: dict[str, Gauged]
-) -> tuple[Variables, dict[str, object]]:
+def _of_rods(motions: Motions, rods: Mapping[str, Labelled], gauged: dict[str, Gauged]) -> Series:
     """Section forces and peak stresses; the latter are left out when a rod has a section without known outline.
 
     The largest of all sections into `gauged`, at the centre of its section.
@@ -219,3 +216,50 @@ def _turn(v: np.ndarray) -> np.ndarray:
     angle = np.linalg.norm(v, axis=-1)[..., None, None]
     X = skew(v)
     return np.eye(3) + np.sinc(angle / np.pi) * X + 0.5 * np.sinc(0.5 * angle / np.pi) ** 2 * (X @ X)
+
+
+# Solids: the fields of their bundles times what their factors are in each row. These are modal coordinates, forces and
+# moments of the frames, accelerations of the body frame and of the modes (`structure/stress/solid` says why that is the
+# method of mode acceleration)
+
+
+def factors(bundle: Labelled, motion: Motion, moment: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """What each field of a solid's bundle is multiplied by, in SI, shape (time, field).
+
+    moment, force: as `body_loads.motion_and_loads` returns them.
+    """
+    origins = bundle["frame_position"].values + np.einsum(
+        "fim,tm->tfi", bundle["frame_translation_shape"].values, motion.q, optimize=True
+    )
+    loads = np.concatenate([force, moment - np.cross(origins, force)], axis=2)
+    W = skew(motion.omega)
+    slope = skew(motion.alpha) + W @ W  # acceleration per position in the body
+    rows = len(motion.a)
+    return np.hstack([motion.q, loads.reshape(rows, -1), motion.a, slope.reshape(rows, 9), motion.du])
+
+
+def gauge_nodes(bundle: Labelled) -> dict[str, np.ndarray]:
+    """Nodes of the whole surface, by the empty name, where stress is none of an artefact; and of each gauge."""
+    nodes = {"": np.flatnonzero(bundle["node_doubtful"].values == 0)}
+    for k, name in enumerate(bundle["gauge"].values.tolist()):
+        nodes[name] = bundle["gauge_node"].values[bundle["gauge_index"].values == k]
+    return nodes
+
+
+def largest(field: np.ndarray, factor: np.ndarray, groups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Stress of each group at its node of largest von Mises stress (time, group, 6), and that node, (time, group).
+
+    field: shape (node, 6, field).  factor: shape (time, field).
+    """
+    tensor = np.empty((len(factor), len(groups), 6))
+    node = np.empty((len(factor), len(groups)), dtype=np.int64)
+    flat = np.ascontiguousarray(field.reshape(-1, field.shape[2]).T)
+    step = max(1, COMPONENTS_AT_ONCE // flat.shape[1])
+    for start in range(0, len(factor), step):
+        part = slice(start, start + step)
+        stress = (factor[part] @ flat).reshape(-1, *field.shape[:2])
+        size, row = von_mises(stress), np.arange(len(stress))
+        for k, nodes in enumerate(groups):
+            node[part, k] = nodes[np.argmax(size[:, nodes], axis=1)]
+            tensor[part, k] = stress[row, node[part, k]]
+    return tensor, node

@@ -6,15 +6,13 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.equations.observation import Observed, Series, Variables
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.model.mobility import INFINITE
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.run import Run
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory
-
-Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
 
 #: singular values of the selected closure rows below this fraction of the largest count as zero in the rank
 ZERO_ROW = 1e-9
@@ -25,7 +23,7 @@ WELL = 1e3
 ROWS_AT_ONCE = 256
 
 
-def topology(run: Run) -> tuple[Variables, dict[str, object]]:
+def topology(run: Run) -> Series:
     """Variables and coordinates of the run dataset."""
     engine, trajectory, seen = run.engine, run.trajectory, run.observed
     redundant = np.array([name in engine.mobility.redundant_joints for name in run.scene.joint], dtype=np.int8)

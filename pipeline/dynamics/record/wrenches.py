@@ -13,10 +13,10 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.model import Model
-from flexclear.pipeline.dynamics.record.acting import on_frames
 from flexclear.pipeline.dynamics.record.motion import Motions
 
 Wrench = tuple[np.ndarray, np.ndarray]  #: moment about the kernels' origin, force; (time, 3) each, world axes
+Acting = tuple[str, np.ndarray, np.ndarray]  #: the same with the frame on which it acts
 
 
 def joint_wrenches(motions: Motions, names: Collection[str] | None = None) -> dict[str, Wrench]:
@@ -48,11 +48,23 @@ def every_joint_wrench(motions: Motions, names: Sequence[str]) -> Wrench:
     return moments, forces
 
 
-def path_wrenches(model: Model, seen: Observed) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def path_wrenches(model: Model, seen: Observed) -> list[Acting]:
     """For every frame that a drive leads along a path: its name, moment about the kernels' origin, force."""
     tree, drives = _tree(model, seen), model.scene.drive
     paths = {f"drive.{name}": drive.frame for name, drive in drives.items() if isinstance(drive, PathDrive)}
     return [(frame, *tree[edge]) for edge, frame in paths.items() if edge in tree]
+
+
+def on_frames(model: Model, seen: Observed, body: str) -> list[Acting]:
+    """What acts on a body besides joints and paths: loads and effects."""
+    on_each: list[Acting] = []
+    if model.loads:
+        from flexclear.pipeline.dynamics.record.loads import on_loaded_frames
+
+        on_each += on_loaded_frames(model, seen)
+    for on_its_frames in model.parts.functions("acts"):
+        on_each += on_its_frames(model, seen)
+    return [acting for acting in on_each if model.mechanism.frames[acting[0]].body == body]
 
 
 def _tree(model: Model, seen: Observed) -> dict[str, Wrench]:
@@ -83,8 +95,8 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
     """Wrenches of the fixed joints inside each link, by Newton and Euler for the bodies beyond them."""
     model, rows, beyond, inside = motions.model, len(motions.seen.state), list[_Beyond](), dict[str, Wrench]()
     for link in model.links:
-        every = model.scene.joint.items()
-        inner = [n for n, j in every if n not in known and _is_inside(model, j.between, link.places)]
+        others = {name: _joined(model, name) for name in model.scene.joint if name not in known}
+        inner = [name for name, bodies in others.items() if link.places.keys() >= set(bodies)]
         # a second path between bodies that are joined already carries nothing here
         inside |= {name: (np.zeros((rows, 3)), np.zeros((rows, 3))) for name in inner}
         tree = _forest(model, inner, list(link.places))
@@ -106,10 +118,6 @@ def _inside_groups(motions: Motions, known: Mapping[str, Wrench]) -> dict[str, W
                 moment, force = moment - n, force - f
         inside[part.joint] = part.sign * moment, part.sign * force
     return inside
-
-
-def _is_inside(model: Model, between: tuple[str, str], places: Mapping[str, object]) -> bool:
-    return all(model.mechanism.frames[f].body in places for f in between)
 
 
 def _joined(model: Model, name: str) -> tuple[str, str]:

@@ -9,7 +9,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type, label
 from flexclear.pipeline.dynamics.model.model import Model
 
 Series = tuple[np.ndarray, np.ndarray, np.ndarray]  #: coordinate, rate and second rate, shape (time,) each
@@ -20,7 +20,7 @@ def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
     series: dict[str, Series] = {}
     for i, link in enumerate(model.links):
         edge = link.branch.edge
-        if edge is None or link.on_path or not joint_class(edge.kind).COORDINATES:
+        if edge is None or link.on_path or not joint_type(edge.kind).COORDINATES:
             continue
         positions, coordinates = model.numbering.positions[i], model.numbering.coordinates[i]
         for index, q, c in zip(link.joint.positions, positions, coordinates, strict=True):
@@ -33,15 +33,9 @@ def joint_coordinates(model: Model, seen: Observed) -> dict[str, Series]:
             continue
         edge = closure.edge
         a, b = seen.sites[:, row["site_a"]], seen.sites[:, row["site_b"]]
-        for index, coordinate in enumerate(joint_class(edge.kind).COORDINATES):
+        for index, coordinate in enumerate(joint_type(edge.kind).COORDINATES):
             series[label(edge.name, edge.kind, index)] = _measured(a, b, coordinate)
     return {name: series[name] for name, _, _ in named_coordinates(model.scene) if name in series}
-
-
-def label(joint: str, kind: str, k: int) -> str:
-    """Name in records of coordinate k of a joint of some type."""
-    declared: tuple[Coordinate, ...] = joint_class(kind).COORDINATES
-    return joint if len(declared) == 1 else f"{joint}.{declared[k].name}"
 
 
 def named_coordinates(scene: Scene) -> list[tuple[str, str, bool]]:
@@ -51,7 +45,7 @@ def named_coordinates(scene: Scene) -> list[tuple[str, str, bool]]:
     return [
         (label(name, kind, k), name, coordinate.turning)
         for name, kind in kinds.items()
-        for k, coordinate in enumerate(joint_class(kind).COORDINATES)
+        for k, coordinate in enumerate(joint_type(kind).COORDINATES)
     ]
 
 

@@ -18,11 +18,11 @@ as loads, linear between two outputs, so that joint forces and works are those o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import null_space, qr
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.drives import JointDrive, PathDrive
 from flexclear.pipeline.core.scene.laws import Constant
 from flexclear.pipeline.core.scene.loads import JointForce
@@ -43,9 +43,6 @@ from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.trajectory import Trajectory, integrate
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: singular values below this fraction of the largest are zero
 RANK_TOLERANCE = 1e-8
@@ -117,19 +114,12 @@ def _with_drives(scene: Scene, requested: Mapping[str, PathDrive], names: list[s
                 raise InputError(where, f"something called '{name}' acts already", "name each actuator once")
             joint, _, _ = _coordinate(scene, name, where)
             made[name] = JointDrive(joint=joint, coordinate=_named(name), law=Constant(type="constant"))
-    return _changed(scene, {"drive": {**others, **made}})
+    return scene.model_copy(update={"drive": {**others, **made}})
 
 
 def _named(actuator: str) -> str | None:
     """The coordinate that an actuator's name gives, if any."""
     return actuator.partition(".")[2] or None
-
-
-def _changed(scene: Scene, update: dict[str, object]) -> Scene:
-    """The scene with other parts, under its own name."""
-    changed = scene.model_copy(update=update)
-    changed._name, changed._path = scene.name, scene.path
-    return changed
 
 
 def _enough(engine: Engine, scene: Scene, requested: Mapping[str, PathDrive], names: list[str]) -> list[str]:
@@ -233,7 +223,7 @@ def _shared(
         joint, _, _ = _coordinate(scene, name)
         loads[name] = JointForce(type="joint-force", joint=joint, coordinate=_named(name), force=force)
         shared[f"load.{name}"] = _linear(trajectory.time, before[:, k], after[:, k])
-    return _changed(scene, {"load": {**scene.load, **loads}}), shared
+    return scene.model_copy(update={"load": {**scene.load, **loads}}), shared
 
 
 def _least(

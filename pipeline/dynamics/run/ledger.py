@@ -26,7 +26,7 @@ BALANCE_ROUNDING = 1e-12
 NO_ENERGY = 1e-30
 #: no contact law is known to a thousandth of its energy; a run of chosen steps that is off by more says something
 #: else. Where more is requested, the balance is better: of three hundred hard cases at rtol 1e-10
-#: (benchmarks/stability) none is off by 1e-6, unless something is wrong; what damps by its order is not distinguished
+#: (benchmarks/atlas.py) none is off by 1e-6, unless something is wrong; what damps by its order is not distinguished
 #: from a fault that soon. Fixed steps are for comparison: their error is to be seen, up to a tenth of all energy
 CHOSEN, STRICT, PER_RTOL, FIXED = 1e-3, 1e-4, 1e5, 0.1
 #: fraction of the exchanged energy above which an error is a warning: no force or speed can be trusted to a per cent

@@ -11,31 +11,31 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.registry import lookup, module_of
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.system.errors import SolverError, StoppedError
-from flexclear.pipeline.core.system.progress import Progress
+from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.core.workflow.cores import meanwhile
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import Pieces
-from flexclear.pipeline.dynamics.effects import STARTS
+from flexclear.pipeline.dynamics.effects import STARTS, scheme_of
 from flexclear.pipeline.dynamics.equations import observation
 from flexclear.pipeline.dynamics.equations.observation import Blocks, Observed
 from flexclear.pipeline.dynamics.model.mechanism import build
 from flexclear.pipeline.dynamics.model.model import Model, tabulate
+from flexclear.pipeline.dynamics.model.refill import refilled
 from flexclear.pipeline.dynamics.run import trajectory as stepping
-from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
+from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, assemble, prepare
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe_blocks
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, mends
 from flexclear.pipeline.dynamics.run.ledger import require_closed
 from flexclear.pipeline.dynamics.run.progress_rate import Judges, Panel
-from flexclear.pipeline.dynamics.run.singular_poses.collocation import CLEAR, NEARLY_CLEAR, blurred, observe_around
 from flexclear.pipeline.dynamics.run.trajectory import Followed, StiffError, Stop, Trajectory, never
 
 if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
     from flexclear.pipeline.dynamics.run.horizon.horizon import PerturbedRun
     from flexclear.pipeline.dynamics.run.singular_poses.collocation import Collocation
 
@@ -105,6 +105,28 @@ def engines(
     """The engine of a run, and the maker of one that continues with another integrator, given by its name."""
     made = maker(scene, bundles, progress)
     return made("", progress), cache(lambda name: made(name, progress))
+
+
+def engines_alike(
+    known: Engine | None, scene: Scene, bundles: Mapping[str, Labelled]
+) -> tuple[Engine, Callable[[str], Engine]]:
+    """What `engines` gives, to the last bit, at less cost where an engine of another edit of the scene is `known`.
+
+    What has been compiled and judged for that serves this.  known: with the same bundles; it is not changed.  Errors as
+    of `engines`.
+    """
+    model = None if known is None or not _may_serve(known, scene) else refilled(known.model, scene)
+    if known is None or model is None:
+        return engines(scene, bundles, silent)
+    other = cache(lambda name: engine_of(edited(scene, {"solver.integrator": name}), bundles, silent))
+    return assemble(model, known.entry, known.method, known.mobility), other
+
+
+def _may_serve(known: Engine, scene: Scene) -> bool:
+    """Whether the scene runs on the same kernels, no other run finds its motion, and its start is no special one."""
+    old = known.model.scene
+    paths = any(isinstance(drive, PathDrive) for drive in [*old.drive.values(), *scene.drive.values()])
+    return not paths and scheme_of(scene.solver) == scheme_of(old.solver) and not known.mobility.singular_start
 
 
 def maker(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> Callable[[str, Progress], Engine]:
@@ -233,11 +255,8 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
         engine.keep(selected)
         out = observe_blocks(engine, trajectory.rows[part])
         for k, motion in _near_singular(engine, trajectory.rows[part], trajectory.collocations):
-            row, lost = trajectory.rows[part][k], out["status"][k, 0]
-            limit = observe_around(engine, row, motion, CLEAR)
-            if limit is None and lost:
-                limit = observe_around(engine, row, motion, NEARLY_CLEAR)
-            for name, values in (limit or {}).items():
+            limit = _limit(engine, trajectory.rows[part][k], motion, bool(out["status"][k, 0]))
+            for name, values in limit.items():
                 out[name][k] = values
         parts.append(out)
     # megabytes are copied only where there is something to join: that would take as long as a short run
@@ -257,11 +276,23 @@ def observed(engine: Engine, trajectory: Trajectory) -> Observed:
     return seen
 
 
+def _limit(engine: Engine, row: np.ndarray, motion: Collocation, lost: bool) -> dict[str, np.ndarray]:
+    """What is observed around a row next to a singular pose; nothing where the row itself is as good."""
+    from flexclear.pipeline.dynamics.run.singular_poses.collocation import CLEAR, NEARLY_CLEAR, observe_around
+
+    limit = observe_around(engine, row, motion, CLEAR)
+    if limit is None and lost:
+        limit = observe_around(engine, row, motion, NEARLY_CLEAR)
+    return limit or {}
+
+
 def _near_singular(
     engine: Engine, rows: np.ndarray, motions: tuple[Collocation, ...]
 ) -> Iterator[tuple[int, Collocation]]:
     """Rows, by number, that are too close to a singular pose, and the motion over it to which they belong."""
     for motion in motions:
+        from flexclear.pipeline.dynamics.run.singular_poses.collocation import blurred  # which few runs need
+
         engine.select_pieces_after(0.5 * (motion.start + motion.end))
         begin = np.searchsorted(rows[:, 0], motion.start, side="left" if motion.start == engine.start else "right")
         for k in range(int(begin), int(np.searchsorted(rows[:, 0], motion.end, side="right"))):

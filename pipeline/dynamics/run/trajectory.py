@@ -13,12 +13,13 @@ from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow import stopping
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER, TOO_LITTLE
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
 from flexclear.pipeline.dynamics.run.evaluation.start import NO_IMPACT, overlapping
-from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Piece, Selections, Tape, in_order, piece
+from flexclear.pipeline.dynamics.run.pieces import Handover, Jumps, Moment, Selections, Tape, in_order
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, crawls, look
 from flexclear.pipeline.dynamics.run.refusals import refusal
 from flexclear.pipeline.dynamics.run.refusals.reach import require_shallow
@@ -50,7 +51,7 @@ def never(rows: np.ndarray) -> bool:
 class Trajectory:
     """What the stepper left.
 
-    rows: of the record (see `memory.record`); events: of the event table, by time.
+    rows: of the record (see `integrate.recording`); events: of the event table, by time.
     contacts: number of clearance joints.  selections: closure rows solved for, each from a time on.
     drift, rate_drift: largest violation of a closure that a projection met [m or -], and of its rate [1/s of it].
     steepest: largest rate [1/s] of the equations that a step met, as the method estimates it.
@@ -72,12 +73,12 @@ class Trajectory:
     @property
     def time(self) -> np.ndarray:
         """Times of the rows [s], strictly increasing."""
-        return m.record(self.rows, self.contacts).time
+        return recording.record(self.rows, self.contacts).time
 
     @property
     def state(self) -> np.ndarray:
         """States, shape (rows, NY)."""
-        return m.record(self.rows, self.contacts).state
+        return recording.record(self.rows, self.contacts).state
 
     def parts(self) -> list[tuple[slice, np.ndarray]]:
         """Stretches of rows, each with the closure rows that were solved for to reach them."""
@@ -91,10 +92,6 @@ class Trajectory:
         """The trajectory without its rows at some times [s], but for those at its events."""
         dropped = np.isin(self.time, times) & ~np.isin(self.time, self.events["time"])
         return replace(self, rows=self.rows[~dropped]) if dropped.any() else self
-
-    def selection(self, row: int) -> np.ndarray:
-        """Closure rows that were solved for to reach a row."""
-        return next(selected for part, selected in self.parts() if part.start <= row < part.stop)
 
 
 #: the engine that came to the end, what it followed, and why it is not the one that began
@@ -121,34 +118,21 @@ def integrate(
 ) -> Trajectory:
     """The trajectory from a consistent start; SolverError when the stepper gives up.
 
-    stop: asked now and then with the rows recorded so far, whether they are enough; also of what an earlier attempt has
-        left.
+    stop: asked now and then with the rows recorded so far, whether they are enough.
     left: what another method left of this run; it is continued from there.
     outputs: times of output [s], the start first; the scene's where there are none.
     judge: whether another method continues; by default where this one is explicit and would take far too long.
     jumps: changes the state at events and breaks.
-    Where the task keeps a journal, what an earlier attempt left there is continued.  Raises StoppedError, with the
-    engine and the trajectory so far as `partial` if there is any, when the work is asked to stop.
+    Raises StoppedError, with the engine and the trajectory so far as `partial` if there is any, when the work is asked
+    to stop.
     """
     judge = judge or Judge(SLICE, crawls)
     if outputs is None:
         outputs = engine.output_times(engine.model.scene.output.interval)
-    mine = piece(engine, y, outputs, left)
-    why = stopping.requested()
-    if why and (mine is None or not mine.done):  # many short integrations never pause
-        if mine is not None:
-            mine.journal.write()
-        raise StoppedError(why, interrupted=why == stopping.INTERRUPTED)
+    stopping.check()  # many short integrations never pause
     with stopping.heeded():
-        if mine is None or mine.tape is None:
-            tape = _begun(engine, y, left, outputs)
-            _advance(engine, tape, progress, stop, left, mine, judge, jumps, resumed=False)
-        else:
-            tape = mine.tape
-            if not mine.done:
-                _advance(engine, tape, progress, stop, left, mine, judge, jumps, resumed=True)
-    if mine is not None:
-        mine.finish(tape)
+        tape = _begun(engine, y, left, outputs)
+        _advance(engine, tape, progress, stop, left, judge, jumps)
     return _collect(engine, tape)
 
 
@@ -169,31 +153,23 @@ def _advance(
     progress: Progress,
     stop: Stop,
     left: Handover | None,
-    mine: Piece | None,
     judge: Judge,
     jumps: Jumps | None,
-    *,
-    resumed: bool,
 ) -> None:
-    """From segment to segment to the end; resumed: the first of them has been begun in an earlier attempt."""
+    """From segment to segment to the end."""
     sample, control = _sampler(engine), engine.control
     settle(engine, progress)
-    if not resumed:
-        tape.looks.append(look(engine))
-    elif stop(_so_far(engine, tape)):
-        return
+    tape.looks.append(look(engine))
     for a, b in zip(engine.breaks[:-1], engine.breaks[1:], strict=True):
         if b <= control[m.TIME]:
             continue
-        if not resumed:
-            if a > (engine.start if left is None else left.time):
-                engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
-                if jumps is not None:
-                    jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
-            engine.select_pieces_after(0.5 * (a + b))
-            control[m.END], engine.n[m.FRESH] = b, 1
-        resumed = False
-        if _segment(engine, tape, progress, stop, mine, judge, jumps):
+        if a > (engine.start if left is None else left.time):
+            engine.view(m.Y)[:] = sample(engine.view(m.Y).copy(), a)
+            if jumps is not None:
+                jumps.at_break(engine, *engine.pieces[[engine.segments(a, after=side) for side in (False, True)]])
+        engine.select_pieces_after(0.5 * (a + b))
+        control[m.END], engine.n[m.FRESH] = b, 1
+        if _segment(engine, tape, progress, stop, judge, jumps):
             break
 
 
@@ -206,7 +182,7 @@ def _sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
 def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
     """A tape with its first row, and contacts that are closed at the start."""
     tape = _prepare(engine, y, engine.start, outputs)
-    first = m.record(tape.rows[:1], len(engine.model.contacts))
+    first = recording.record(tape.rows[:1], len(engine.model.contacts))
     first.time[:], first.state[:] = engine.start, y
     engine.n[m.N_RECORDED], engine.n[m.NEXT_OUTPUT] = 1, 1
     if engine.model.contacts:
@@ -217,17 +193,17 @@ def _begin(engine: Engine, y: np.ndarray, outputs: np.ndarray) -> Tape:
 
 def _resume(engine: Engine, left: Handover, outputs: np.ndarray) -> Tape:
     """A tape with what another method has recorded; the engine as that method left it."""
-    tape, n = _prepare(engine, left.y, left.time, outputs), engine.n
+    here, before = left.here, left.tape
+    tape, n = _prepare(engine, here.y, left.time, outputs), engine.n
     cap = n[m.CAP]
     n[m.STATUS : m.INTEGERS] = left.counters
     n[m.CAP] = cap
-    engine.modes[:] = left.modes
-    engine.view(m.Y)[:], engine.latched[:], engine.view(m.WATCH.place)[:] = left.y, left.latched, left.watched
+    here.enter(engine)
     engine.control[LASTING] = left.lasting
-    tape.rows, tape.events = np.concatenate([left.rows, tape.rows]), np.concatenate([left.events, tape.events])
-    same = np.array_equal(left.selections[-1][1], engine.selected)
-    tape.selections = [*left.selections, *([] if same else tape.selections)]
-    tape.collocations, tape.passes = [*left.collocations], [*left.passes]
+    tape.rows, tape.events = np.concatenate([before.rows, tape.rows]), np.concatenate([here.events, tape.events])
+    same = np.array_equal(before.selections[-1][1], engine.selected)
+    tape.selections = [*before.selections, *([] if same else tape.selections)]
+    tape.collocations, tape.passes = [*before.collocations], [*before.passes]
     return tape
 
 
@@ -247,7 +223,7 @@ def _prepare(engine: Engine, y: np.ndarray, t: float, outputs: np.ndarray) -> Ta
     n[m.CAP] = solver.evaluations
     engine.modes[:], engine.latched[:] = 0, 0.0
     room = EVENT_ROWS if contacts else m.ROOM
-    rows = m.empty_record(len(outputs) + room + m.ROOM, contacts, len(y))
+    rows = recording.empty_record(len(outputs) + room + m.ROOM, contacts, len(y))
     events = np.full((room + m.ROOM, m.EVENT.size), np.nan)
     return Tape(outputs, rows, events, [(t, _select(engine, y, t))])
 
@@ -264,14 +240,13 @@ def _leave_singular_start(engine: Engine, tape: Tape) -> None:
     """Leave a way out of the singular start to the stepper, and begin with the speeds of its branch."""
     from flexclear.pipeline.dynamics.run.singular_poses.beginning import start_motion  # which few mechanisms need
 
-    first = m.record(tape.rows[:1], len(engine.model.contacts)).state[0]
+    first = recording.record(tape.rows[:1], len(engine.model.contacts)).state[0]
     engine.select_pieces_after(engine.start)
     way = start_motion(engine, first.copy())
-    first[:] = engine.view(m.Y)[:] = way.state
-    engine.view(m.COLLOCATION)[:] = way.motion.series.ravel()
+    way.lay(engine)
+    first[:] = engine.view(m.Y)
     engine.view(m.PIVOT)[:] = 1.0, 0.0
-    engine.control[m.COLLOCATED] = way.motion.span
-    tape.collocations.append(way.motion)
+    tape.collocations.append(way)
     tape.selections[:] = [(engine.start, engine.selected.copy())]
 
 
@@ -294,7 +269,6 @@ def _segment(
     tape: Tape,
     progress: Progress,
     stop: Stop,
-    mine: Piece | None,
     judge: Judge,
     jumps: Jumps | None = None,
 ) -> bool:
@@ -340,17 +314,13 @@ def _segment(
             _warn(engine, tape, progress)
             if stop(_so_far(engine, tape)):
                 return True
-            if mine is not None:
-                mine.keep(tape)
-            _stop_when_asked(engine, tape, mine)
+            _stop_when_asked(engine, tape)
 
 
-def _stop_when_asked(engine: Engine, tape: Tape, mine: Piece | None) -> None:
+def _stop_when_asked(engine: Engine, tape: Tape) -> None:
     """Leave what there is in good order, and go."""
     why = stopping.requested()
     if why:
-        if mine is not None:
-            mine.save(tape)
         raise StoppedError(why, (engine, _collect(engine, tape)), interrupted=why == stopping.INTERRUPTED)
 
 
@@ -376,7 +346,7 @@ def _pass_over(engine: Engine, tape: Tape) -> bool:
     if engine.mobility.redundant and closure_rows.improve(engine, t, closure_rows.CLEARLY):
         tape.selections.append((t, engine.selected.copy()))
         return True
-    from flexclear.pipeline.dynamics.run.singular_poses.passing import EQUAL_TIMES, lay_over
+    from flexclear.pipeline.dynamics.run.singular_poses.passing import EQUAL_TIMES, lay_over  # which few runs need
 
     made, passes = lay_over(engine)
     if made is not None:
@@ -400,19 +370,9 @@ def _rescued(engine: Engine, tape: Tape) -> bool:
 def _hand_over(engine: Engine, tape: Tape) -> Handover:
     """What a paused integration leaves to another method."""
     n = engine.n
-    return Handover(
-        engine.view(m.Y).copy(),
-        engine.modes.copy(),
-        engine.latched.copy(),
-        engine.view(m.WATCH.place).copy(),
-        n[m.STATUS : m.INTEGERS].copy(),
-        engine.control[LASTING],
-        tape.rows[: n[m.N_RECORDED]].copy(),
-        tape.events[: n[m.N_EVENTS]].copy(),
-        tuple(tape.selections),
-        tuple(tape.collocations),
-        tuple(tape.passes),
-    )
+    here = Moment.of(engine, engine.view(m.WATCH.place), tape.events[: n[m.N_EVENTS]].copy())
+    recorded = replace(tape, rows=tape.rows[: n[m.N_RECORDED]].copy())
+    return Handover(here, n[m.STATUS : m.INTEGERS].copy(), engine.control[LASTING], recorded)
 
 
 def _so_far(engine: Engine, tape: Tape) -> np.ndarray:

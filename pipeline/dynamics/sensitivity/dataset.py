@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.artifacts.quantities import IMPACT, reduced
 from flexclear.pipeline.core.scene.event_kinds import CLOSING
 from flexclear.pipeline.core.scene.load import with_numbers
@@ -26,8 +27,6 @@ from flexclear.pipeline.dynamics.sensitivity.series import NORMAL_FORCE, Series,
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: step of reductions, which are smooth functions of their series, as a fraction of the largest change
 REDUCTION_STEP = 1e-6

@@ -7,7 +7,7 @@ records is differentiated, by the code that records it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.dynamics import memory as m
-from flexclear.pipeline.dynamics.equations.observation import Observed
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.record.dataset import chosen
 from flexclear.pipeline.dynamics.record.motion import Motions
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
@@ -48,30 +48,24 @@ def derivatives(
 ) -> Series:
     """Return the derivatives of the same along direction k of a run, per unit of the parameter."""
     made: Series = {}
-    for rows, step in _batches(_steps(family, run, k, parameter)):
-        around = {j: _read_moved(family, run, k, parameter, rows, j * step, wanted) for j in (-2, -1, 1, 2)}
+    # rows with common steps together
+    powers = np.floor(np.log10(_steps(family, run, k, parameter)) + 1e-9).astype(int)
+    for power in np.unique(powers):
+        rows, step = np.flatnonzero(powers == power), 10.0**power
+        around = {
+            j: read(family, family.changed(parameter, j * step), moved(run, k, rows, j * step), wanted)
+            for j in (-2, -1, 1, 2)
+        }
         for name in around[1]:
             change = central({j: there[name] for j, there in around.items()}, step)
             made.setdefault(name, np.zeros((len(run.trajectory.rows), change.shape[1])))[rows] = change
     return made
 
 
-def _read_moved(
-    family: Family,
-    run: Differentiated,
-    k: int,
-    parameter: Parameter,
-    rows: np.ndarray,
-    step: float,
-    wanted: Collection[Quantity],
-) -> Series:
-    return read(family, family.changed(parameter, step), moved(run, k, rows, step), wanted)
-
-
 def moved(run: Differentiated, k: int, rows: np.ndarray, step: float) -> Differentiated:
     """Return some rows of a run, moved by a step along direction k."""
     some = run.trajectory.rows[rows]
-    record = m.record(some, run.trajectory.contacts)
+    record = recording.record(some, run.trajectory.contacts)
     record.state[:] += step * run.changes[rows, k]
     record.latched[:] += step * run.impact_rates[rows, k]
     return replace(run, trajectory=replace(run.trajectory, rows=some))
@@ -86,22 +80,11 @@ def _steps(family: Family, run: Differentiated, k: int, parameter: Parameter) ->
     steps = WIDEST_STEP / np.maximum(1.0, (changes[:, positions] / size).max(axis=1, initial=0.0))
     if model.contacts:
         everything, probe = np.arange(len(steps)), float(steps.min()) * 1e-3
-        ends = [_look(family.changed(parameter, j * probe), moved(run, k, everything, j * probe)) for j in (-1, 1)]
-        gaps = [end.touch["gap"] for end in ends]
+        sides = [(family.changed(parameter, j * probe), moved(run, k, everything, j * probe)) for j in (-1, 1)]
+        gaps = [observed(engine, side.trajectory).touch["gap"] for engine, side in sides]
         depth, change = -0.5 * (gaps[0] + gaps[1]), np.abs(gaps[1] - gaps[0]) / (2.0 * probe)
-        closed = (m.record(run.trajectory.rows, run.trajectory.contacts).modes == 1) & (depth > 0.0)
+        closed = (recording.record(run.trajectory.rows, run.trajectory.contacts).modes == 1) & (depth > 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             allowed = np.where(closed & (change > 0.0), OF_DEPTH * depth / change, np.inf)
         steps = np.minimum(steps, allowed.min(axis=1))
     return np.clip(steps, FINEST, WIDEST_STEP)
-
-
-def _look(engine: Engine, run: Differentiated) -> Observed:
-    return observed(engine, run.trajectory)
-
-
-def _batches(steps: np.ndarray) -> Iterator[tuple[np.ndarray, float]]:
-    """Yield rows with common steps, powers of ten."""
-    powers = np.floor(np.log10(steps) + 1e-9).astype(int)
-    for power in np.unique(powers):
-        yield np.flatnonzero(powers == power), 10.0**power

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
-
-
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.drives import JointDrive
 from flexclear.pipeline.core.scene.laws import Constant
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import JointStart, Start
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics.linear.bench import state
-from flexclear.pipeline.dynamics.linear.equilibrium import equilibrium
+from flexclear.pipeline.dynamics.linear.equilibrium import balanced
 from flexclear.pipeline.dynamics.model.driving import joint_drives
 from flexclear.pipeline.dynamics.model.start_table import given_coordinates
-from flexclear.pipeline.dynamics.starts.snapshot import posed, resting
+from flexclear.pipeline.dynamics.starts.snapshot import joint_starts, posed, resting
 
 
 def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> tuple[Scene, str]:
@@ -26,7 +23,7 @@ def begin(scene: Scene, bundles: Mapping[str, Labelled], progress: Progress) -> 
 
     Raises InputError for a scene that cannot be built, SolverError when there is no equilibrium close to its poses.
     """
-    bench, rest = equilibrium(placed(scene), bundles, progress, None, None)
+    bench, rest, _ = balanced(placed(scene), bundles, progress)
     progress(None, f"begins at the equilibrium: {rest.residual:.2g} N unbalanced, {rest.iterations} iterations")
     rest_state = resting(posed(scene, bench.engine, state(bench, rest.at.q), bench.time), scene.contacts())
     return rest_state, bench.engine.model.mechanism.choice
@@ -44,15 +41,10 @@ def placed(scene: Scene) -> Scene:
             law = Constant(type="constant", value=start.position)
             name = f"hold-{start.joint}-{start.coordinate.name}"
             holds[name] = JointDrive(joint=start.joint, coordinate=start.coordinate.name, law=law)
-    hints = {
-        joint: {
-            name: _hint(one) for name, one in coordinates.items() if one.position is not None or one.near is not None
-        }
-        for joint, coordinates in scene.start.joint.items()
-    }
-    hinted = Start(joint={joint: coordinates for joint, coordinates in hints.items() if coordinates})
+
+    def hint(one: JointStart) -> JointStart | None:
+        given = one.position is not None or one.near is not None
+        return one.model_copy(update={"velocity": None}) if given else None
+
+    hinted = Start(joint=joint_starts(scene.start, hint))
     return scene.model_copy(update={"drive": holds, "start": hinted})
-
-
-def _hint(one: JointStart) -> JointStart:
-    return one.model_copy(update={"velocity": None})

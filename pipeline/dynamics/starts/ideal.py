@@ -9,10 +9,10 @@ have no ideal counterpart: they stay as they are, and what touches them where th
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import Start
@@ -27,13 +27,11 @@ from flexclear.pipeline.dynamics.record.wrenches import joint_wrenches
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, prepare
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe
-from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, project, rates_at_speeds
+from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start, project
 from flexclear.pipeline.dynamics.run.horizon.horizon import offset_jacobian
 from flexclear.pipeline.dynamics.run.run import driven
+from flexclear.pipeline.dynamics.run.states import per_speed, rows_of
 from flexclear.pipeline.dynamics.starts.snapshot import moving, resting
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: a pin has its final position when it is this fraction of the clearance from it; passes in which that is reached, at
 #: most
@@ -139,11 +137,7 @@ def _modal_speeds(engine: Engine) -> list[int]:
 
 def _forces(scene: Scene, engine: Engine, y: np.ndarray) -> dict[str, np.ndarray]:
     """Force of every joint on its second body at the start [N], world axes, by name."""
-    contacts = len(engine.model.contacts)  # with stops
-    rows = m.empty_record(1, contacts, len(y))
-    start = m.record(rows, contacts)
-    start.time[:], start.state[:] = engine.start, y
-    seen = observe(engine, rows, after=True)
+    seen = observe(engine, rows_of(engine, y[None], engine.start), after=True)
     return {name: wrench[1][0] for name, wrench in joint_wrenches(Motions(engine.model, seen)).items()}
 
 
@@ -185,9 +179,8 @@ def _moved(engine: Engine, y: np.ndarray, pins: list[bool], offsets: np.ndarray,
     back: a stiff one is under kilonewtons then.
     """
     engine.select_pieces_after(engine.start)
-    nq, nv, modes = engine.model.nq, engine.model.nv, _modes(engine)
-    still = rates_at_speeds(engine, y, np.zeros(nv))[:nq]
-    ways = np.array([rates_at_speeds(engine, y, unit)[:nq] - still for unit in np.eye(nv)]).T
+    nq, modes = engine.model.nq, _modes(engine)
+    ways = per_speed(engine, y, lambda rates: rates[:nq])
     jacobian = offset_jacobian(engine, y)[np.repeat(pins, 3)]
     speeds, _, rank, _ = np.linalg.lstsq(jacobian, offsets, rcond=SINGULAR_ROUNDING)
     if modes:

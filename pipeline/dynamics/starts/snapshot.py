@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.scene.parts import Ground
 from flexclear.pipeline.core.scene.schema import Scene
 from flexclear.pipeline.core.scene.start import JointStart, ModalStart, Start
-from flexclear.pipeline.core.scene.units import LARGEST
+from flexclear.pipeline.core.scene.units import LARGEST_NUMBER
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.initial import centre_of
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
@@ -80,17 +80,20 @@ def _modes(engine: Engine, values: np.ndarray, numbers: dict[int, range]) -> dic
 
 def _given(values: np.ndarray) -> Any:
     """Computed values as a scene may give them: what rounding leaves below all numbers of scenes is zero."""
-    return np.where(np.abs(values) < 1.0 / LARGEST, 0.0, values).tolist()
+    return np.where(np.abs(values) < 1.0 / LARGEST_NUMBER, 0.0, values).tolist()
 
 
 def _begun(scene: Scene, modal: dict[str, ModalStart]) -> Start:
     """The start without what the poses say now."""
     old = scene.start if scene.start is not None else Start()
-    rates = {
-        joint: {
-            name: JointStart(velocity=one.velocity) for name, one in coordinates.items() if one.velocity is not None
-        }
-        for joint, coordinates in old.joint.items()
+    rates = joint_starts(old, lambda one: None if one.velocity is None else JointStart(velocity=one.velocity))
+    return old.model_copy(update={"at": None, "joint": rates, "modal": modal})
+
+
+def joint_starts(start: Start, left: Callable[[JointStart], JointStart | None]) -> dict[str, dict[str, JointStart]]:
+    """What is left of what a start says of each joint coordinate, by joint."""
+    made = {
+        joint: {name: new for name, one in coordinates.items() if (new := left(one)) is not None}
+        for joint, coordinates in start.joint.items()
     }
-    nonempty = {joint: coordinates for joint, coordinates in rates.items() if coordinates}
-    return old.model_copy(update={"at": None, "joint": nonempty, "modal": modal})
+    return {joint: coordinates for joint, coordinates in made.items() if coordinates}

@@ -174,6 +174,11 @@ def written(value: float, uncertainty: float, unit: str) -> str:
     return f"{rounded(factor * value, 3)} {shown}"
 
 
+def listed(names: Sequence[str]) -> str:
+    """Names with commas and an `and`."""
+    return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + f" and {names[-1]}"
+
+
 def chart(name: str, dataset: xr.Dataset, title: str, requested: Mapping[str, float] | None = None) -> dict[str, bytes]:
     """Bars of what each effect does alone, a panel for each quantity; a line where an accuracy is requested.
 

@@ -17,7 +17,7 @@ import xarray as xr
 from flexclear.pipeline.core.artifacts.effect_size import Influence, chance, influence, scatter, size
 from flexclear.pipeline.core.artifacts.points import Point
 from flexclear.pipeline.core.scene.quantity import Quantity
-from flexclear.pipeline.post.answers.effect_sizes import written
+from flexclear.pipeline.post.answers.effect_sizes import listed, written
 from flexclear.pipeline.post.overview.curves import measured, rounded
 from flexclear.pipeline.post.plotting.table import Table
 
@@ -168,10 +168,10 @@ def sentence(result: xr.Dataset, requested: Mapping[str, float]) -> str:
         now, perhaps = _called_for(single, limits)
         new = [effect for effect in now if effect not in before]
         unsure = [effect for effect in perhaps if effect not in now]
-        open_ = f" (not decided: {_enumerated(unsure)})" if unsure else ""
+        open_ = f" (not decided: {listed(unsure)})" if unsure else ""
         if new or unsure:
             none = "no more for certain" if before else "none for certain"
-            said.append(f"{name} calls {'also ' if before and new else ''}for {_enumerated(new) or none}{open_}.")
+            said.append(f"{name} calls {'also ' if before and new else ''}for {listed(new or [none])}{open_}.")
         else:
             calm.append(name)
         before += new
@@ -196,10 +196,6 @@ def _called_for(single: xr.Dataset, limits: np.ndarray) -> tuple[list[str], list
     return [w for w, hit in zip(words, now, strict=True) if hit], [
         w for w, hit in zip(words, perhaps & ~now, strict=True) if hit
     ]
-
-
-def _enumerated(names: Sequence[str]) -> str:
-    return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + f" and {names[-1]}"
 
 
 def table(result: xr.Dataset) -> Table:

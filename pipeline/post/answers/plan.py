@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import xarray as xr
 
 from flexclear.pipeline.core.artifacts.effect_size import Agreement
 from flexclear.pipeline.core.scene.plan_decisions import EVIDENCE, NOT_WORTH, Plan
-from flexclear.pipeline.post.answers.effect_sizes import written
+from flexclear.pipeline.post.answers.effect_sizes import listed, written
 from flexclear.pipeline.post.plotting.table import Table
 
 
@@ -36,30 +36,56 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
         **({"ledger_tolerance": plan.ledger_tolerance} if plan.ledger_tolerance is not None else {}),
         "uncoupled": list(plan.uncoupled),
     }
-    plan_dataset = xr.Dataset(
-        {
-            "influence": (("effect", "quantity"), estimate),
-            "uncertainty": (("effect", "quantity"), doubt),
-            "kept": (("effect",), np.array([int(d.kept) for d in plan.decisions], dtype=np.int8)),
-            "evidence": (("effect",), np.array([d.evidence for d in plan.decisions], dtype=object)),
-            "reason": (("effect",), np.array([d.reason for d in plan.decisions], dtype=object)),
-            "wanted": (("quantity",), np.array([plan.requested[name] for name in names])),
-            "integration": (("quantity",), np.array([plan.integration.get(name, np.nan) for name in names])),
-            "elements": (("body",), np.array([m.given for m in meshes], dtype=np.int64)),
-            "elements_called_for": (("body",), np.array([m.called_for for m in meshes], dtype=np.int64)),
-            "mesh_frequency_error": (("body",), np.array([m.frequency for m in meshes], dtype=float)),
-            "mesh_compliance_error": (("body",), np.array([m.compliance for m in meshes], dtype=float)),
-            "mesh_error": (
-                ("body", "quantity"),
-                np.array([[m.error[name] for name in names] for m in meshes], dtype=float).reshape(-1, len(names)),
-            ),
-        },
+    variables = {
+        "influence": (
+            ("effect", "quantity"),
+            estimate,
+            "estimated influence of the effect on the quantity, in the quantity's unit",
+        ),
+        "uncertainty": (("effect", "quantity"), doubt, "what the estimate may be wrong by"),
+        "kept": (
+            ("effect",),
+            np.array([int(d.kept) for d in plan.decisions], dtype=np.int8),
+            "1: the planned scene has the effect",
+        ),
+        "evidence": (("effect",), _texts(d.evidence for d in plan.decisions), "what the decision rests on"),
+        "reason": (("effect",), _texts(d.reason for d in plan.decisions), "the decision in words"),
+        "wanted": (("quantity",), np.array([plan.requested[name] for name in names]), "requested accuracy"),
+        "integration": (
+            ("quantity",),
+            np.array([plan.integration.get(name, np.nan) for name in names]),
+            "estimated error of the planned run's integration, and of the modes that it leaves out",
+        ),
+        "elements": (("body",), np.array([m.given for m in meshes], dtype=np.int64), "finite elements of the body"),
+        "elements_called_for": (
+            ("body",),
+            np.array([m.called_for for m in meshes], dtype=np.int64),
+            "finite elements that the requested accuracy calls for",
+        ),
+        "mesh_frequency_error": (
+            ("body",),
+            np.array([m.frequency for m in meshes], dtype=float),
+            "largest error of a retained frequency due to the mesh, as a fraction",
+        ),
+        "mesh_compliance_error": (
+            ("body",),
+            np.array([m.compliance for m in meshes], dtype=float),
+            "largest error of the frames' compliance due to the mesh, as a fraction",
+        ),
+        "mesh_error": (
+            ("body", "quantity"),
+            np.array([[m.error[name] for name in names] for m in meshes], dtype=float).reshape(-1, len(names)),
+            "estimated error of the quantity due to the body's mesh, at most, in the quantity's unit",
+        ),
+    }
+    return xr.Dataset(
+        {name: (dims, values, {"long_name": text}) for name, (dims, values, text) in variables.items()},
         coords={
-            "body": np.array(list(plan.meshes), dtype=object),
-            "effect": np.array([d.effect.name for d in plan.decisions], dtype=object),
-            "words": ("effect", np.array([d.effect.words for d in plan.decisions], dtype=object)),
-            "quantity": np.array(names, dtype=object),
-            "unit": ("quantity", np.array([units[name] for name in names], dtype=object)),
+            "body": _texts(plan.meshes),
+            "effect": _texts(d.effect.name for d in plan.decisions),
+            "words": ("effect", _texts(d.effect.words for d in plan.decisions)),
+            "quantity": _texts(names),
+            "unit": ("quantity", _texts(units[name] for name in names)),
         },
         attrs={
             "Conventions": "CF-1.11",
@@ -69,23 +95,10 @@ def dataset(plan: Plan, title: str, units: Mapping[str, str]) -> xr.Dataset:
             "runs": plan.runs,
         },
     )
-    meanings = {
-        "influence": "estimated influence of the effect on the quantity, in the quantity's unit",
-        "uncertainty": "what the estimate may be wrong by",
-        "kept": "1: the planned scene has the effect",
-        "evidence": "what the decision rests on",
-        "reason": "the decision in words",
-        "wanted": "requested accuracy",
-        "integration": "estimated error of the planned run's integration, and of the modes that it leaves out",
-        "elements": "finite elements of the body",
-        "elements_called_for": "finite elements that the requested accuracy calls for",
-        "mesh_frequency_error": "largest error of a retained frequency due to the mesh, as a fraction",
-        "mesh_compliance_error": "largest error of the frames' compliance due to the mesh, as a fraction",
-        "mesh_error": "estimated error of the quantity due to the body's mesh, at most, in the quantity's unit",
-    }
-    for name, text in meanings.items():
-        plan_dataset[name].attrs = {"long_name": text}
-    return plan_dataset
+
+
+def _texts(words: Iterable[str]) -> np.ndarray:
+    return np.array(list(words), dtype=object)
 
 
 def drawn(planned: xr.Dataset) -> xr.Dataset:
@@ -171,11 +184,6 @@ def words(planned: xr.Dataset) -> str:
     parts = [f"{listed(needed)} must stay" if needed else "", left]
     parts += [f"{listed(unseen)} {'is' if len(unseen) == 1 else 'are'} unchanged without a run" if unseen else ""]
     return f"For {asked} as requested {'; '.join(filter(None, parts))}."
-
-
-def listed(names: list[str]) -> str:
-    """Names with commas and an `and`."""
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + f" and {names[-1]}"
 
 
 MET, MET_TO_HORIZON, MISSED, UNDECIDED = "met", "met to the horizon", "missed", "not decided"

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.single_run.horizon import sentence
+from flexclear.pipeline.post.single_run.series import sentence
 
 #: the energy that a run loses without a trace, as a fraction of the largest energy
 ENERGY = 1e-3

@@ -13,8 +13,7 @@ from flexclear.pipeline.core.artifacts import quantities
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.post.answers.stability import ENERGY, largest_energy
 from flexclear.pipeline.post.overview.curves import impacts, measured, rounded
-from flexclear.pipeline.post.single_run.horizon import sentence
-from flexclear.pipeline.post.single_run.series import parameters
+from flexclear.pipeline.post.single_run.series import parameters, sentence
 
 #: a difference is reported from none where it is so many times larger than both runs' own errors
 DISTINGUISHED = 2.0

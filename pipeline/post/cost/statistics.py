@@ -81,8 +81,7 @@ def _panel(ax: Axes, contact: str, statistic: str, ensembles: dict[str, xr.Datas
     ax.set(xscale="log", yscale="log", title=f"{contact} {statistic.replace('_', ' ')}")
     plain(ax.xaxis)
     plain(ax.yaxis)
-    ax.set_xlabel("CPU time of the integrations (s)")
-    ax.set_ylabel("relative error of the mean")
+    ax.set(xlabel="CPU time of the integrations (s)", ylabel="relative error of the mean")
 
 
 def table(ensembles: dict[str, xr.Dataset], title: str) -> Table:

@@ -6,8 +6,9 @@ Errors are pointwise up to the horizon of the scene's run; beyond it only statis
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -115,8 +116,15 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
     data["reference_uncertainty"] = (("quantity",), floor)
     for group, factors in GROUPS.items():
         mine = [p for p in points if p.group == group]
-        if mine:
-            _span(group, factors, mine, runs, errors, asis, data, coordinates)
+        if not mine:
+            continue
+        values = {factor: _sorted({p.factors[factor] for p in mine}) for factor in factors}
+        coordinates |= values
+        over, each = partial(_over_factors, values, mine, runs), (len(chosen),)
+        distance = over(lambda run: np.nan if asis is None else errors(run, asis), each)
+        data[f"error_by_{group}"] = ((*factors, "quantity"), over(errors, each))
+        data[f"distance_by_{group}"] = ((*factors, "quantity"), distance)
+        data |= {f"{name}_by_{group}": (factors, over(partial(cost, name=name))) for name in COSTS}
     if asis is not None and "refused" not in asis.attrs:
         data["own_error"] = (("quantity",), errors(asis) + np.nan_to_num(floor))
     attributes = {
@@ -136,8 +144,7 @@ def assemble(points: Sequence[Point], runs: Mapping[str, xr.Dataset], chosen: Se
 
 def resolved(study: xr.Dataset, group: str) -> xr.DataArray:
     """Whether an error is so large that the reference can measure it; same shape as ``error_by_<group>``."""
-    mask: xr.DataArray = study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
-    return mask
+    return study[f"error_by_{group}"] >= MARGIN * study["reference_uncertainty"].fillna(0.0)
 
 
 def _reason(refused: xr.Dataset) -> str:
@@ -145,36 +152,20 @@ def _reason(refused: xr.Dataset) -> str:
     return str(refused.attrs["refused"]).partition(";")[0]
 
 
-def _span(
-    group: str,
-    factors: tuple[str, ...],
-    points: list[Point],
+def _over_factors(
+    values: Mapping[str, list[Any]],
+    points: Sequence[Point],
     runs: Mapping[str, xr.Dataset],
-    errors: Any,
-    asis: xr.Dataset | None,
-    data: dict[str, Any],
-    coordinates: dict[str, Any],
-) -> None:
-    """Error and cost over the factors of one group."""
-    values = {factor: _sorted({p.factors[factor] for p in points}) for factor in factors}
-    shape = tuple(len(v) for v in values.values())
-    error = np.full((*shape, len(coordinates["quantity"])), np.nan)
-    distance = error.copy()
-    costs = {name: np.full(shape, np.nan) for name in COSTS}
+    of: Callable[[xr.Dataset], Any],
+    inner: tuple[int, ...] = (),
+) -> np.ndarray:
+    """`of` each run (shape inner) over the values of the factors; NaN where there is no run, or it was refused."""
+    result = np.full((*map(len, values.values()), *inner), np.nan)
     for point in points:
-        run = runs[point.key]
-        index = tuple(values[factor].index(point.factors[factor]) for factor in factors)
-        if "refused" in run.attrs:
-            continue
-        error[index] = errors(run)
-        if asis is not None:
-            distance[index] = errors(run, asis)
-        for name in COSTS:
-            costs[name][index] = cost(run, name)
-    coordinates |= values
-    data[f"error_by_{group}"] = ((*factors, "quantity"), error)
-    data[f"distance_by_{group}"] = ((*factors, "quantity"), distance)
-    data |= {f"{name}_by_{group}": (factors, array) for name, array in costs.items()}
+        if "refused" not in runs[point.key].attrs:
+            index = tuple(known.index(point.factors[factor]) for factor, known in values.items())
+            result[index] = of(runs[point.key])
+    return result
 
 
 def cost(run: xr.Dataset, name: str) -> float:

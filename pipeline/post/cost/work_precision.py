@@ -136,8 +136,7 @@ def _panel(
     elif bound > 0.0:
         ax.axhspan(0.3 * bound, bound, color=GRID, zorder=0)
         ax.set_ylim(bottom=0.3 * bound)
-    ax.set_xlabel("CPU time of the integration (s)")
-    ax.set_ylabel("relative error")
+    ax.set(xlabel="CPU time of the integration (s)", ylabel="relative error")
 
 
 def look(curve: Curve, others: Sequence[Curve]) -> tuple[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -77,48 +77,73 @@ def _rest(count: int, most: int) -> str:
     return f"; {most} of {count} are shown" if count > most else ""
 
 
+#: a panel over time: title, and by label its lines, of which each has values over time and how it is drawn
+Panel = tuple[str, Mapping[str, tuple[np.ndarray, dict[str, Any]]]]
+
+
+def _sheet(
+    name: str,
+    time: np.ndarray,
+    panels: Sequence[Panel],
+    columns: int,
+    heading: tuple[str, str],
+    height: float = 1.8,
+    width: float = 11.0,
+    legend: int = 0,
+    **options: Any,
+) -> dict[str, bytes]:
+    """``name.png`` and ``.svg`` of panels over time [s], row by row.
+
+    heading: title, and what is below it.  height: of a row (inches).  legend: columns of the one legend.
+    """
+    rows = -(-len(panels) // columns)
+    figure, axes = style.grid(rows, columns, (width, 0.9 + height * rows), sharex=True, **options)
+    for panel, (title, lines) in zip(axes.flat, panels, strict=False):
+        for label, (values, look) in lines.items():
+            panel.plot(1e3 * time, values, label=label, **look)
+        panel.set(title=title, xlim=(1e3 * time[0], 1e3 * time[-1]))
+    for panel in axes.flat[len(panels) :]:
+        panel.set_visible(False)
+    for panel in axes[-1]:
+        panel.set_xlabel("time (ms)")
+    if legend:
+        style.shared_legend(figure, axes[0, 0], legend)
+    style.heading(figure, *heading)
+    return style.files(name, figure)
+
+
 def _motion(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
     names = [str(name) for name in run["body"].values]
     moved, speed = post["displacement"].values, run["velocity"].values
     chosen = _chosen(names, first, np.abs(moved).max(axis=(0, 2)), BODIES)
-    figure, axes = style.grid(len(chosen), 3, (11.0, 0.9 + 1.75 * len(chosen)), sharex=True)
-    time = 1e3 * run["time"].values
-    moved, speed = _without_noise(run, moved, "m"), _without_noise(run, speed, "m/s")
-    for row, k in zip(axes, chosen, strict=True):
-        factor, unit = by_unit({"": moved[:, k]}, "m")
-        rate, rate_unit = by_unit({"": speed[:, k]}, "m/s")
-        for i, (axis, color) in enumerate(AXES_COLORS.items()):
-            row[0].plot(time, factor * moved[:, k, i], color=color, label=axis)
-            row[1].plot(time, rate * speed[:, k, i], color=color, lw=0.9)
+    panels: list[Panel] = []
+    for what, values, unit, width in (("displacement", moved, "m", 1.3), ("velocity", speed, "m/s", 0.9)):
+        shown = _without_noise(run, values, unit)
+        for k in chosen:
+            factor, written = by_unit({"": shown[:, k]}, unit)
+            lines = {
+                axis: (factor * shown[:, k, i], {"color": color, "lw": width})
+                for i, (axis, color) in enumerate(AXES_COLORS.items())
+            }
+            panels.append((f"{names[k]}: {what} ({written})", lines))
+    for k in chosen:
         turned = turned_by(run, names[k])
-        row[2].plot(time, np.degrees(without_noise(turned.angle, NOISE)), color=style.INK)
-        for panel, what in zip(
-            row, (f"displacement ({unit})", f"velocity ({rate_unit})", f"{turned.title} (°)"), strict=True
-        ):
-            panel.set_title(f"{names[k]}: {what}")
-            panel.set_xlim(time[0], time[-1])
-    for panel in axes[-1]:
-        panel.set_xlabel("time (ms)")
-    style.shared_legend(figure, axes[0, 0], 3)
-    style.heading(figure, f"Motion of the bodies{_rest(len(names), BODIES)}", "centre of mass, axes of the world")
-    return style.files("motion", figure)
+        angle = np.degrees(without_noise(turned.angle, NOISE))
+        panels.append((f"{names[k]}: {turned.title} (°)", {"": (angle, {"color": style.INK})}))
+    by_body = [panels[k + n * len(chosen)] for k in range(len(chosen)) for n in range(3)]
+    heading = (f"Motion of the bodies{_rest(len(names), BODIES)}", "centre of mass, axes of the world")
+    return _sheet("motion", run["time"].values, by_body, 3, heading, 1.75, legend=3)
 
 
 def _watched(run: xr.Dataset, watched: Sequence[Quantity]) -> dict[str, bytes]:
     """Watched quantities that none of the other figures has."""
     others = [quantity for quantity in watched if quantity.component or quantity.kind not in ELSEWHERE]
-    lines = [line for quantity in others for line in curves([run], quantity) if line is not None]
-    if not lines:
-        return {}
-    figure, axes = style.grid(len(lines), 1, (8.0, 0.9 + 1.8 * len(lines)), sharex=True)
-    for panel, line in zip(axes.flat, lines, strict=True):
+    panels: list[Panel] = []
+    for line in (line for quantity in others for line in curves([run], quantity) if line is not None):
         factor, unit = by_unit({"": line.values}, line.unit)
-        panel.plot(1e3 * line.time, factor * line.values, lw=0.9)
-        panel.set_title(f"{line.title} ({unit})")
-        panel.set_xlim(1e3 * line.time[0], 1e3 * line.time[-1])
-    axes.flat[-1].set_xlabel("time (ms)")
-    style.heading(figure, "Watched quantities", "of vectors without a component: the magnitude, or the component named")
-    return style.files("watched", figure)
+        panels.append((f"{line.title} ({unit})", {"": (factor * line.values, {"lw": 0.9})}))
+    heading = ("Watched quantities", "of vectors without a component: the magnitude, or the component named")
+    return _sheet("watched", run["time"].values, panels, 1, heading, width=8.0) if panels else {}
 
 
 def _without_noise(run: xr.Dataset, values: np.ndarray, unit: str) -> np.ndarray:
@@ -133,26 +158,16 @@ def _reactions(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[
     force = _without_noise(run, post["reaction"].values, "N")
     drives = [str(name) for name in run["drive"].values] if "drive_force" in run else []
     chosen = _chosen(names, first, force.max(axis=0), JOINTS)
-    panels: list[tuple[str, np.ndarray]] = [(f"{names[k]}: force (N)", force[:, k]) for k in chosen]
-    panels += [
-        (f"{name}: drive ({quantities.unit(run, Quantity(name, 'drive_force'))})", run["drive_force"].values[:, k])
-        for k, name in enumerate(drives)
+    panels: list[Panel] = [
+        (f"{names[k]}: force (N)", {"": (force[:, k], {"color": "#0072B2", "lw": 0.9})}) for k in chosen
     ]
-    rows = -(-len(panels) // 2)
-    figure, axes = style.grid(rows, 2, (11.0, 0.9 + 1.8 * rows), sharex=True)
-    time = 1e3 * run["time"].values
-    for panel, (title, values) in zip(axes.flat, panels, strict=False):
-        panel.plot(time, values, color="#D55E00" if "drive" in title else "#0072B2", lw=0.9)
-        panel.set_title(title)
-        panel.set_xlim(time[0], time[-1])
-    for panel in axes.flat[len(panels) :]:
-        panel.set_visible(False)
-    for panel in axes[-1]:
-        panel.set_xlabel("time (ms)")
-    style.heading(
-        figure, f"Reactions and drives{_rest(len(names), JOINTS)}", "magnitude of the force that a joint transmits"
+    for k, name in enumerate(drives):
+        title = f"{name}: drive ({quantities.unit(run, Quantity(name, 'drive_force'))})"
+        panels.append((title, {"": (run["drive_force"].values[:, k], {"color": "#D55E00", "lw": 0.9})}))
+    below = "magnitude of the force that a joint transmits"
+    return _sheet(
+        "reactions", run["time"].values, panels, 2, (f"Reactions and drives{_rest(len(names), JOINTS)}", below)
     )
-    return style.files("reactions", figure)
 
 
 def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
@@ -187,8 +202,7 @@ def contacts(run: xr.Dataset, post: xr.Dataset, first: Sequence[str]) -> dict[st
 def _over_time(axes: Axes, run: xr.Dataset, values: np.ndarray, title: str = "") -> None:
     time = 1e3 * run["time"].values
     axes.plot(time, values, color="#D55E00", lw=0.8)
-    axes.set(xlim=(time[0], time[-1]), xlabel="time (ms)")
-    axes.set_title(title)
+    axes.set(xlim=(time[0], time[-1]), xlabel="time (ms)", title=title)
 
 
 def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[np.ndarray, np.ndarray]:
@@ -205,8 +219,7 @@ def orbit(axes: Axes, run: xr.Dataset, clearance: float, contact: int) -> tuple[
         axes.plot(offset[:, i], offset[:, j], color="#009E73", lw=0.8)
         axes.plot(offset[-1:, i], offset[-1:, j], "o", color="#009E73", ms=4)  # of a ball that stays where it is
         axes.margins(y=0.15)
-        axes.set(xlabel="xyz"[i], ylabel="xyz"[j])
-        axes.set_title(centre(run, contact))
+        axes.set(xlabel="xyz"[i], ylabel="xyz"[j], title=centre(run, contact))
         return offset[:, i], offset[:, j]
     turn = np.linspace(0.0, 2.0 * np.pi, 181)
     axes.fill(radius * np.cos(turn), radius * np.sin(turn), color="#f3f3f3", ec="#a8a8a8", lw=1.0)
@@ -245,19 +258,14 @@ def _friction(run: xr.Dataset, first: Sequence[str]) -> dict[str, bytes]:
     names = [str(name) for name in run["rubbing"].values]
     lost, load = run["joint_friction_loss"].values, run["joint_bearing_load"].values
     chosen = _chosen(names, first, lost[-1], JOINTS)
-    time = 1e3 * run["time"].values
     factor, unit = by_unit({"": lost[:, chosen]}, "J")
-    figure, axes = style.grid(1, 2, (11.0, 3.3))
-    for color, k in zip(COLORS, chosen, strict=False):
-        axes[0, 0].plot(time, load[:, k], color=color, lw=0.9, label=names[k])
-        axes[0, 1].plot(time, factor * lost[:, k], color=color)
-    axes[0, 0].set_title("normal force in the bearings (N)")
-    axes[0, 1].set_title(f"energy lost ({unit})")
-    for panel in axes.flat:
-        panel.set(xlim=(time[0], time[-1]), xlabel="time (ms)")
-    style.shared_legend(figure, axes[0, 0], 8)
-    style.heading(figure, f"Friction of ideal joints{_rest(len(names), JOINTS)}")
-    return style.files("joint_friction", figure)
+    colors = list(zip(COLORS, chosen, strict=False))
+    panels: list[Panel] = [
+        ("normal force in the bearings (N)", {names[k]: (load[:, k], {"color": c, "lw": 0.9}) for c, k in colors}),
+        (f"energy lost ({unit})", {names[k]: (factor * lost[:, k], {"color": c}) for c, k in colors}),
+    ]
+    heading = (f"Friction of ideal joints{_rest(len(names), JOINTS)}", "")
+    return _sheet("joint_friction", run["time"].values, panels, 2, heading, 2.4, legend=8)
 
 
 def _wear(run: xr.Dataset, post: xr.Dataset) -> dict[str, bytes]:
@@ -267,8 +275,7 @@ def _wear(run: xr.Dataset, post: xr.Dataset) -> dict[str, bytes]:
     time = 1e3 * run["time"].values
     for k, (row, name) in enumerate(zip(axes, names, strict=True)):
         row[0].plot(time, run["wear_load_path"].values[:, k], color=style.INK)
-        row[0].set(xlim=(time[0], time[-1]), xlabel="time (ms)")
-        row[0].set_title(f"{name}: normal force times way (N m)")
+        row[0].set(xlim=(time[0], time[-1]), xlabel="time (ms)", title=f"{name}: normal force times way (N m)")
         for panel, side, what in zip(row[1:], ("outer", "inner"), ("socket or journal", "ball or pin"), strict=True):
             sectors = int(post["wear_sectors"].values[k])
             depth = post[f"wear_depth_{side}"].values[k].max(axis=0)[:sectors]
@@ -287,18 +294,12 @@ def _energy(run: xr.Dataset) -> dict[str, bytes]:
     largest = max(float(np.abs(values - values[0]).max()) for values in there.values()) or 1.0
     there = {label: v for label, v in there.items() if float(np.abs(v).max(initial=0.0)) > UNSEEN * largest}
     factor, unit = by_unit(there, "J")
-    time = 1e3 * run["time"].values
-    figure, axes = style.grid(1, 2, (11.0, 3.3), width_ratios=[1.8, 1.0])
-    for color, (label, values) in zip(COLORS, there.items(), strict=False):
-        axes[0, 0].plot(time, factor * values, color=color, label=label)
-    axes[0, 0].set_title(f"energies ({unit})")
     error = run["energy_error"].values
     small, small_unit = by_unit({"": error}, "J")
-    axes[0, 1].plot(time, small * error, color=style.INK, lw=0.9)
-    axes[0, 1].set_title(f"error of the energy balance ({small_unit})")
-    for panel in axes.flat:
-        panel.set(xlim=(time[0], time[-1]), xlabel="time (ms)")
-    if there:
-        style.shared_legend(figure, axes[0, 0], 6)
-    style.heading(figure, "Energy")
-    return style.files("energy", figure)
+    colors = zip(COLORS, there.items(), strict=False)
+    panels: list[Panel] = [
+        (f"energies ({unit})", {label: (factor * values, {"color": color}) for color, (label, values) in colors}),
+        (f"error of the energy balance ({small_unit})", {"": (small * error, {"color": style.INK, "lw": 0.9})}),
+    ]
+    legend = 6 if there else 0
+    return _sheet("energy", run["time"].values, panels, 2, ("Energy", ""), 2.4, legend=legend, width_ratios=[1.8, 1.0])

@@ -175,8 +175,7 @@ def _map(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
     ax.grid(False)
     refused = np.argwhere(sweep["status"].values == 1)
     ax.plot(x[refused[:, 1]], y[refused[:, 0]], "x", color=REFUSED, ms=4.0)
-    ax.set_xlabel(_axis(sweep, columns))
-    ax.set_ylabel(_axis(sweep, rows))
+    ax.set(xlabel=_axis(sweep, columns), ylabel=_axis(sweep, rows))
 
 
 def _cloud(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
@@ -198,8 +197,7 @@ def _cloud(figure: Figure, ax: Axes, sweep: xr.Dataset, name: str) -> None:
 
 
 def _label(ax: Axes, sweep: xr.Dataset, parameter: str, name: str) -> None:
-    ax.set_xlabel(_axis(sweep, parameter))
-    ax.set_ylabel(_written(sweep[name].attrs["units"]))
+    ax.set(xlabel=_axis(sweep, parameter), ylabel=_written(sweep[name].attrs["units"]))
 
 
 def _scale(sweep: xr.Dataset, parameter: str) -> tuple[float, str]:

@@ -1,10 +1,13 @@
-"""What pages are made of: style, scripts, and the viewer; each page carries its own copy."""
+"""Self-contained pages: style, scripts, pictures, films and the viewer are inside, so that one file can be sent."""
 
 from __future__ import annotations
 
+import base64
 import html
 import json
 import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -63,3 +66,121 @@ def figures_of(page: str) -> str:
     return "".join(
         re.findall(r"<figure><figcaption>[^<]*</figcaption><div class='viewer'.*?</figure>\n", page, re.DOTALL)
     )
+
+
+#: media types by suffix of a file
+TYPES = {
+    "png": "image/png",
+    "webp": "image/webp",
+    "jpg": "image/jpeg",
+    "svg": "image/svg+xml",
+    "mp4": "video/mp4",
+    "gif": "image/gif",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """A part of the page: its key, its heading, its HTML."""
+
+    key: str
+    heading: str
+    body: str
+
+
+def page(title: str, lead: str, parts: Sequence[Part], answer: str = "") -> bytes:
+    """The page with those parts that are not empty, all inside: it asks nobody for anything.
+
+    answer: HTML of what is said first.
+    """
+    shown = [part for part in parts if part.body]
+    body = "".join(
+        f"<section aria-labelledby='{part.key}'><h2 id='{part.key}'>{html.escape(part.heading)}</h2>\n"
+        f"{part.body}</section>\n"
+        for part in shown
+    )
+    links = "".join(f"<li><a href='#{part.key}'>{html.escape(part.heading)}</a></li>" for part in shown)
+    contents = f"<nav aria-label='Contents'><ul>{links}</ul></nav>\n" if len(shown) > 1 else ""
+    said = f"<div class='answer'>{answer}</div>\n" if answer else ""
+    below = f"<p class='lead'>{html.escape(lead)}</p>\n" if lead else ""
+    scripts = [asset("page.js")] + ([asset("viewer.js")] if "class='viewer'" in body else [])
+    text = (
+        "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'>"
+        "<meta name='viewport' content='width=device-width, initial-scale=1'><link rel='icon' href='data:,'>"
+        f"<title>{html.escape(title)}</title><style>{asset('page.css')}</style></head>\n<body>"
+        f"<a class='skip' href='#main'>To the content</a><main id='main'><h1>{html.escape(title)}</h1>\n"
+        f"{below}{said}{contents}{body}</main>{''.join(f'<script>{text}</script>' for text in scripts)}</body></html>\n"
+    )
+    return text.encode()
+
+
+def viewer_page(title: str, views: Sequence[str], below: str = "") -> bytes:
+    """A page with views that can be turned (`pipeline.post.pages.viewer`), and what is below them as HTML."""
+    return page(title, "", [Part("view", "View" if len(views) == 1 else "Views", in_columns(views) + below)])
+
+
+def in_columns(figures: Sequence[str]) -> str:
+    """Figures next to each other where there is room for that."""
+    return "".join(figures) if len(figures) < 2 else f"<div class='side-by-side'>{''.join(figures)}</div>\n"
+
+
+def media(name: str, content: bytes, caption: str, alt: str = "") -> str:
+    """A picture or film, inside of the page; alt: what it shows, where the caption does not say it all."""
+    kind = TYPES[name.rpartition(".")[2]]
+    data = f"data:{kind};base64,{base64.b64encode(content).decode()}"
+    alt_text = html.escape(alt or caption, quote=True)
+    shown = (
+        f"<video src='{data}' controls loop muted playsinline aria-label='{alt_text}'></video>"
+        if kind.startswith("video")
+        else f"<img src='{data}' alt='{alt_text}'>"
+    )
+    look = "" if kind.startswith("video") else " class='plot'"
+    return f"<figure{look}><figcaption>{html.escape(caption)}</figcaption>{shown}</figure>\n"
+
+
+def listed(rows: Mapping[str, str], heads: tuple[str, str]) -> str:
+    """A table of two columns of text; empty without rows."""
+    return prose(heads, list(rows.items()))
+
+
+def prose(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table of sentences, with `backticks` as code; empty without rows."""
+    if not rows:
+        return ""
+    head = "".join(f"<th scope='col'>{html.escape(text)}</th>" for text in heads)
+    lines = "".join("<tr>" + "".join(f"<td>{_code(cell)}</td>" for cell in row) + "</tr>\n" for row in rows)
+    table = f"<table class='prose'><thead><tr>{head}</tr></thead><tbody>\n{lines}</tbody></table>"
+    return f"<figure><div class='scroll' tabindex='0'>{table}</div></figure>\n"
+
+
+def downloads(files: Mapping[str, bytes]) -> str:
+    """Small files that a reader can take out of the page, by name."""
+    if not files:
+        return ""
+    kinds = {"csv": "text/csv", "toml": "text/plain", "bib": "text/plain", "md": "text/markdown"}
+    items = "".join(
+        f"<li><a download='{html.escape(name)}' href='data:{kinds.get(name.rpartition('.')[2], 'text/plain')};"
+        f"base64,{base64.b64encode(content).decode()}'>{html.escape(name)}</a> ({len(content) / 1e3:.3g} kB)</li>"
+        for name, content in files.items()
+    )
+    return f"<ul>{items}</ul>\n"
+
+
+def in_folder(page: bytes) -> dict[str, bytes]:
+    """The same page as ``index.html`` with its pictures and films as files next to it, by name."""
+    files: dict[str, bytes] = {}
+    suffix = {kind: name for name, kind in TYPES.items()}
+
+    def apart(match: re.Match[str]) -> str:
+        content = base64.b64decode(match[2])
+        name = f"files/{len(files) + 1:03d}.{suffix[match[1]]}"
+        files[name] = content
+        return f"src='{name}'"
+
+    text = re.sub(r"src='data:((?:image|video)/[\w+.-]+);base64,([A-Za-z0-9+/=]+)'", apart, page.decode())
+    return {"index.html": text.encode(), **files}
+
+
+def _code(text: str) -> str:
+    """Escaped, with `backticks` as code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))

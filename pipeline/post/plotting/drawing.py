@@ -12,7 +12,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 
 from flexclear.pipeline.post.plotting.style import INK
-from flexclear.pipeline.post.shapes.rod_shape import circle
+from flexclear.pipeline.post.shapes.body_shape import circle
 
 #: direction of the light, seen by the observer: from above his left shoulder
 LIGHT = np.array([-0.35, 0.65, 0.68])
@@ -45,57 +45,47 @@ def view(towards: np.ndarray, up: np.ndarray) -> View:
 def shell(
     axes: Axes, seen: View, rings: np.ndarray, values: np.ndarray | None, color: str = "#9aa5b1", **look: Any
 ) -> None:
-    """A closed tube of rings (ring, around, 3), the last point of each its first; far faces are hidden by near ones.
+    """A closed tube of rings (ring, around, 3), the last point of each its first.
 
     values: one per ring in [0, 1], drawn as colours; without them the tube has one colour.
     """
-    corners = np.stack([rings[:-1, :-1], rings[1:, :-1], rings[1:, 1:], rings[:-1, 1:]], axis=2).reshape(-1, 4, 3)
-    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
+    index = np.arange(rings[..., 0].size).reshape(rings.shape[:2])
+    faces = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]], axis=-1).reshape(-1, 4)
+    shades = None if values is None else np.repeat(values, rings.shape[1])
+    skin(axes, seen, rings.reshape(-1, 3), faces, shades, color, closed=True, **look)
+
+
+def skin(
+    axes: Axes,
+    seen: View,
+    points: np.ndarray,
+    faces: np.ndarray,
+    values: np.ndarray | None,
+    color: str = "#9aa5b1",
+    *,
+    closed: bool = False,
+    **look: Any,
+) -> None:
+    """Faces (m, corners) between points (n, 3), the near ones before the far ones.
+
+    values: one per point in [0, 1], drawn as colours.  closed: whether all faces run round the same way, so that those
+    behind are left out; else either side of a face may be the outer one.
+    """
+    corners = points[faces]
+    normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, -1] - corners[:, 1])
     size = np.linalg.norm(normal, axis=1)
-    normal = normal[size > 0.0] / size[size > 0.0, None]
-    outward = normal @ seen.axes.T
-    # which way the rings run round decides which way normals point
-    outward *= _outwards(rings, normal, corners[size > 0.0])
-    if values is None:
-        base = np.tile(to_rgb(color), (len(corners), 1))
-    else:
-        middles = np.repeat(0.5 * (values[:-1] + values[1:]), rings.shape[1] - 1)
-        base = colormaps["viridis"](middles)[:, :3]
-    base, corners = base[size > 0.0], corners[size > 0.0]
-    facing = outward[:, 2] > 0.0
-    light = AMBIENT + (1.0 - AMBIENT) * np.clip(outward @ (LIGHT / np.linalg.norm(LIGHT)), 0.0, 1.0)
-    colors = np.clip(base * light[:, None], 0.0, 1.0)[facing]
-    depth = seen.depth(corners[facing]).mean(axis=1)
-    order = np.argsort(depth, kind="stable")
+    volume = float(np.sum((corners.mean(axis=1) - points.mean(axis=0)) * normal))
+    outward = normal / np.where(size > 0.0, size, 1.0)[:, None] @ seen.axes.T * (1.0 if volume >= 0.0 else -1.0)
+    shown = (size > 0.0) & (outward[:, 2] > 0.0 if closed else True)
+    light = LIGHT / np.linalg.norm(LIGHT)
+    lit = outward[shown] @ light if closed else np.abs(outward[shown]) @ np.abs(light)
+    corners, faces = corners[shown], faces[shown]
+    base = np.array(to_rgb(color)) if values is None else colormaps["viridis"](values[faces].mean(axis=1))[:, :3]
+    colors = np.clip(base * (AMBIENT + (1.0 - AMBIENT) * np.clip(lit, 0.0, 1.0))[:, None], 0.0, 1.0)
+    order = np.argsort(seen.depth(corners).mean(axis=1), kind="stable")
     # edges of the faces' own colour close the gaps between them, but would show through where they are translucent
     edges = {"edgecolors": colors[order], "lw": 0.3} if "alpha" not in look else {"edgecolors": "none"}
-    faces = PolyCollection(list(seen.project(corners[facing])[order]), facecolors=colors[order], **edges, **look)
-    axes.add_collection(faces)
-
-
-def skin(axes: Axes, seen: View, points: np.ndarray, triangles: np.ndarray, values: np.ndarray, **look: Any) -> None:
-    """Triangles (m, 3) between points (n, 3), the near ones before the far ones; values: one per point in [0, 1]."""
-    corners = points[triangles]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.linalg.norm(normal, axis=1)
-    there = size > 0.0
-    toward = np.abs(normal[there] / size[there, None] @ seen.axes.T)  # either side may be the outer one
-    light = AMBIENT + (1.0 - AMBIENT) * np.clip(toward @ np.abs(LIGHT / np.linalg.norm(LIGHT)), 0.0, 1.0)
-    colors = np.clip(colormaps["viridis"](values[triangles[there]].mean(axis=1))[:, :3] * light[:, None], 0.0, 1.0)
-    order = np.argsort(seen.depth(corners[there]).mean(axis=1), kind="stable")
-    faces = seen.project(corners[there])[order]
-    axes.add_collection(PolyCollection(list(faces), facecolors=colors[order], edgecolors=colors[order], lw=0.3, **look))
-
-
-def _outwards(rings: np.ndarray, normal: np.ndarray, corners: np.ndarray) -> float:
-    """+1 where the normals point out of the tube, else -1."""
-    centre = np.repeat(rings[:-1, :-1].mean(axis=1)[:, None], rings.shape[1] - 1, axis=1).reshape(-1, 3)
-    sides = np.linalg.norm(
-        np.cross(rings[1:, :-1] - rings[:-1, :-1], rings[:-1, 1:] - rings[:-1, :-1]), axis=-1
-    ).ravel()
-    visible = centre[: len(sides)][sides > 0.0]
-    n = min(len(visible), len(normal))
-    return 1.0 if ((corners[:n].mean(axis=1) - visible[:n]) * normal[:n]).sum() >= 0.0 else -1.0
+    axes.add_collection(PolyCollection(list(seen.project(corners)[order]), facecolors=colors[order], **edges, **look))
 
 
 def tube(start: np.ndarray, end: np.ndarray, radius: float, around: int = 24) -> np.ndarray:

@@ -15,8 +15,7 @@ from matplotlib.figure import Figure
 from flexclear.pipeline.post.plotting import style
 from flexclear.pipeline.post.plotting.drawing import View, shell, skin, view
 from flexclear.pipeline.post.plotting.style import SOFT
-from flexclear.pipeline.post.shapes.body_shape import faces, is_rod, scale_to, surface
-from flexclear.pipeline.post.shapes.rod_shape import AROUND
+from flexclear.pipeline.post.shapes.body_shape import AROUND, faces, is_rod, scale_to, surface
 
 #: modes next to each other, and drawn size of the largest displacement as a fraction of the body's length
 COLUMNS, FRACTION = 3, 0.14
@@ -89,15 +88,17 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, fraction
     factor = scale_to(bundle, q, FRACTION)
     points, size = surface(bundle, q, fraction * factor)
     moved = size if size.max() > 1e-9 * np.ptp(rest) else np.linalg.norm(points - rest, axis=1)
-    largest = float(scale_to_size(bundle, q, factor, rest))
+    full, sizes = surface(bundle, q, factor)
+    # of its centre line, or of its skin where that rests
+    skin_moves = sizes.max() <= 1e-9 * np.ptp(rest)
+    largest = float(np.linalg.norm(full - rest, axis=1).max()) if skin_moves else max(float(sizes.max()), 1e-300)
     index = faces(bundle)
     share_of = np.clip(moved / largest, 0.0, 1.0)
     if is_rod(bundle):
         rings = points.reshape(-1, AROUND + 1, 3)[:, ::EVERY]
         shell(panel, seen, rings, share_of.reshape(-1, AROUND + 1)[:, 0], zorder=2)
     elif index.shape[1] >= 3:
-        triangles = index if index.shape[1] == 3 else np.concatenate([index[:, [0, 1, 2]], index[:, [0, 2, 3]]])
-        skin(panel, seen, points, triangles, share_of, zorder=2)
+        skin(panel, seen, points, index, share_of, zorder=2)
     else:
         x, y = seen.project(points).T
         panel.scatter(x, y, c=moved / largest, cmap="viridis", vmin=0.0, vmax=1.0, s=9)
@@ -106,19 +107,8 @@ def _mode(panel: style.Axes, bundle: xr.Dataset, seen: View, mode: int, fraction
     both = np.concatenate([seen.project(surface(bundle, q, sign * factor)[0]) for sign in (1.0, -1.0)] + [line])
     low, high = both.min(axis=0), both.max(axis=0)
     edge = 0.03 * float((high - low).max())
-    panel.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge))
-    panel.set_aspect("equal")
+    panel.set(xlim=(low[0] - edge, high[0] + edge), ylim=(low[1] - edge, high[1] + edge), aspect="equal")
     panel.set_axis_off()
     frequency = float(bundle["frequency"].values[mode])
     text = f"{frequency:.5g} Hz" if frequency > 0.0 else "static"
     panel.set_title(f"mode {mode + 1}: {text}, × {factor:.2g} √kg m", fontsize=8.8)
-
-
-def scale_to_size(bundle: xr.Dataset, q: np.ndarray, factor: float, rest: np.ndarray) -> float:
-    """The largest drawn displacement [m] of a shape: of its centre line, or of its skin where that rests."""
-    points, size = surface(bundle, q, factor)
-    return (
-        max(float(size.max()), 1e-300)
-        if size.max() > 1e-9 * np.ptp(rest)
-        else float(np.linalg.norm(points - rest, axis=1).max())
-    )

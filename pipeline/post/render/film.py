@@ -14,30 +14,11 @@ from vtkmodules.vtkCommonCore import vtkLogger
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.post.plotting import style
-from flexclear.pipeline.post.render import pace
-from flexclear.pipeline.post.render.mechanism import (
-    CLEARANCE_COLOR,
-    IMPACT_COLOR,
-    Flexible,
-    Mechanism,
-    part_pose,
-    placed,
-    shade,
-)
+from flexclear.pipeline.post.render import mechanism, pace, ruler
+from flexclear.pipeline.post.render.pace import rate, write
 from flexclear.pipeline.post.render.panel import panel
-from flexclear.pipeline.post.render.ruler import (
-    BAR,
-    STRESS_COLORS,
-    color_bar,
-    exaggeration,
-    pixels_per_metre,
-    round_length,
-    with_color_bar,
-    words,
-)
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import ANGLE, eye
-from flexclear.pipeline.post.render.writing import rate, write
 from flexclear.pipeline.post.shapes.body_shape import faces, has_edges
 
 VIEW, SIDE, HEIGHT = 656, 304, 540
@@ -55,7 +36,7 @@ class Actors:
     flexible: tuple[pv.PolyData, ...]
 
 
-def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900), margin: int = 0) -> np.ndarray:
+def still(drawn: mechanism.Mechanism, step: int, size: tuple[int, int] = (1200, 900), margin: int = 0) -> np.ndarray:
     """One picture of the mechanism at an output, shape (height, width, 3); margin: left at both sides [pixels]."""
     scene = plotter(size)
     actors = _build(scene, drawn)
@@ -67,7 +48,7 @@ def still(drawn: Mechanism, step: int, size: tuple[int, int] = (1200, 900), marg
 
 
 def film(
-    drawn: Mechanism,
+    drawn: mechanism.Mechanism,
     post: xr.Dataset,
     watched: Sequence[str] = (),
     progress: Progress = silent,
@@ -85,7 +66,7 @@ def film(
 
 
 def _frames(
-    drawn: Mechanism,
+    drawn: mechanism.Mechanism,
     post: xr.Dataset,
     watched: Sequence[str],
     curves: Sequence[Quantity],
@@ -96,25 +77,25 @@ def _frames(
     steps = shown.steps(drawn.run)
     scene = plotter((VIEW, HEIGHT))
     actors = _build(scene, drawn)
-    margin = 0 if drawn.stress is None else BAR
+    margin = 0 if drawn.stress is None else ruler.BAR
     look(scene, drawn, margin)
     # words are drawn by matplotlib below: a text in the scene costs as much as the mechanism
     caption = pace.Caption((VIEW, 26), SOFT)
-    larger = "".join(f", {text}" for text in exaggeration(drawn))
-    scale = pixels_per_metre(drawn, (VIEW, HEIGHT), margin)
-    bar = round_length(0.2 * VIEW / scale)
+    larger = "".join(f", {text}" for text in ruler.exaggeration(drawn))
+    scale = ruler.pixels_per_metre(drawn, (VIEW, HEIGHT), margin)
+    bar = ruler.round_length(0.2 * VIEW / scale)
     long = round(bar * scale)
-    legend = None if drawn.stress is None else color_bar(drawn.stress, HEIGHT)
+    legend = None if drawn.stress is None else ruler.color_bar(drawn.stress, HEIGHT)
     with style.style():
         plots = panel(drawn.run, post, (SIDE, HEIGHT), watched, curves)
         for k, step in enumerate(steps):
             struck = _struck(drawn.run, int(steps[k - 1]) if k else 0, int(step))
             _place(drawn, actors, int(step), struck)
             picture = image(scene)
-            caption.onto(picture, f"{pace.speed_text(float(shown.slower[k]))}{larger}, bar: {words(bar)}")
+            caption.onto(picture, f"{pace.speed_text(float(shown.slower[k]))}{larger}, bar: {ruler.words(bar)}")
             picture[-36:-33, VIEW - 16 - long : VIEW - 16] = INK
             if legend is not None:
-                with_color_bar(picture, legend)
+                ruler.with_color_bar(picture, legend)
             yield np.concatenate([picture, plots.frame(int(step))], axis=1)
             if k % 15 == 0:
                 progress((k + 1) / steps.size, "film")
@@ -126,7 +107,7 @@ def _struck(run: xr.Dataset, before: int, now: int) -> bool:
     return "contact_gap" in run and bool((run.contact_gap.values[before : now + 1] < 0.0).any())
 
 
-def _build(scene: pv.Plotter, drawn: Mechanism) -> Actors:
+def _build(scene: pv.Plotter, drawn: mechanism.Mechanism) -> Actors:
     floor(scene, drawn)
     parts = tuple(solid(scene, part.surface, part.color, part.opacity) for part in drawn.parts)
     return Actors(parts, tuple(_flexible(scene, drawn, body) for body in drawn.flexible))
@@ -140,18 +121,18 @@ def solid(scene: pv.Plotter, surface: Surface, color: str, opacity: float, mesh:
     return actor
 
 
-def _flexible(scene: pv.Plotter, drawn: Mechanism, body: Flexible) -> pv.PolyData:
-    mesh = skin(placed(drawn.run, body, 0)[0], faces(body.bundle))
-    mesh["shade"] = shade(drawn.run, body, 0)
+def _flexible(scene: pv.Plotter, drawn: mechanism.Mechanism, body: mechanism.Flexible) -> pv.PolyData:
+    mesh = skin(mechanism.placed(drawn.run, body, 0)[0], faces(body.bundle))
+    mesh["shade"] = mechanism.shade(drawn.run, body, 0)
     q = np.abs(drawn.run.modal_coordinate.values[:, body.columns]).max(axis=1)
-    largest = drawn.stress or max(float(placed(drawn.run, body, int(np.argmax(q)))[1].max()), 1e-12)
+    largest = drawn.stress or max(float(mechanism.placed(drawn.run, body, int(np.argmax(q)))[1].max()), 1e-12)
     if body.color is not None:
         scene.add_mesh(mesh, color=body.color, **shading(body.bundle))
         return mesh
     scene.add_mesh(
         mesh,
         scalars="shade",
-        cmap=STRESS_COLORS if body.stressed else "viridis",
+        cmap=ruler.STRESS_COLORS if body.stressed else "viridis",
         clim=(0.0, largest),
         show_scalar_bar=False,
         **shading(body.bundle),
@@ -159,17 +140,17 @@ def _flexible(scene: pv.Plotter, drawn: Mechanism, body: Flexible) -> pv.PolyDat
     return mesh
 
 
-def _place(drawn: Mechanism, actors: Actors, step: int, glow: bool) -> None:
+def _place(drawn: mechanism.Mechanism, actors: Actors, step: int, glow: bool) -> None:
     for part, actor in zip(drawn.parts, actors.parts, strict=True):
         if part.owner is not None:
-            actor.user_matrix = part_pose(drawn.run, part, step)
+            actor.user_matrix = mechanism.part_pose(drawn.run, part, step)
         if part.contact is not None:
-            actor.prop.color = IMPACT_COLOR if glow else CLEARANCE_COLOR
+            actor.prop.color = mechanism.IMPACT_COLOR if glow else mechanism.CLEARANCE_COLOR
     for bent, mesh in zip(drawn.flexible, actors.flexible, strict=True):
-        mesh.points, mesh["shade"] = placed(drawn.run, bent, step)[0], shade(drawn.run, bent, step)
+        mesh.points, mesh["shade"] = mechanism.placed(drawn.run, bent, step)[0], mechanism.shade(drawn.run, bent, step)
 
 
-def floor(scene: pv.Plotter, drawn: Mechanism) -> None:
+def floor(scene: pv.Plotter, drawn: mechanism.Mechanism) -> None:
     """A pale disc under the mechanism; none behind a planar one, and none where its scene says from where to look."""
     if drawn.view.planar or drawn.looks.direction is not None:
         return
@@ -184,7 +165,7 @@ def floor(scene: pv.Plotter, drawn: Mechanism) -> None:
     scene.add_mesh(disc, color="#dfe5ec", ambient=0.12)
 
 
-def look(scene: pv.Plotter, drawn: Mechanism, margin: int = 0) -> None:
+def look(scene: pv.Plotter, drawn: mechanism.Mechanism, margin: int = 0) -> None:
     """Put the camera where all that is drawn over the run is in the picture, between its margins [pixels]."""
     width, height = scene.window_size
     position, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)

@@ -15,9 +15,9 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
-from flexclear.pipeline.post.render.fields import fields_of, hertz, linear_fields
 from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose, rest, skin
 from flexclear.pipeline.post.render.surfaces import Surface
+from flexclear.pipeline.post.shapes.body_shape import fields_of, hertz, linear_fields
 
 FLOAT, WHOLE, ARRAY, INDICES = 5126, 5125, 34962, 34963
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}

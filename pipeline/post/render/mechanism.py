@@ -14,11 +14,10 @@ from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.scene.fields import Pose
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.post.render import forms, surfaces
-from flexclear.pipeline.post.render.forms import Seat, Solid, equivalent
+from flexclear.pipeline.post.render.forms import Seat, Solid, Wheel, equivalent, wheels
 from flexclear.pipeline.post.render.surfaces import Surface
 from flexclear.pipeline.post.render.view import View, view
-from flexclear.pipeline.post.render.wheels import Wheel, wheels
-from flexclear.pipeline.post.shapes import body_stress
+from flexclear.pipeline.post.shapes import body_shape
 from flexclear.pipeline.post.shapes.body_shape import faces, scale_to, surface
 from flexclear.pipeline.post.single_run.series import parameters
 
@@ -169,7 +168,7 @@ def mechanism(
     stressed: whether the colours of flexible bodies show von Mises stress.  InputError for a run that has none.
     """
     looks, at = looks or Looks(), Layout(run, parameters(run), bundles)
-    if stressed and not body_stress.recorded(run):
+    if stressed and not body_shape.stress_recorded(run):
         problem = "the run records no von Mises stress"
         raise InputError(
             "--what stress", problem, 'ask for it: [output] stress = ["BODY"], a rod of known section or a solid'
@@ -182,7 +181,7 @@ def mechanism(
     size = float(np.linalg.norm(np.ptp(shown, axis=0))) or LONE
     parts = (*_bodies(at, looks, size), *_joints(at, size))
     seen = view(run, at.given, looks.direction, looks.up)
-    top = max(body_stress.largest(run), 1e-9) if stressed else None
+    top = max(body_shape.largest_stress(run), 1e-9) if stressed else None
     return Mechanism(run, parts, flexible, seen, size, _cloud(run, parts, flexible), looks, top)
 
 
@@ -227,7 +226,7 @@ def placed(run: xr.Dataset, body: Flexible, step: int) -> tuple[np.ndarray, np.n
 def shade(run: xr.Dataset, body: Flexible, step: int) -> np.ndarray:
     """What the colours of a body show at the points of `placed`: von Mises stress [Pa], or displacement [m]."""
     if body.stressed:
-        return body_stress.on_surface(run, body.bundle, _names(run, "body")[body.index], step)
+        return body_shape.stress_on_surface(run, body.bundle, _names(run, "body")[body.index], step)
     return placed(run, body, step)[1]
 
 
@@ -380,7 +379,7 @@ def _flexible(run: xr.Dataset, name: str, bundle: xr.Dataset, looks: Looks, *, s
     largest = q[int(np.argmax(np.abs(q).max(axis=1)))]
     scale = looks.exaggeration or max(1.0, float(f"{scale_to(bundle, largest, DEFORMATION_SHARE):.0e}"))
     color = looks.bodies.get(name, {}).get("color")
-    shown = stressed and name in body_stress.recorded(run)
+    shown = stressed and name in body_shape.stress_recorded(run)
     if stressed:  # grey does not look like a stress
         color = None if shown else GROUND_COLOR
     return Flexible(_names(run, "body").index(name), bundle, columns, scale, color, shown)

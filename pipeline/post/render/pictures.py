@@ -14,8 +14,7 @@ import xarray as xr
 from flexclear.pipeline.core.scene.quantity import Quantity
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.core.system.progress import Progress, silent
-from flexclear.pipeline.post.overview.page import media, viewer_page
-from flexclear.pipeline.post.pages import viewer
+from flexclear.pipeline.post.pages import media, viewer, viewer_page
 from flexclear.pipeline.post.plotting import mode_sheet
 from flexclear.pipeline.post.render import gl, gltf, joint_view, pace, paraview, player, vibrations
 from flexclear.pipeline.post.render.mechanism import Looks, Mechanism, mechanism
@@ -65,16 +64,6 @@ def make(what: str, kind: str, shown: Shown) -> dict[str, bytes]:
     return MAKERS[what][kind](shown, kind)
 
 
-def formats(what: str) -> tuple[str, ...]:
-    """As what something can be shown."""
-    return tuple(MAKERS[what])
-
-
-def needs_gl(what: str, kind: str) -> bool:
-    """Whether the machine must be able to draw solids for that."""
-    return what in ("motion", "stress", "vibrations") and kind in ("png", "gif", "mp4")
-
-
 def png(pixels: np.ndarray) -> bytes:
     """PNG file of pixels of shape (height, width, 3)."""
     from matplotlib.image import imsave
@@ -84,25 +73,16 @@ def png(pixels: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-def _still(shown: Shown, kind: str) -> dict[str, bytes]:
-    """When the bodies are farthest from where they started."""
+def _still(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes]:
+    """When the bodies are farthest from where they started, or the largest stress of the run is largest."""
     _must_draw()
     from flexclear.pipeline.post.render import film, ruler
 
-    drawn = shown.mechanism()
-    moved = np.abs(drawn.run.position.values - drawn.run.position.values[:1])
-    picture = film.still(drawn, int(np.argmax(moved.sum(axis=(1, 2)))))
-    return {"mechanism.png": png(ruler.annotated(picture, drawn))}
-
-
-def _stress_still(shown: Shown, kind: str) -> dict[str, bytes]:
-    """When the largest stress of the run is largest."""
-    _must_draw()
-    from flexclear.pipeline.post.render import film, ruler
-
-    drawn = shown.mechanism(stressed=True)
-    step = int(np.argmax(drawn.run["von_mises_stress"].values.max(axis=1)))
-    return {"stress.png": png(ruler.annotated(film.still(drawn, step, margin=ruler.BAR), drawn, ruler.BAR))}
+    drawn, margin = shown.mechanism(stressed=stressed), ruler.BAR if stressed else 0
+    moved = np.abs(drawn.run.position.values - drawn.run.position.values[:1]).sum(axis=(1, 2))
+    step = int(np.argmax(drawn.run["von_mises_stress"].values.max(axis=1) if stressed else moved))
+    picture = film.still(drawn, step, margin=margin)
+    return {f"{'stress' if stressed else 'mechanism'}.png": png(ruler.annotated(picture, drawn, margin))}
 
 
 def _film(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes]:
@@ -120,13 +100,10 @@ def _must_draw() -> None:
         raise SolverError(f"no pictures of solids: {gl.remedy()}")
 
 
-def _motion_page(shown: Shown, kind: str) -> dict[str, bytes]:
-    return {"motion.html": shown.page("motion", [viewer(player.motion(shown.mechanism()), "Motion")])}
-
-
-def _stress_page(shown: Shown, kind: str) -> dict[str, bytes]:
-    view = viewer(player.motion(shown.mechanism(stressed=True)), "Von Mises stress")
-    return {"stress.html": shown.page("stress", [view])}
+def _motion_page(shown: Shown, kind: str, *, stressed: bool = False) -> dict[str, bytes]:
+    what, caption = ("stress", "Von Mises stress") if stressed else ("motion", "Motion")
+    view = viewer(player.motion(shown.mechanism(stressed=stressed)), caption)
+    return {f"{what}.html": shown.page(what, [view])}
 
 
 def _motion_gltf(shown: Shown, kind: str) -> dict[str, bytes]:
@@ -149,21 +126,25 @@ def _bodies(shown: Shown) -> Mapping[str, xr.Dataset]:
     return shown.bundles
 
 
+def _side(bundle: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
+    """From where a body is examined, and what is up."""
+    seen = player.side(bundle)
+    return seen.direction, seen.up
+
+
 def _mode_sheets(shown: Shown, kind: str) -> dict[str, bytes]:
     files: dict[str, bytes] = {}
     for body, bundle in _bodies(shown).items():
-        seen = player.side(bundle)
-        files |= mode_sheet.files(f"modes_{body}", body, bundle, seen.direction, seen.up)
+        files |= mode_sheet.files(f"modes_{body}", body, bundle, *_side(bundle))
     return files
 
 
 def _mode_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.render import writing
+    from flexclear.pipeline.post.render import pace
 
     files = {}
     for body, bundle in _bodies(shown).items():
-        seen = player.side(bundle)
-        suffix, content = writing.write(mode_sheet.frames(body, bundle, seen.direction, seen.up), 12, kind)
+        suffix, content = pace.write(mode_sheet.frames(body, bundle, *_side(bundle)), 12, kind)
         files[f"modes_{body}.{suffix}"] = content
     return files
 
@@ -219,12 +200,12 @@ def _joint_page(shown: Shown, kind: str) -> dict[str, bytes]:
 
 
 def _joint_films(shown: Shown, kind: str) -> dict[str, bytes]:
-    from flexclear.pipeline.post.render import joint_film, writing
+    from flexclear.pipeline.post.render import joint_view, pace
 
-    files, rate = {}, writing.rate(kind)
+    files, rate = {}, pace.rate(kind)
     for k, name in _joints(shown).items():
-        pictures = joint_film.frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
-        suffix, content = writing.write(pictures, rate, kind)
+        pictures = joint_view.frames(shown.of_run, k, shown.looks.duration, shown.looks.impact_slowdown, rate)
+        suffix, content = pace.write(pictures, rate, kind)
         files[f"joint_{name}.{suffix}"] = content
     return files
 
@@ -246,18 +227,13 @@ def _vibration_page(shown: Shown, kind: str) -> dict[str, bytes]:
 
 def _vibration_sheet(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
-    from flexclear.pipeline.post.render import vibration_film as film
-
-    return {"vibrations.png": png(film.sheet(*_vibrating(shown)))}
+    return {"vibrations.png": png(vibrations.sheet(*_vibrating(shown)))}
 
 
-def _vibration_film(shown: Shown, kind: str) -> dict[str, bytes]:
+def _vibrations(shown: Shown, kind: str) -> dict[str, bytes]:
     _must_draw()
-    from flexclear.pipeline.post.render import vibration_film as film
-    from flexclear.pipeline.post.render import writing
-
-    rate = writing.rate(kind)
-    suffix, content = writing.write(film.frames(*_vibrating(shown), rate, shown.progress), rate, kind)
+    rate = pace.rate(kind)
+    suffix, content = pace.write(vibrations.frames(*_vibrating(shown), rate, shown.progress), rate, kind)
     return {f"vibrations.{suffix}": content}
 
 
@@ -272,10 +248,8 @@ MAKERS: dict[str, dict[str, Maker]] = {
         "pvd": _motion_series,
     },
     "stress": {
-        "png": _stress_still,
-        "gif": partial(_film, stressed=True),
-        "mp4": partial(_film, stressed=True),
-        "html": _stress_page,
+        kind: partial(make, stressed=True)
+        for kind, make in {"png": _still, "gif": _film, "mp4": _film, "html": _motion_page}.items()
     },
     "modes": {
         "png": _mode_sheets,
@@ -286,5 +260,5 @@ MAKERS: dict[str, dict[str, Maker]] = {
         "pvd": _mode_series,
     },
     "joint": {"png": _joint_figures, "gif": _joint_films, "mp4": _joint_films, "html": _joint_page},
-    "vibrations": {"png": _vibration_sheet, "gif": _vibration_film, "mp4": _vibration_film, "html": _vibration_page},
+    "vibrations": {"png": _vibration_sheet, "gif": _vibrations, "mp4": _vibrations, "html": _vibration_page},
 }

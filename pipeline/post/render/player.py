@@ -14,23 +14,11 @@ import xarray as xr
 
 from flexclear.pipeline.core.numerics.rotations import matrix_to_quaternion
 from flexclear.pipeline.post.overview.curves import scaled
-from flexclear.pipeline.post.render import joint_view, pace, surfaces
-from flexclear.pipeline.post.render.fields import fields_of, hertz, linear_fields
-from flexclear.pipeline.post.render.mechanism import (
-    CLEARANCE_COLOR,
-    COLORS,
-    SOCKET_COLOR,
-    Flexible,
-    Looks,
-    Mechanism,
-    Part,
-    part_pose,
-    rest,
-)
+from flexclear.pipeline.post.render import joint_view, mechanism, pace, surfaces
 from flexclear.pipeline.post.render.vibrations import Vibrations
 from flexclear.pipeline.post.render.view import View, axes_of, eye
-from flexclear.pipeline.post.shapes import body_stress
-from flexclear.pipeline.post.shapes.body_shape import box, faces, scale_to
+from flexclear.pipeline.post.shapes import body_shape
+from flexclear.pipeline.post.shapes.body_shape import box, faces, fields_of, hertz, linear_fields, scale_to
 
 #: frames of a motion, and width over height of a picture that is neither wide nor narrow
 FRAMES, ASPECT = 240, 1.2
@@ -38,7 +26,7 @@ FRAMES, ASPECT = 240, 1.2
 FRACTION = 0.12
 
 
-def motion(drawn: Mechanism, frames: int = FRAMES) -> dict[str, Any]:
+def motion(drawn: mechanism.Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     """A run, for the viewer: bodies on their tracks, flexible ones bent."""
     run, steps = drawn.run, _steps(drawn.run, drawn.looks, frames)
     tracks: dict[tuple[int | None, int | None], int] = {}
@@ -62,13 +50,13 @@ def motion(drawn: Mechanism, frames: int = FRAMES) -> dict[str, Any]:
     }
 
 
-def _largest_stress(drawn: Mechanism, steps: np.ndarray) -> dict[str, Any]:
+def _largest_stress(drawn: mechanism.Mechanism, steps: np.ndarray) -> dict[str, Any]:
     factor, unit = scaled(drawn.stress or 0.0, "Pa")
-    values = factor * body_stress.of_bodies(drawn.run)[steps].max(axis=1)
+    values = factor * body_shape.stress_of_bodies(drawn.run)[steps].max(axis=1)
     return {"label": "largest stress", "unit": unit, "values": [float(f"{v:.4g}") for v in values]}
 
 
-def joint(run: xr.Dataset, contact: int, looks: Looks, frames: int = FRAMES) -> dict[str, Any]:
+def joint(run: xr.Dataset, contact: int, looks: mechanism.Looks, frames: int = FRAMES) -> dict[str, Any]:
     """The centre of a ball or pin in its socket, for the viewer: where it may be, its path, and itself.
 
     contact: index of a joint with clearance, not of the end of a stop.
@@ -86,8 +74,8 @@ def joint(run: xr.Dataset, contact: int, looks: Looks, frames: int = FRAMES) -> 
     return {
         "meshes": [
             _still(shown.path, joint_view.PATH_COLOR, 1.0) | {"track": -1},
-            _still(shown.mark, CLEARANCE_COLOR, 1.0) | {"track": 0},
-            _still(shown.room, SOCKET_COLOR, 0.3) | {"track": -1},
+            _still(shown.mark, mechanism.CLEARANCE_COLOR, 1.0) | {"track": 0},
+            _still(shown.room, mechanism.SOCKET_COLOR, 0.3) | {"track": -1},
         ],
         "tracks": [_floats(np.column_stack([centre, unturned]))],
         "times": _rounded(run, steps),
@@ -118,7 +106,7 @@ def scales(bundle: xr.Dataset) -> np.ndarray:
     return np.array([scale_to(bundle, unit, FRACTION) for unit in np.eye(bundle.sizes["mode"])])
 
 
-def vibrations(drawn: Mechanism, linear: Vibrations) -> dict[str, Any]:
+def vibrations(drawn: mechanism.Mechanism, linear: Vibrations) -> dict[str, Any]:
     """The natural vibrations of a mechanism about a pose, for the viewer.
 
     Of each complex shape real and imaginary part are shown in turn, so that running waves run.
@@ -150,7 +138,7 @@ def side(bundle: xr.Dataset) -> View:
     return View(across / np.linalg.norm(across) + 0.6 * up - 0.25 * axis, up, False)
 
 
-def _steps(run: xr.Dataset, looks: Looks, frames: int) -> np.ndarray:
+def _steps(run: xr.Dataset, looks: mechanism.Looks, frames: int) -> np.ndarray:
     """The outputs that are shown."""
     if run.sizes["time"] == 1:
         return np.zeros(1, dtype=int)
@@ -161,20 +149,20 @@ def _rounded(run: xr.Dataset, steps: np.ndarray) -> list[float]:
     return [round(float(t), 9) for t in run["time"].values[steps]]
 
 
-def _bent(run: xr.Dataset, body: Flexible, steps: np.ndarray) -> dict[str, Any]:
+def _bent(run: xr.Dataset, body: mechanism.Flexible, steps: np.ndarray) -> dict[str, Any]:
     bundle, q = body.bundle, run["modal_coordinate"].values[:, body.columns]
     fields = linear_fields(bundle)
     some = np.unique(np.linspace(0, len(q) - 1, 60).astype(int))
     largest = max(float(np.linalg.norm(np.tensordot(q[k], fields, axes=1), axis=1).max()) for k in some)
-    content = _skin(bundle, rest(bundle)) | {
+    content = _skin(bundle, mechanism.rest(bundle)) | {
         "fields": [_scaled(values) for values in fields],
         "weights": _floats(q[steps]),
         "largest": largest,
     }
     if body.stressed:  # one byte a point and frame
-        top = body_stress.largest(run) or 1.0
+        top = body_shape.largest_stress(run) or 1.0
         name = str(run["body"].values[body.index])
-        levels = np.array([body_stress.on_surface(run, bundle, name, int(step)) for step in steps]) / top
+        levels = np.array([body_shape.stress_on_surface(run, bundle, name, int(step)) for step in steps]) / top
         data = np.round(255.0 * np.clip(levels, 0.0, 1.0)).astype(np.uint8)
         factor, unit = scaled(top, "Pa")
         content |= {"levels": base64.b64encode(data.tobytes()).decode(), "top": f"{factor * top:.3g} {unit}"}
@@ -183,10 +171,10 @@ def _bent(run: xr.Dataset, body: Flexible, steps: np.ndarray) -> dict[str, Any]:
 
 def _track(run: xr.Dataset, owner: int | None, frame: int | None, steps: np.ndarray) -> np.ndarray:
     assert owner is not None
-    part = Part(owner, surfaces.EMPTY, "", frame=frame)
+    part = mechanism.Part(owner, surfaces.EMPTY, "", frame=frame)
     rows = []
     for step in steps:
-        matrix = part_pose(run, part, int(step))
+        matrix = mechanism.part_pose(run, part, int(step))
         rows.append([*matrix[:3, 3], *matrix_to_quaternion(matrix[:3, :3])])
     return np.array(rows)
 
@@ -204,7 +192,7 @@ def _still(part: surfaces.Surface, color: str, opacity: float) -> dict[str, Any]
 def _skin(bundle: xr.Dataset, points: np.ndarray) -> dict[str, Any]:
     """Points keep their number, so that fields fit; sharp edges of solids are shaded softly."""
     triangles = surfaces.triangulated(faces(bundle))
-    return {"points": _floats(points), "triangles": _wholes(triangles), "color": COLORS[0], "opacity": 1.0}
+    return {"points": _floats(points), "triangles": _wholes(triangles), "color": mechanism.COLORS[0], "opacity": 1.0}
 
 
 def _camera(seen: View, cloud: np.ndarray, zoom: float = 1.0) -> dict[str, Any]:

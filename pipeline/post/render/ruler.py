@@ -22,8 +22,7 @@ def project(drawn: Mechanism, points: np.ndarray, size: tuple[int, int], margin:
     where, focus = eye(drawn.view, drawn.cloud, (width - 2 * margin) / height, drawn.looks.zoom)
     local = (points - where) @ axes_of(drawn.view, where, focus)
     scale = -0.5 * height / np.tan(0.5 * np.radians(ANGLE)) / local[:, 2]
-    result: np.ndarray = np.column_stack([0.5 * width + scale * local[:, 0], 0.5 * height - scale * local[:, 1]])
-    return result
+    return np.column_stack([0.5 * width + scale * local[:, 0], 0.5 * height - scale * local[:, 1]])
 
 
 def pixels_per_metre(drawn: Mechanism, size: tuple[int, int], margin: int = 0) -> float:

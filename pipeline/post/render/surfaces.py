@@ -81,8 +81,7 @@ def hull(places: np.ndarray, margin: float) -> np.ndarray:
     turn = np.linspace(0.0, 2.0 * np.pi, ROUND, endpoint=False)
     circle = margin * np.column_stack([np.cos(turn), np.sin(turn)])
     spread = (places[:, None, :] + circle).reshape(-1, 2)
-    outline: np.ndarray = spread[ConvexHull(spread).vertices]
-    return outline
+    return spread[ConvexHull(spread).vertices]
 
 
 def cylinder(radius: float, length: float) -> Surface:

@@ -1,21 +1,28 @@
-"""Natural vibrations of an assembled mechanism as moving skins: what pages, films and pictures of them draw."""
+"""Natural vibrations of an assembled mechanism as moving skins, for pages, and as a film and a sheet of pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
 
-from flexclear.pipeline.post.render import surfaces
-from flexclear.pipeline.post.render.fields import hertz, linear_fields
+from flexclear.pipeline.core.system.progress import Progress, silent
+from flexclear.pipeline.post.render import pace, surfaces
 from flexclear.pipeline.post.render.mechanism import COLORS, Flexible, Mechanism, part_pose, pose, rest, skin
+from flexclear.pipeline.post.shapes.body_shape import hertz, linear_fields
 
 #: drawn size of the largest displacement of a vibration, as a fraction of the mechanism's size
 FRACTION = 0.12
 #: largest drawn rotation of any frame [rad]: points of a body that turns further would leave it, they move linearly
 TURN = 0.5
+#: size of a film's pictures and of those on a sheet, and how many are next to each other there
+SIZE, TILE, COLUMNS = (960, 540), (480, 360), 3
+#: how long one vibration is shown [s], and how many periods it goes through meanwhile
+SECONDS, PERIODS = 1.5, 2
+#: most vibrations that are shown, the slowest ones
+SHOWN = 12
 #: displacement of the centre of mass and rotation in each vibration, (vibration, part, 3), by index of the body
 Motions = Mapping[int, tuple[np.ndarray, np.ndarray]]
 
@@ -123,8 +130,7 @@ def body_motions(run: xr.Dataset, linear: xr.Dataset, flexible: Sequence[Flexibl
 def _rigid(motions: Motions, owner: int, points: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """Displacements of points of a rigid body in each vibration, (vibration, part, point, 3)."""
     move, turn = motions[owner]
-    moved: np.ndarray = move[:, :, None, :] + np.cross(turn[:, :, None, :], points - centre)
-    return moved
+    return move[:, :, None, :] + np.cross(turn[:, :, None, :], points - centre)
 
 
 def _bending(run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motions) -> Piece:
@@ -134,3 +140,72 @@ def _bending(run: xr.Dataset, body: Flexible, linear: xr.Dataset, motions: Motio
     shape = linear["modal_shape"].values[:, :, body.columns]
     moved = _rigid(motions, body.index, points, matrix[:3, 3]) + np.tensordot(shape, fields, axes=1)
     return Piece(skin(body.bundle, points), moved, COLORS[0], 1.0, False)
+
+
+def frames(drawn: Mechanism, modes: Vibrations, rate: int, progress: Progress = silent) -> Iterator[np.ndarray]:
+    """The slowest vibrations in turn, at most SHOWN, pictures of shape (540, 960, 3), so many a second."""
+    count = round(SECONDS * rate / PERIODS)
+    picture, close = _stage(drawn, modes, SIZE)
+    shown = min(len(modes.labels), SHOWN)
+    for k in range(shown):
+        period = [picture(k, 2.0 * np.pi * n / count) for n in range(count)]
+        for _ in range(PERIODS):
+            yield from period
+        progress((k + 1) / shown, "film")
+    close()
+
+
+def sheet(drawn: Mechanism, modes: Vibrations) -> np.ndarray:
+    """The vibrations at their largest, in rows of three, slowest first: at most SHOWN of them."""
+    picture, close = _stage(drawn, modes, TILE)
+    tiles = [picture(k, 0.0) for k in range(min(len(modes.labels), SHOWN))]
+    close()
+    columns = min(COLUMNS, len(tiles))
+    tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % columns)
+    return np.concatenate(
+        [np.concatenate(tiles[k : k + columns], axis=1) for k in range(0, len(tiles), columns)], axis=0
+    )
+
+
+def _cloud(modes: Vibrations) -> np.ndarray:
+    """Points that represent all that is drawn, at both ends of each vibration that is shown."""
+    clouds = []
+    for piece in modes.pieces:
+        for k in range(min(len(modes.labels), SHOWN)):
+            way = modes.scale[k] * piece.moved[k, 0, ::5]
+            clouds += [piece.surface.points[::5] + way, piece.surface.points[::5] - way]
+    return np.concatenate(clouds)
+
+
+def _stage(
+    drawn: Mechanism, modes: Vibrations, size: tuple[int, int]
+) -> tuple[Callable[[int, float], np.ndarray], Callable[[], None]]:
+    """What draws one vibration at a phase [rad], shape (height, width, 3), and what closes the stage.
+
+    Imports pyvista, which ends the process where there are no GL libraries.
+    """
+    from flexclear.pipeline.post.render import film
+
+    stage, caption, skins = film.plotter(size), pace.Caption((size[0], 26), film.SOFT), []
+    for piece in modes.pieces:
+        mesh = film.polydata(piece.surface)
+        if piece.plain:
+            film.solid(stage, piece.surface, piece.color, piece.opacity, mesh)
+        else:
+            mesh["displacement"] = np.zeros(mesh.n_points)
+            stage.add_mesh(mesh, scalars="displacement", cmap="viridis", clim=(0.0, 1.0), show_scalar_bar=False)
+        skins.append(mesh)
+    film.look(stage, replace(drawn, cloud=_cloud(modes)))
+
+    def picture(vibration: int, phase: float) -> np.ndarray:
+        scale, largest = modes.scale[vibration], modes.largest[vibration] or 1.0
+        for piece, mesh in zip(modes.pieces, skins, strict=True):
+            way = np.cos(phase) * piece.moved[vibration, 0] - np.sin(phase) * piece.moved[vibration, 1]
+            mesh.points = piece.surface.points + scale * way
+            if not piece.plain:
+                mesh["displacement"] = np.linalg.norm(way, axis=1) / largest
+        pixels = film.image(stage)
+        caption.onto(pixels, f"{modes.labels[vibration]}; drawn larger than it is")
+        return pixels
+
+    return picture, stage.close

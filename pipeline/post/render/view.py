@@ -111,8 +111,7 @@ def plane(run: xr.Dataset) -> np.ndarray | None:
 def gravity(given: Mapping[str, Any]) -> np.ndarray:
     """Sum of the gravity loads among a scene's parameters [m/s^2], shape (3,)."""
     fields = [load["acceleration"] for load in given.get("load", {}).values() if load["type"] == "gravity"]
-    total: np.ndarray = np.sum(np.array(fields, dtype=float).reshape(-1, 3), axis=0)
-    return total
+    return np.sum(np.array(fields, dtype=float).reshape(-1, 3), axis=0)
 
 
 def _up(given: Mapping[str, Any]) -> np.ndarray:
@@ -128,6 +127,5 @@ def _across(up: np.ndarray, direction: np.ndarray) -> np.ndarray:
     for candidate in (up, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])):
         rest = candidate - (candidate @ unit) * unit
         if np.linalg.norm(rest) > 0.2:
-            result: np.ndarray = rest / np.linalg.norm(rest)
-            return result
+            return rest / np.linalg.norm(rest)
     return np.array([1.0, 0.0, 0.0])

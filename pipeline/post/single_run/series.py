@@ -1,20 +1,47 @@
-"""From one run (and its ensemble) to the series that figures, tables and people look at."""
+"""From one run (and its ensemble) to the series that figures, tables and people look at: impacts and wear included.
+
+Wear: depths by Archard's law, and where on pin and socket it happens. Totals are the run's own integrals. Over the
+surfaces they are spread along the way of the contact between recorded rows, which are the outputs and all events; a
+contact that turns by more than a sector between two outputs is spread along the shorter arc.
+"""
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
+from flexclear.pipeline.core.numerics.rotations import angle_about_y
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+
+from typing import TYPE_CHECKING
+
+from flexclear.pipeline.core.artifacts.quantities import IMPACT
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from flexclear.pipeline.core.artifacts.labelled import LabelledArrays
+
+import json
+from typing import TYPE_CHECKING
+
 from flexclear.pipeline.core.artifacts.labelled import LabelledArrays, labelled, of
-from flexclear.pipeline.core.artifacts.quantities import IMPACT, SEPARATED
 from flexclear.pipeline.core.artifacts.schema import conformed, require_complete
-from flexclear.pipeline.core.numerics.rotations import angle_about_y, first_largest, rotation_between
-from flexclear.pipeline.post.single_run.horizon import QUANTILES, Variables, ensemble_statistics, horizon
-from flexclear.pipeline.post.single_run.impacts import impacts, of_kind
+from flexclear.pipeline.core.numerics.rotations import first_largest, rotation_between
 from flexclear.pipeline.post.single_run.schema import POST
-from flexclear.pipeline.post.single_run.wear import wear
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -147,3 +174,209 @@ def _peak_force(run: xr.Dataset | LabelledArrays) -> np.ndarray:
 def parameters(run: xr.Dataset | LabelledArrays) -> dict:
     """The scene's parameters from the run's attributes; empty when they do not."""
     return json.loads(run.attrs.get("parameters", "{}"))
+
+
+def impacts(run: xr.Dataset | LabelledArrays) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Variables ``impact_*`` of the post artifact; empty for a run without contacts.
+
+    Listed and counted are the closings with an approach speed above IMPACT; the separation speed is
+    that of the next opening of the same contact.  Of one that the run's end cuts short, separation
+    speed, duration, impulse and losses are NaN.
+    """
+    if "event_time" not in run or "contact" not in run.sizes:
+        return {}
+    contact, names = run["event_contact"].values, [str(name) for name in run["contact"].values]
+    speed = run["event_approach_speed"].values
+    closings, openings = of_kind(run, "closing"), of_kind(run, "opening")
+    strong = np.flatnonzero(closings & (speed > IMPACT))
+    opens = np.array([_next_opening(int(i), contact, openings) for i in strong], dtype=int)
+    ended, begun = opens >= 0, run["event_time"].values[strong]
+    return {
+        "impact_time": (("impact",), begun),
+        "impact_contact": (("impact",), contact[strong]),
+        "impact_approach_speed": (("impact",), speed[strong]),
+        "impact_separation_speed": (("impact",), np.where(ended, speed[opens], np.nan)),
+        "impact_peak_force": (("impact",), run["event_peak_force"].values[strong]),
+        "impact_duration": (("impact",), np.where(ended, run["event_time"].values[opens] - begun, np.nan)),
+        "impact_count": (
+            ("contact",),
+            np.array([np.count_nonzero(contact[strong] == name) for name in names], dtype=np.int64),
+        ),
+        **_books(run, contact[strong], begun, np.where(ended, run["event_time"].values[opens], np.nan)),
+    }
+
+
+#: what the run's ledger books of contacts, by the name that an impact's fraction of it has
+BOOKS = {
+    "impact_impulse": "contact_impulse",
+    "impact_damping_loss": "contact_damping_loss",
+    "impact_friction_loss": "contact_friction_loss",
+}
+
+
+def _books(
+    run: xr.Dataset | LabelledArrays, contact: np.ndarray, begun: np.ndarray, ended: np.ndarray
+) -> dict[str, tuple[tuple[str, ...], np.ndarray]]:
+    """Impulse and losses of each impact, NaN where it has not ended; there are rows at all events."""
+    time, booked = run["time"].values, dict[str, tuple[tuple[str, ...], np.ndarray]]()
+    for name, book in BOOKS.items():
+        if book in run:
+            values, fractions = run[book].values, np.full(len(contact), np.nan)
+            names = list(run["contact"].values)
+            for i, c in enumerate(names.index(name) for name in contact):
+                fractions[i] = np.interp(ended[i], time, values[:, c]) - np.interp(begun[i], time, values[:, c])
+            booked[name] = (("impact",), fractions)
+    return booked
+
+
+def of_kind(run: xr.Dataset | LabelledArrays, name: str) -> np.ndarray:
+    """True for the events of a kind, e.g. those that close a gap, shape (event,)."""
+    return np.asarray(run["event_kind"].values == name, dtype=bool)
+
+
+def _next_opening(i: int, contact: np.ndarray, openings: np.ndarray) -> int:
+    """Index of the first opening of the same contact after event i, or -1."""
+    later = np.flatnonzero((contact[i + 1 :] == contact[i]) & openings[i + 1 :])
+    return int(i + 1 + later[0]) if later.size else -1
+
+
+#: steps of the way between two rows, each of which goes to one sector; bands of a sphere, of equal area
+PIECES, BANDS = 16, 18
+SURFACES = ("outer", "inner")
+
+
+def wear(run: xr.Dataset | LabelledArrays, joints: dict[str, Any]) -> Variables:
+    """Variables ``wear_*`` of the post artifact; empty where nothing wears.
+
+    joints: what the scene says of its joints.  Depths are those that a surface alone would have; both share the volume.
+    """
+    if "wear_load_path" not in run:
+        return {}
+    names = [str(name) for name in run["worn"].values]
+    laws = [joints[name]["wear"] for name in names]
+    sectors = max(int(law["sectors"]) for law in laws)
+    bands = BANDS if any("ball_radius" in joints[name] for name in names) else 1
+    shape = (len(names), bands, sectors)
+    maps = {f"wear_{what}_{side}": np.zeros(shape) for what in ("depth", "impulse") for side in SURFACES}
+    path, sliding = run["wear_load_path"].values, run["wear_sliding_distance"].values
+    contacts = run["contact"].values.tolist()
+    impulse = run["contact_impulse"].values[:, [contacts.index(name) for name in names]]
+    volume = np.zeros(len(names))
+    for k, (name, law) in enumerate(zip(names, laws, strict=True)):
+        per_path, own = law["coefficient"] / law["hardness"], int(law["sectors"])
+        rows = BANDS if "ball_radius" in joints[name] else 1
+        volume[k] = per_path * (path[-1, k] - path[0, k])
+        for side in SURFACES:
+            direction = run[f"wear_direction_{side}"].values[:, k]
+            area = _area(joints[name], side) / (own * rows)
+            fractions = spread_over_surface(direction, np.stack([path[:, k], impulse[:, k]], axis=1), own, rows)
+            maps[f"wear_depth_{side}"][k, :rows, :own] = per_path * fractions[..., 0] / area
+            maps[f"wear_impulse_{side}"][k, :rows, :own] = fractions[..., 1]
+    totals: Variables = {
+        "wear_volume": (("worn",), volume),
+        "wear_distance": (("worn",), sliding[-1] - sliding[0]),
+        "wear_sectors": (("worn",), np.array([int(law["sectors"]) for law in laws], dtype=np.int32)),
+    }
+    for side in SURFACES:
+        deepest = maps[f"wear_depth_{side}"].reshape(len(names), -1).max(axis=1)
+        totals[f"wear_deepest_{side}"] = (("worn",), deepest)
+    mapped: Variables = {name: (("worn", "band", "sector"), values) for name, values in maps.items()}
+    return totals | mapped
+
+
+def _area(joint: dict[str, Any], side: str) -> float:
+    """Area of a surface [m^2]; half a sphere is not distinguished from a whole one."""
+    widened = float(joint["clearance"]) if side == "outer" else 0.0
+    if "ball_radius" in joint:
+        return float(4.0 * np.pi * (joint["ball_radius"] + widened) ** 2)
+    return float(2.0 * np.pi * (joint["pin_radius"] + widened) * joint["length"])
+
+
+def spread_over_surface(direction: np.ndarray, totals: np.ndarray, sectors: int, bands: int) -> np.ndarray:
+    """Increments of totals (time, what) in the sectors that a direction (time, 3) passes, (band, sector, what).
+
+    Sector s holds angles about z from x on, s to s + 1 times 2 pi/sectors; band b z-components from -1 on.
+    """
+    distributed = np.zeros((bands, sectors, totals.shape[1]))
+    growth, fraction = np.diff(totals, axis=0), (np.arange(PIECES) + 0.5) / PIECES
+    grown = np.flatnonzero(np.any(growth != 0.0, axis=1))
+    start, end = direction[grown], direction[grown + 1]
+    # before a contact begins, or after it has ended, the centres may have been anywhere
+    start = np.where(np.any(start != 0.0, axis=1, keepdims=True), start, end)
+    between = start[:, None] + fraction[None, :, None] * (end - start)[:, None]
+    angle = np.arctan2(between[..., 1], between[..., 0]) % (2.0 * np.pi)
+    sector = np.minimum((angle / (2.0 * np.pi) * sectors).astype(int), sectors - 1)
+    size = np.linalg.norm(between, axis=-1)
+    height = np.divide(between[..., 2], size, out=np.zeros_like(size), where=size > 0.0)
+    band = np.minimum(((height + 1.0) / 2.0 * bands).astype(int), bands - 1)
+    for what in range(totals.shape[1]):
+        values = np.repeat(growth[grown, what] / PIECES, PIECES)
+        np.add.at(distributed[..., what], (band.ravel(), sector.ravel()), values)
+    return distributed
+
+
+#: fractions of the members below the recorded quantiles: of so few, the middle and the bulk
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+
+Variables = dict[str, tuple[tuple[str, ...], np.ndarray]]
+
+
+def spread(velocity: np.ndarray) -> np.ndarray:
+    """Largest distance of a member's velocity from the mean [m/s], over members and bodies, shape (time,).
+
+    velocity: shape (member, time, body, axis) [m/s].
+    """
+    return np.linalg.norm(velocity - velocity.mean(axis=0), axis=-1).max(axis=(0, 2))
+
+
+def horizon(time: np.ndarray, velocity: np.ndarray, fraction: float = SEPARATED) -> float:
+    """Time from which on `spread` stays above `share` of the largest speed; the last time if it never does [s].
+
+    Beyond it two runs that differ by a perturbation far below any tolerance differ visibly, so a
+    pointwise value is one draw out of many.
+    """
+    peak = float(np.linalg.norm(velocity, axis=-1).max())
+    first = lasting(time, spread(velocity) > fraction * peak, LASTING * float(time[-1] - time[0]))
+    return float(time[-1] if first is None else time[first])
+
+
+def sentence(horizon: float, end: float, members: float | None = None) -> str:
+    """Statement on a run's predictability horizon [s]; end: of the run [s].
+
+    members: horizon of its ensemble [s], which may start further from the run than the perturbed run does.
+    """
+    neighbour = f"A run whose contacts start {100.0 * PERTURBATION:g} % of their clearance elsewhere"
+    difference = f"{100.0 * SEPARATED:g} % of each body's largest motion"
+    if horizon >= end:
+        text = f"{neighbour} stays within {difference} to the end, but for moments of impacts."
+    else:
+        whole = f"the run lasts {1e3 * end:.4g} ms"
+        text = f"{neighbour} differs by more than {difference} from {1e3 * horizon:.4g} ms on ({whole})."
+    if members is None or members >= end:
+        return text
+    return f"{text} The members of its ensemble differ by {100.0 * SEPARATED:g} % from {1e3 * members:.4g} ms on."
+
+
+def ensemble_statistics(ensemble: xr.Dataset | LabelledArrays) -> Variables:
+    """Mean, standard deviation (``ddof = 1``) and QUANTILES over the members, on the ensemble's own times.
+
+    Quantiles are interpolated between members (numpy's default); of an angle, a vector's components, a contact.
+    """
+    position, per_contact = ensemble["position"].values, ("contact",)
+    members = {
+        "rotation_y": (("ensemble_time", "ensemble_body"), angle_about_y(ensemble["quaternion"].values)),
+        "displacement": (("ensemble_time", "ensemble_body", "axis"), position - position[:, :1]),
+        "velocity": (("ensemble_time", "ensemble_body", "axis"), ensemble["velocity"].values),
+        "acceleration": (("ensemble_time", "ensemble_body", "axis"), ensemble["acceleration"].values),
+        "normal_force": (("ensemble_time", "contact"), ensemble["contact_normal_force"].values),
+        "impact_count": (per_contact, ensemble["impact_count"].values.astype(float)),
+        "peak_force": (per_contact, ensemble["peak_force"].values),
+        "contact_time_share": (per_contact, ensemble["contact_time_share"].values),
+        "peak_acceleration": (("ensemble_body", "axis"), ensemble["peak_acceleration"].values),
+    }
+    result: Variables = {"spread": (("ensemble_time",), spread(ensemble["velocity"].values))}
+    for name, (dims, values) in members.items():
+        result[f"{name}_mean"] = (dims, values.mean(axis=0))
+        result[f"{name}_std"] = (dims, values.std(axis=0, ddof=1))
+        result[f"{name}_quantile"] = (("quantile", *dims), np.quantile(values, QUANTILES, axis=0))
+    return result

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.numerics.rotations import axes_to_matrix, axis_to_matrix
-from flexclear.pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position, given_once
-from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, check_interfaces
+from flexclear.pipeline.core.scene.fields import Direction, Inertia, Length, Mass, Part, Pose, Position
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive, TurnedFrame
 from flexclear.pipeline.structure.fe.section_recipe import DIMENSIONS, InertiaSection, StiffnessSection
 
 Elements = Annotated[int, Field(ge=1, le=100_000)]
@@ -19,31 +18,30 @@ SAME_PLACE = 1e-9
 
 
 class StraightBeam(Part):
-    """A beam along x of the rod frame, from x = 0 to `length`, cut into equal elements.
-
-    length: of the rod.
-    """
+    """A beam along x of the rod frame, from x = 0 to `length`, cut into equal elements."""
 
     type: Literal["straight-beam"]
     length: Annotated[Length, Positive]
+    """of the rod"""
 
 
 class Segment(Part):
-    """A piece of a stepped rod, cut into equal elements.
-
-    end_section: the section at `end` when it tapers linearly from `section`, of the same type.
-    material: where it differs from the recipe's.
-    start, end: positions along the rod.  elements: number of elements.  section: cross section.  inertia_section: gives
-    the second moments of the mass; default: `section`.
-    """
+    """A piece of a stepped rod, cut into equal elements."""
 
     start: Length
+    """positions along the rod"""
     end: Length
+    """positions along the rod"""
     elements: Elements
+    """number of elements"""
     section: StiffnessSection
+    """cross section"""
     end_section: StiffnessSection | None = None
+    """the section at `end` when it tapers linearly from `section`, of the same type"""
     inertia_section: InertiaSection | None = None
+    """gives the second moments of the mass; default: `section`"""
     material: Isotropic | None = None
+    """where it differs from the recipe's"""
 
     @model_validator(mode="after")
     def _has_a_length(self) -> Segment:
@@ -54,14 +52,13 @@ class Segment(Part):
 
 
 class SegmentedBeam(Part):
-    """A beam along x of the rod frame, from x = 0 to `length`, of segments that cover it without gap or overlap.
-
-    length: of the rod.  segments: pieces in their order.
-    """
+    """A beam along x of the rod frame, from x = 0 to `length`, of segments that cover it without gap or overlap."""
 
     type: Literal["segmented-beam"]
     length: Annotated[Length, Positive]
+    """of the rod"""
     segments: tuple[Segment, ...]
+    """pieces in their order"""
 
     @model_validator(mode="after")
     def _covered(self) -> SegmentedBeam:
@@ -79,15 +76,14 @@ class SegmentedBeam(Part):
 
 
 class LumpedMass(Part):
-    """A body tied rigidly to the node at `x` (a ball, a stem).
-
-    com: its centre of mass seen from the node, inertia: about that centre; both in axes of the rod frame.
-    x: position along the rod.  mass: its mass.
-    """
+    """A body tied rigidly to the node at `x` (a ball, a stem)."""
 
     x: Length
+    """position along the rod"""
     mass: Annotated[Mass, Positive]
+    """its mass"""
     com: Position = (0.0, 0.0, 0.0)
+    """its centre of mass seen from the node, inertia: about that centre; both in axes of the rod frame"""
     inertia: Inertia = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
@@ -95,72 +91,51 @@ class LumpedMass(Part):
 FRAME_ROTATION = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
-class NodeFrame(Part):
-    """A named frame at a node.
-
-    axes: as of a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod.
-    A pin across the beam needs others, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``.
-    axis: as of a pose, the direction of z alone: ``axis = [0, 0, 1]``.
-    x: position along the rod, at a node.
-    """
+class NodeFrame(TurnedFrame):
+    """A named frame at a node."""
 
     x: Length
+    """position along the rod, at a node"""
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+    """as of a pose, directions in the rod's axes; default: z along the beam (x of the rod), x = y of the rod. A pin
+    across the beam needs others, for a joint turns about z: ``axes = { z = [0, 0, 1], x = [1, 0, 0] }``"""
     axis: Direction | None = None
-
-    @model_validator(mode="after")
-    def _orthogonal_axes(self) -> NodeFrame:
-        given_once(self, ("axes", "axis"))
-        self.orientation()
-        return self
-
-    def orientation(self) -> np.ndarray:
-        """Columns: x, y, z of the frame in rod axes."""
-        if self.axis is not None:
-            return axis_to_matrix(self.axis)
-        return FRAME_ROTATION if self.axes is None else axes_to_matrix(self.axes)
+    """as of a pose, the direction of z alone: ``axis = [0, 0, 1]``"""
+    default: ClassVar[np.ndarray] = FRAME_ROTATION
 
 
-class BeamRecipe(Part):
-    """What all beams have.
+class BeamRecipe(BodyRecipe):
+    """What all beams have."""
 
-    theory: of bending; Euler-Bernoulli has no rotary inertia, Rayleigh has it, Timoshenko has shear too.
-    torsion, extension: degree of the twist and of the axial displacement in an element.
-    pose: of the rod frame in the mesh frame.
-    masses: lumped masses by name.
-    interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
-    title: what the body is, in words.  frames: named frames at nodes.
-    """
-
-    title: str = ""
     theory: Literal["euler-bernoulli", "rayleigh", "timoshenko"] = "rayleigh"
+    """of bending; Euler-Bernoulli has no rotary inertia, Rayleigh has it, Timoshenko has shear too"""
     torsion: Literal["linear", "quadratic"] = "linear"
+    """degree of the twist and of the axial displacement in an element"""
     extension: Literal["linear", "quadratic"] = "linear"
+    """degree of the twist and of the axial displacement in an element"""
     pose: Pose = Pose()
+    """of the rod frame in the mesh frame"""
     masses: dict[str, LumpedMass] = Field(default_factory=dict)
+    """lumped masses by name"""
     frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
-    interfaces: tuple[str, ...] = ()
-
-    @model_validator(mode="after")
-    def _interfaces_are_frames(self) -> BeamRecipe:
-        check_interfaces(self.interfaces, self.frames)
-        return self
+    """named frames at nodes"""
 
 
 class StraightBeamRecipe(BeamRecipe):
-    """A uniform or linearly tapered rod.
-
-    section: gives area and stiffness.  end_section: the one at the far end of a linear taper, of the same type.
-    inertia_section: gives the second moments of the mass; default: `section`.
-    elements: number of elements.  shape: the rod.  material: elastic constants and density.
-    """
+    """A uniform or linearly tapered rod."""
 
     elements: Elements
+    """number of elements"""
     shape: StraightBeam
+    """the rod"""
     material: Isotropic
+    """elastic constants and density"""
     section: StiffnessSection
+    """gives area and stiffness"""
     end_section: StiffnessSection | None = None
+    """the one at the far end of a linear taper, of the same type"""
     inertia_section: InertiaSection | None = None
+    """gives the second moments of the mass; default: `section`"""
 
     @model_validator(mode="after")
     def _sections_fit(self) -> StraightBeamRecipe:
@@ -170,13 +145,12 @@ class StraightBeamRecipe(BeamRecipe):
 
 
 class SegmentedBeamRecipe(BeamRecipe):
-    """A rod whose section changes in steps.
-
-    shape: the rod and its pieces.  material: elastic constants and density.
-    """
+    """A rod whose section changes in steps."""
 
     shape: SegmentedBeam
+    """the rod and its pieces"""
     material: Isotropic
+    """elastic constants and density"""
 
     @model_validator(mode="after")
     def _shear_known(self) -> SegmentedBeamRecipe:

@@ -17,15 +17,84 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
-from skfem import Element
-
-from flexclear.pipeline.structure.fe.line_elements import Hierarchical, LocalHermite
+import numpy as np
+from skfem.element.discrete_field import DiscreteField
+from skfem.element.element import Element
+from skfem.element.element_h1 import ElementH1
+from skfem.refdom import RefLine
 
 #: unknowns of a node in scikit-fem's order, as indices of ux uy uz rx ry rz, with sign: ry = -slope of w
 NODE_COMPONENT = (0, 3, 1, 5, 2, 4)
 NODE_SIGN = (1.0, 1.0, 1.0, 1.0, 1.0, -1.0)
+
+
+#: ascending power coefficients on [0, 1] of: value at 0, slope at 0, value at 1, slope at 1
+HERMITE = np.array([[1.0, 0.0, -3.0, 2.0], [0.0, 1.0, -2.0, 1.0], [0.0, 0.0, 3.0, -2.0], [0.0, 0.0, -1.0, 1.0]])
+
+
+class LocalHermite(Element):
+    """Cubic: deflection and slope at both ends; nodal unknowns u and du/dx, evaluated in the cell's own coordinate.
+
+    scikit-fem's `ElementLineHermite` inverts a Vandermonde matrix in global coordinates: the stiffness is wrong by
+    3e-11 (12 cells), 5e-9 (64) and 5e-7 (256) relative on a rod that starts at the origin, and a second mesh silently
+    reuses the first one's inverse. This one is exact to rounding and keeps nothing.
+    """
+
+    nodal_dofs = 2
+    maxdeg = 3
+    dofnames: ClassVar[list[str]] = ["u", "u_x"]
+    doflocs = np.array([[0.0], [0.0], [1.0], [1.0]])
+    refdom = RefLine
+
+    def gbasis(self, mapping: Any, X: np.ndarray, i: int, tind: np.ndarray | None = None) -> tuple[DiscreteField]:
+        """Basis function i with first and second derivative at local points X, shape (1, points)."""
+        h = mapping.detDF(X, tind)  # (cells, points): the length of each cell, signed
+        scale = np.ones_like(h) if i % 2 == 0 else h
+        s = np.broadcast_to(X[0], h.shape)
+        value, slope, curvature = (_at(HERMITE[i], s, order) for order in range(3))
+        return (
+            DiscreteField(
+                value=scale * value,
+                grad=(scale * slope / h)[None],
+                hess=(scale * curvature / h**2)[None, None],
+            ),
+        )
+
+
+#: ascending power coefficients on [0, 1]: both nodal functions, then the bubbles 4 s (1-s) and 8 s (1-s) (2s-1)
+BUBBLES = (
+    np.array([1.0, -1.0]),
+    np.array([0.0, 1.0]),
+    np.array([0.0, 4.0, -4.0]),
+    np.array([0.0, -8.0, 24.0, -16.0]),
+)
+
+
+class Hierarchical(ElementH1):
+    """Continuous, of degree one to three: values at both ends and, inside, `degree` - 1 bubbles that vanish there.
+
+    With bubbles, a field that is linear along the rod, as in every rigid motion, is given by its nodal values alone.
+    scikit-fem's own hierarchical element keeps the values of its last call; this one keeps nothing.
+    """
+
+    nodal_dofs = 1
+    refdom = RefLine
+
+    def __init__(self, degree: int) -> None:
+        self.interior_dofs = degree - 1
+        self.maxdeg = degree
+        self.dofnames = ["u"] + ["bubble"] * (degree - 1)
+        self.doflocs = np.array([[0.0], [1.0]] + [[np.nan]] * (degree - 1))
+
+    def lbasis(self, X: np.ndarray, i: int) -> tuple[Any, Any]:
+        """Function i and its derivative at local points X, shape (1, points)."""
+        return _at(BUBBLES[i], X[0]), _at(BUBBLES[i], X[0], 1)[None]
+
+
+def _at(coefficients: np.ndarray, s: np.ndarray, order: int = 0) -> np.ndarray:
+    return np.polynomial.polynomial.polyval(s, np.polynomial.polynomial.polyder(coefficients, order))
 
 
 @dataclass(frozen=True)

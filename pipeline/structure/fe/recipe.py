@@ -8,9 +8,8 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from flexclear.pipeline.core.scene.file_kinds import RECIPE, require_kind
 from flexclear.pipeline.core.scene.json_schema import identified
-from flexclear.pipeline.core.scene.load import read_toml
+from flexclear.pipeline.core.scene.load import RECIPE, read_toml, require_kind
 from flexclear.pipeline.core.scene.registry import suggestion
 from flexclear.pipeline.core.scene.validation_errors import input_errors
 from flexclear.pipeline.core.system.errors import InputError

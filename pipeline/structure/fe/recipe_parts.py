@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from flexclear.pipeline.core.scene.fields import Density, Direction, Number, Part, Pose, Pressure, given_once
+from flexclear.pipeline.core.numerics.rotations import axes_to_matrix, axis_to_matrix
+from flexclear.pipeline.core.scene.fields import Density, Direction, Number, Part, Pressure, given_once
 from flexclear.pipeline.core.scene.registry import suggestion
 
 Positive = Field(gt=0.0)
 
 
 class Isotropic(Part):
-    """A linear elastic, isotropic material.
-
-    density: mass density.  youngs_modulus: Young's modulus.  poisson: Poisson's ratio.
-    """
+    """A linear elastic, isotropic material."""
 
     density: Annotated[Density, Positive]
+    """mass density"""
     youngs_modulus: Annotated[Pressure, Positive]
+    """Young's modulus"""
     poisson: Annotated[Number, Field(gt=-1.0, lt=0.5)]
+    """Poisson's ratio"""
 
     @property
     def shear_modulus(self) -> float:
@@ -30,13 +31,13 @@ class Isotropic(Part):
 
 
 class TurnedFrame(Part):
-    """A named frame with axes of its own, as of a pose (`axes`, or `axis` for z alone); default: the mesh's.
-
-    axes: as of a pose.  axis: as of a pose, the direction of z alone.
-    """
+    """A named frame with axes of its own, as of a pose (`axes`, or `axis` for z alone); default: the mesh's."""
 
     axes: dict[str, Direction] | tuple[Direction, Direction, Direction] | None = None
+    """as of a pose"""
     axis: Direction | None = None
+    """as of a pose, the direction of z alone"""
+    default: ClassVar[np.ndarray] = np.eye(3)
 
     @model_validator(mode="after")
     def _orthogonal_axes(self) -> TurnedFrame:
@@ -44,15 +45,28 @@ class TurnedFrame(Part):
         self.orientation()
         return self
 
-    def orientation(self) -> Pose:
-        """The orientation as a pose at the origin."""
-        return Pose(axes=self.axes, axis=self.axis)
+    def orientation(self) -> np.ndarray:
+        """Columns: x, y, z of the frame in those of the mesh."""
+        if self.axis is not None:
+            return axis_to_matrix(self.axis)
+        return self.default if self.axes is None else axes_to_matrix(self.axes)
 
 
-def check_interfaces(interfaces: tuple[str, ...], frames: Mapping[str, object]) -> None:
-    """ValueError unless every interface is a frame of the recipe, named once."""
-    for name in interfaces:
-        if name not in frames:
-            raise ValueError(f"interface '{name}' is no frame of the recipe; {suggestion(name, frames)}")
-    if len(set(interfaces)) < len(interfaces):
-        raise ValueError(f"interfaces {list(interfaces)} name a frame twice")
+class BodyRecipe(Part):
+    """What recipes of all bodies say."""
+
+    title: str = ""
+    """what the body is, in words"""
+    frames: Annotated[dict[str, Any], Field(min_length=1)]
+    """named frames"""
+    interfaces: tuple[str, ...] = ()
+    """frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis"""
+
+    @model_validator(mode="after")
+    def _interfaces_are_frames(self) -> BodyRecipe:
+        for name in self.interfaces:
+            if name not in self.frames:
+                raise ValueError(f"interface '{name}' is no frame of the recipe; {suggestion(name, self.frames)}")
+        if len(set(self.interfaces)) < len(self.interfaces):
+            raise ValueError(f"interfaces {list(self.interfaces)} name a frame twice")
+        return self

@@ -42,8 +42,7 @@ class Section:
 
 def circle(radius: Value) -> Section:
     """Full circle; radius [m]."""
-    area, second = math.pi * radius**2, math.pi * radius**4 / 4.0
-    return Section(area, 2.0 * second, second, second)
+    return tube(radius, 0.0)
 
 
 def tube(radius: Value, inner_radius: Value) -> Section:
@@ -81,16 +80,8 @@ def rectangle_torsion(width: Value, height: Value) -> Value:
     return torsion if np.ndim(torsion) else float(torsion)
 
 
-def circle_shear_coefficient(poisson: float) -> float:
-    """Shear coefficient of a full circle, ``6 (1 + nu) / (7 + 6 nu)``.
-
-    Source: Cowper (1966), J. Appl. Mech. 33, 335-340.
-    """
-    return 6.0 * (1.0 + poisson) / (7.0 + 6.0 * poisson)
-
-
 def tube_shear_coefficient(poisson: float, ratio: Value) -> Value:
-    """Shear coefficient of a tube with the inner over the outer radius m = `ratio`.
+    """Shear coefficient of a tube with the inner over the outer radius m = `ratio`, which is 0 for a full circle.
 
     ``6 (1 + nu) (1 + m^2)^2 / [(7 + 6 nu) (1 + m^2)^2 + (20 + 12 nu) m^2]``.
     Source: Cowper (1966), J. Appl. Mech. 33, 335-340.

@@ -33,26 +33,25 @@ ShearCoefficient = Annotated[
 
 
 class CircleSection(Part):
-    """Full circle.  shear_coefficient: kappa instead of Cowper's (1966).
-
-    radius: of the circle.
-    """
+    """Full circle."""
 
     type: Literal["circle"]
     radius: Annotated[Length, Positive]
+    """of the circle"""
     shear_coefficient: ShearCoefficient | None = None
+    """kappa instead of Cowper's (1966)"""
 
 
 class TubeSection(Part):
-    """Circular tube; `inner_radius` is that of the hole.
-
-    radius, inner_radius: of the outer circle and of the hole.  shear_coefficient: kappa instead of Cowper's (1966).
-    """
+    """Circular tube; `inner_radius` is that of the hole."""
 
     type: Literal["tube"]
     radius: Annotated[Length, Positive]
+    """of the outer circle and of the hole"""
     inner_radius: Annotated[Length, Positive]
+    """of the outer circle and of the hole"""
     shear_coefficient: ShearCoefficient | None = None
+    """kappa instead of Cowper's (1966)"""
 
     @model_validator(mode="after")
     def _has_a_wall(self) -> TubeSection:
@@ -64,34 +63,35 @@ class TubeSection(Part):
 
 
 class RectangleSection(Part):
-    """Full rectangle, `width` along y and `height` along z of the rod.
-
-    width, height: along y and along z of the rod.  shear_coefficient: kappa instead of Cowper's (1966).
-    """
+    """Full rectangle, `width` along y and `height` along z of the rod."""
 
     type: Literal["rectangle"]
     width: Annotated[Length, Positive]
+    """along y and along z of the rod"""
     height: Annotated[Length, Positive]
+    """along y and along z of the rod"""
     shear_coefficient: ShearCoefficient | None = None
+    """kappa instead of Cowper's (1966)"""
 
 
 class GeneralSection(Part):
-    """Any section by its constants about the centroid, which is its shear centre too.
-
-    second_y: int z^2 dA.  second_z: int y^2 dA.  product: int y z dA.  torsion: St. Venant's J.
-    inertia: polar and bending second moments of the mass [about x, y, z], where they are not those of the area.
-    shear_coefficient: kappa, one number or [along y, along z]; needed by Timoshenko beams only.
-    area: of the section.
-    """
+    """Any section by its constants about the centroid, which is its shear centre too."""
 
     type: Literal["general"]
     area: Annotated[Area, Positive]
+    """of the section"""
     torsion: Annotated[SecondMoment, Positive]
+    """St. Venant's J"""
     second_y: Annotated[SecondMoment, Positive]
+    """int z^2 dA"""
     second_z: Annotated[SecondMoment, Positive]
+    """int y^2 dA"""
     product: SecondMoment = 0.0
+    """int y z dA"""
     inertia: tuple[Annotated[SecondMoment, Positive], SecondMoment, SecondMoment] | None = None
+    """polar and bending second moments of the mass [about x, y, z], where they are not those of the area"""
     shear_coefficient: ShearCoefficient | None = None
+    """kappa, one number or [along y, along z]; needed by Timoshenko beams only"""
 
     @model_validator(mode="after")
     def _moments_are_of_an_area(self) -> GeneralSection:
@@ -155,13 +155,11 @@ def shear_coefficient(start: Any, end: Any | None, s: Value, poisson: float) -> 
     """Kappa along y and z, None where nobody says it."""
     if start.shear_coefficient is not None or start.type == "general":
         return start.shear_coefficient
-    if start.type == "tube":
-        outer, inner = _dimensions(start, end, s)
-        kappa: Value = sections.tube_shear_coefficient(poisson, inner / outer)
-    elif start.type == "circle":
-        kappa = sections.circle_shear_coefficient(poisson)
+    if start.type == "rectangle":
+        kappa: Value = sections.rectangle_shear_coefficient(poisson)
     else:
-        kappa = sections.rectangle_shear_coefficient(poisson)
+        outer, *inner = _dimensions(start, end, s)
+        kappa = sections.tube_shear_coefficient(poisson, inner[0] / outer if inner else 0.0)
     return kappa, kappa
 
 

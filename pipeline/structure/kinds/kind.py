@@ -20,13 +20,6 @@ FAMILY = "flexclear.pipeline.structure.kinds"
 PLACE = "mesh recipe"
 
 
-def no_closed_form(
-    mesh: xr.Dataset, reference: str, families: list[str], interfaces: tuple[str, ...]
-) -> dict[str, np.ndarray]:
-    """The closed-form frequencies of a kind that has none."""
-    return {}
-
-
 @dataclass(frozen=True)
 class Kind:
     """Functions of one kind of body.
@@ -36,14 +29,14 @@ class Kind:
     assemble: the mesh dataset to matrices.
     words: what each mode does, in a word, from its family and vectors of shape (ndof, n).
     exact: closed-form frequencies [Hz] next to those of a reference condition, by variable, from the modes'
-        families and the interfaces' names.
+        families and the interfaces' names; None where there are none.
     """
 
     build: Callable[[Any, Path, str], xr.Dataset]
     vtu: Callable[[xr.Dataset], bytes]
     assemble: Callable[[xr.Dataset], Model]
     words: Callable[[Model, list[str], np.ndarray], list[str]]
-    exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]] = no_closed_form
+    exact: Callable[[xr.Dataset, str, list[str], tuple[str, ...]], dict[str, np.ndarray]] | None = None
 
 
 def name_of(recipe: Mapping[str, Any]) -> str:

@@ -58,9 +58,10 @@ def build(body: Body, requested: ModeRequest) -> Basis:
     static = _static(body)
     free = available(body.model, body.condition)
     if requested.count is not None or requested == ModeRequest():
-        request = select.request(requested.count, free, static.shape[1])
-        modes = body.normal(request.solve) if request.normal else _none(body.model)
-        return _joined(body, static, modes, select.whole(modes.values, request))
+        count = select.request(requested.count, free, static.shape[1])
+        none = Normal(np.empty(0), np.empty((body.model.size, 0)), np.empty(0))
+        modes = body.normal(min(count + select.MARGIN, free)) if count else none
+        return _joined(body, static, modes, select.whole(modes.values, count, static.shape[1]))
     tried = FIRST
     while True:
         modes = body.normal(min(tried, free))
@@ -80,10 +81,6 @@ def available(model: Model, condition: Condition) -> int:
     """Number of normal modes of a mesh under a reference condition."""
     held = condition.held.shape[0]
     return model.size - (held or 6) - (0 if held else condition.loaded.shape[0])
-
-
-def _none(model: Model) -> Normal:
-    return Normal(np.empty(0), np.empty((model.size, 0)), np.empty(0))
 
 
 def _static(body: Body) -> np.ndarray:

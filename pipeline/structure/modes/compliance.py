@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from flexclear.pipeline.core.artifacts.compliance import DIRECTIONS, fractions, reduced
@@ -12,27 +10,16 @@ from flexclear.pipeline.structure.modes.condition import in_own_axes
 from flexclear.pipeline.structure.modes.statics import Flexibility
 
 
-@dataclass(frozen=True)
-class Frames:
-    """Motion of p frames in their own axes.
-
-    motion: functionals, shape (6 p, ndof).  rigid: under the six rigid motions, shape (p, 6, 6).
-    """
-
-    motion: np.ndarray
-    rigid: np.ndarray
-
-
-def frames(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> Frames:
-    """Functionals of the frames and their rigid motion."""
+def frames(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Motion of p frames in their own axes: functionals, (6 p, ndof), and under the six rigid motions, (p, 6, 6)."""
     motion = np.vstack([in_own_axes(frame).toarray() for frame in interfaces])
-    return Frames(motion, (motion @ flexibility.model.rigid).reshape(-1, 6, 6))
+    return motion, (motion @ flexibility.model.rigid).reshape(-1, 6, 6)
 
 
 def full(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> np.ndarray:
     """Compliance [m/N, rad/(N m)] of each frame with each held (or, with itself, nothing), shape (p, p, 6)."""
-    at, p = frames(flexibility, interfaces), len(interfaces)
-    loads = np.hstack([at.motion.T, flexibility.momentum])
+    (motion, rigid), p = frames(flexibility, interfaces), len(interfaces)
+    loads = np.hstack([motion.T, flexibility.momentum])
     gram = loads.T @ flexibility.response(loads)
     result = np.empty((p, p, 6))
     for i in range(p):
@@ -41,22 +28,22 @@ def full(flexibility: Flexibility, interfaces: tuple[Interface, ...]) -> np.ndar
             balance = np.zeros((6 * p + 6, 6))
             balance[6 * i : 6 * i + 6] = np.eye(6)
             if i == j:
-                balance[6 * p :] = -np.linalg.solve(flexibility.inertia, at.rigid[i].T)
+                balance[6 * p :] = -np.linalg.solve(flexibility.inertia, rigid[i].T)
             else:
-                balance[6 * j : 6 * j + 6] = -np.linalg.solve(at.rigid[j].T, at.rigid[i].T)
+                balance[6 * j : 6 * j + 6] = -np.linalg.solve(rigid[j].T, rigid[i].T)
             result[i, j] = np.einsum("ad,ab,bd->d", balance, gram, balance)
     return result
 
 
 def of_basis(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> np.ndarray:
     """Compliance that shapes of (ndof, n) can show, likewise; any combination and scale of them."""
-    at = frames(flexibility, interfaces)
+    functionals, rigid = frames(flexibility, interfaces)
     K = vectors.T @ (flexibility.model.stiffness @ vectors)
     relief = np.linalg.solve(flexibility.inertia, flexibility.momentum.T @ vectors)
     scale = 1.0 / np.sqrt(np.diag(K))
     inner = scale[:, None] * (0.5 * (K + K.T)) * scale
-    motion = (at.motion @ (vectors * scale)).reshape(len(interfaces), 6, -1)
-    return reduced(motion, at.rigid, relief * scale, inner)
+    motion = (functionals @ (vectors * scale)).reshape(len(interfaces), 6, -1)
+    return reduced(motion, rigid, relief * scale, inner)
 
 
 def least(flexibility: Flexibility, interfaces: tuple[Interface, ...], vectors: np.ndarray) -> tuple[float, str]:

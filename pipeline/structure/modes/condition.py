@@ -54,12 +54,17 @@ def holding(held: sp.csr_array, note: str, moved: np.ndarray | None = None) -> C
     return Condition(held, note, np.empty(0, dtype=int) if moved is None else moved, none)
 
 
-def floating(model: Model, note: str, loaded: sp.csr_array | None = None, *, residual: bool = False) -> Condition:
+def floating(model: Model, note: str, loaded: sp.csr_array | None = None) -> Condition:
     """Normal modes of the free body without rigid ones, and attachment modes for `loaded` functionals."""
     none = sp.csr_array((0, model.size))
-    return Condition(
-        none, note, np.empty(0, dtype=int), none if loaded is None else loaded, residual=residual, mean_axes=True
-    )
+    return Condition(none, note, np.empty(0, dtype=int), none if loaded is None else loaded, mean_axes=True)
+
+
+def joined(given: Given, count: int, needs: str) -> tuple[Interface, ...]:
+    """The interfaces, of which a condition needs so many; InputError where there are fewer.  needs: in words."""
+    if len(given.interfaces) < count:
+        raise InputError("modes.interfaces", needs, "name the recipe's frames")
+    return given.interfaces
 
 
 def functional(frames: tuple[Interface, ...], name: str) -> sp.csr_array:

@@ -76,7 +76,7 @@ def bounds(flexibility: Flexibility, vectors: np.ndarray, hertz: np.ndarray, fir
     model = flexibility.model
     basis = np.hstack([model.rigid, vectors])
     K, M = model.stiffness @ basis, model.mass @ basis
-    loads = compliance.frames(flexibility, model.interfaces).motion.T
+    loads = compliance.frames(flexibility, model.interfaces)[0].T
     result = np.empty((loads.shape[1], len(hertz)))
     for k, value in enumerate(hertz):
         square = (2.0 * np.pi * value) ** 2

@@ -32,27 +32,13 @@ class ModeRequest:
     mass: float | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Request:
-    """How many normal modes a basis of `count` coordinates needs, of `available` ones.
+def request(count: int | None, available: int, static: int = 0) -> int:
+    """How many normal modes, of `available` ones, a basis of `count` coordinates needs; None asks for all.
 
-    static: constraint modes that the count includes.
+    static: constraint modes that the count includes.  InputError for a count that the mesh cannot give.
     """
-
-    normal: int
-    available: int
-    static: int = 0
-
-    @property
-    def solve(self) -> int:
-        """Number of modes to compute."""
-        return min(self.normal + MARGIN, self.available)
-
-
-def request(count: int | None, available: int, static: int = 0) -> Request:
-    """Check a count (None: all) against what the mesh can give; InputError otherwise."""
     if count is None:
-        return Request(available, available, static)
+        return available
     total = available + static
     if count > total:
         raise InputError(
@@ -62,23 +48,23 @@ def request(count: int | None, available: int, static: int = 0) -> Request:
     if count < least:
         reason = f": the {static} constraint modes of its interfaces belong to it" if static else ""
         raise InputError(WHERE, f"a basis of {count} modes is too small{reason}", f"ask for at least {least}")
-    return Request(count - static, available, static)
+    return count - static
 
 
-def whole(values: np.ndarray, requested: Request) -> int:
-    """`requested.normal`, or InputError when it would keep a part of a cluster of equal frequencies.
+def whole(values: np.ndarray, n: int, static: int = 0) -> int:
+    """The number n of retained modes, or InputError when it would keep a part of a cluster of equal frequencies.
 
     values: ascending eigenvalues [rad^2/s^2] of the normal modes, more than are retained unless there are no more.
+    static: as of `request`.
     """
-    n = requested.normal
     for start, stop in clusters(values):
         if start < n < stop:
-            counts = [c + requested.static for c in (start, stop) if c + requested.static > 0]
+            counts = [c + static for c in (start, stop) if c + static > 0]
             hertz = float(frequency(values[start : start + 1])[0])
             nearest = f"count is {counts[0]}" if len(counts) == 1 else f"counts are {counts[0]} and {counts[1]}"
             raise InputError(
                 WHERE,
-                f"{n + requested.static} modes cut a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz",
+                f"{n + static} modes cut a cluster of {stop - start} equal frequencies at {hertz:.6g} Hz",
                 f"the nearest whole {nearest}",
             )
     return n

@@ -14,7 +14,7 @@ from flexclear.pipeline.core.scene.registry import lookup, suggestion
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import Progress, silent
 from flexclear.pipeline.structure.fe.model import Interface, Model
-from flexclear.pipeline.structure.kinds.kind import Kind, of_mesh
+from flexclear.pipeline.structure.kinds.kind import of_mesh
 from flexclear.pipeline.structure.modes import basis, deficits, eigen, orient, select
 from flexclear.pipeline.structure.modes.condition import Condition, Given, check
 from flexclear.pipeline.structure.modes.select import ModeRequest
@@ -63,10 +63,10 @@ def solve(
     vectors = orient.orient(model, values, vectors)
     families = orient.family(model, vectors)
     vectors = orient.signed(model, vectors, families)
-    data = _variables(model, values, vectors) | _words(kind, model, families, vectors)
-    data |= {
-        theory: (("mode",), hertz) for theory, hertz in kind.exact(mesh, reference, families, tuple(names)).items()
-    }
+    data = _variables(model, values, vectors)
+    data["kind"] = (("mode",), np.array(kind.words(model, families, vectors)))
+    exact = kind.exact(mesh, reference, families, names) if kind.exact is not None else {}
+    data |= {theory: (("mode",), hertz) for theory, hertz in exact.items()}
     if shapes.rigid_frequency.size:
         data["rigid_frequency"] = (("rigid_mode",), shapes.rigid_frequency)
     lacks, attributes = deficits.measure(flexibility(), vectors, progress)
@@ -116,7 +116,3 @@ def _variables(model: Model, values: np.ndarray, vectors: np.ndarray) -> dict[st
         "dof": (("dof",), ["ux", "uy", "uz", "rx", "ry", "rz"]),
         "frame": (("frame",), [frame.name for frame in model.interfaces]),
     }
-
-
-def _words(kind: Kind, model: Model, families: list[str], vectors: np.ndarray) -> dict[str, Any]:
-    return {"kind": (("mode",), np.array(kind.words(model, families, vectors)))}

@@ -39,11 +39,6 @@ class Factor:
     order: np.ndarray
     blocks: tuple[Block, ...]
 
-    @property
-    def entries(self) -> int:
-        """Stored numbers."""
-        return sum(block.diagonal.size + block.under.size for block in self.blocks)
-
     def smallest_pivot(self, diagonal: np.ndarray) -> float:
         """Least pivot as a fraction of the matrix' own `diagonal`, shape (n,); rounding when the matrix is singular."""
         pivots = np.concatenate([np.diag(block.diagonal) for block in self.blocks]) ** 2
@@ -135,15 +130,13 @@ def _under(diagonal: np.ndarray, front: Front) -> np.ndarray:
     return under
 
 
-def negative_pivots(
-    matrix: sp.csr_array, positions: np.ndarray, last: int = 0, tell: Tell = lambda fraction: None
-) -> int:
+def negative_pivots(matrix: sp.csr_array, positions: np.ndarray, last: int = 0) -> int:
     """Number of negative eigenvalues of a symmetric matrix, by Sylvester's law of inertia.
 
     last: this many last rows are eliminated last, since they have no diagonal entry of their own.
     """
     tree = dissect(matrix, positions, last)
-    return sum(_eliminate(front) for front in _fronts(matrix, tree, tell))
+    return sum(_eliminate(front) for front in _fronts(matrix, tree, lambda fraction: None))
 
 
 def _eliminate(front: Front) -> int:

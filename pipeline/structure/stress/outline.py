@@ -44,9 +44,12 @@ class Outline:
 def outline(types: tuple[str, ...], given: Section, poisson: float) -> Outline | None:
     """The maps of a section with these constants that is of one of `types`; None where it has no known outline."""
     for name in types:
-        recovered = _OUTLINES[name](given, poisson, len(types) > 1) if name in _OUTLINES else None
-        if recovered is not None:
-            return recovered
+        lengths = _LENGTHS[name](given) if name in _LENGTHS else None
+        if lengths is None:
+            continue
+        made = getattr(sections, name)(*lengths)
+        if len(types) == 1 or _is(made, given):
+            return _sides(made, *lengths) if name == "rectangle" else _round(made, *lengths, poisson=poisson)
     return None
 
 
@@ -55,37 +58,28 @@ def _is(made: Section, given: Section) -> bool:
     return bool(np.all(np.abs(a - b) <= SAME * b))
 
 
-def _circle(given: Section, poisson: float, checked: bool) -> Outline | None:
-    radius = math.sqrt(given.area / math.pi)
-    made = sections.circle(radius)
-    return None if checked and not _is(made, given) else _round(made, radius, 0.0, poisson)
-
-
-def _tube(given: Section, poisson: float, checked: bool) -> Outline | None:
+def _tube(given: Section) -> tuple[float, float] | None:
     # A = pi (R^2 - r^2) and I = A (R^2 + r^2) / 4
     total, difference = float(4.0 * given.second_y / given.area), float(given.area / math.pi)
     if difference >= total:
         return None
-    radius, inner = math.sqrt(0.5 * (total + difference)), math.sqrt(0.5 * (total - difference))
-    made = sections.tube(radius, inner)
-    return None if checked and not _is(made, given) else _round(made, radius, inner, poisson)
+    return math.sqrt(0.5 * (total + difference)), math.sqrt(0.5 * (total - difference))
 
 
-def _rectangle(given: Section, poisson: float, checked: bool) -> Outline | None:
+def _rectangle(given: Section) -> tuple[float, float]:
     ratio = math.sqrt(given.second_z / given.second_y)
-    width, height = math.sqrt(given.area * ratio), math.sqrt(given.area / ratio)
-    made = sections.rectangle(width, height)
-    return None if checked and not _is(made, given) else _sides(made, width, height)
+    return math.sqrt(given.area * ratio), math.sqrt(given.area / ratio)
 
 
-_OUTLINES: dict[str, Callable[[Section, float, bool], Outline | None]] = {
-    "circle": _circle,
+#: lengths of a section of a type with given constants, as `fe.section` takes them; None where there is none
+_LENGTHS: dict[str, Callable[[Section], tuple[float, ...] | None]] = {
+    "circle": lambda given: (math.sqrt(given.area / math.pi),),
     "tube": _tube,
     "rectangle": _rectangle,
 }
 
 
-def _round(made: Section, radius: float, inner: float, poisson: float) -> Outline:
+def _round(made: Section, radius: float, inner: float = 0.0, *, poisson: float) -> Outline:
     angle = 2.0 * math.pi * np.arange(AROUND) / AROUND
     ring = np.stack([np.cos(angle), np.sin(angle)])
     y, z = np.concatenate([radius * ring, inner * ring if inner else np.zeros((2, 1))], axis=1)

@@ -5,8 +5,4 @@ Each module has the kernels ``force(depth, rate, impact_rate, law) -> (elastic, 
 """
 
 KIND = "form of a normal law"
-NAMES = {
-    "elastic": "elastic:force",
-    "hysteretic": "hysteretic:force",
-    "linear-damper": "linear_damper:force",
-}
+NAMES = {"elastic": "elastic", "hysteretic": "hysteretic", "linear-damper": "linear_damper"}

@@ -9,8 +9,7 @@ Source: Ambrosio (2003), Virtual Nonlinear Multibody Systems, NATO ASI 103, 57-8
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.scene import clearance
-from flexclear.pipeline.dynamics.contact.friction.memoryless import sliding
+from flexclear.pipeline.dynamics.contact.friction.law import Friction, sliding
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
@@ -20,31 +19,8 @@ def coefficient(speed, p):
     return p[0] * min(1.0, max(0.0, (speed - p[1]) / (p[2] - p[1])))
 
 
-traction = sliding(coefficient)
-
-
-class Ambrosio:
-    """See the module's text."""
-
-    coefficient = staticmethod(coefficient)
-    traction = staticmethod(traction)
-
-    @staticmethod
-    def parameters(law: clearance.Ambrosio) -> tuple[float, ...]:
-        """mu_d [-], v_0, v_1 [m/s], and three unused numbers."""
-        return (law.dynamic, law.v0, law.v1, 0.0, 0.0, 0.0)
-
-    @staticmethod
-    def stick_speed(law: clearance.Ambrosio) -> float:
-        """The law has no regime of sticking."""
-        return 0.0
-
-    @staticmethod
-    def kinks(law: clearance.Ambrosio) -> tuple[float, float]:
-        """v_0, v_1 [m/s]: the coefficient's slope jumps."""
-        return (law.v0, law.v1)
-
-    @staticmethod
-    def bristle(law: clearance.Ambrosio) -> float | None:
-        """No memory."""
-        return None
+LAW = Friction(
+    sliding(coefficient),
+    constants=lambda law: (law.dynamic, law.v0, law.v1),
+    kinks=lambda law: (law.v0, law.v1),  # the coefficient's slope jumps
+)

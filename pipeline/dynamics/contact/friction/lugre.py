@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.scene import clearance
+from flexclear.pipeline.dynamics.contact.friction.law import Friction
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import add, dot, scale, sub
 
@@ -36,7 +36,10 @@ def damping_share(elastic, damping, limit):
 
 @kernel
 def traction(z, slip, f_n, p):
-    """Force, loss, stored energy and rate of the bristles; p = (mu_s, mu_d, v_S, sigma_0, sigma_1, sigma_2)."""
+    """Force, loss, stored energy and rate of the bristles.
+
+    p: mu_s, mu_d [-], v_S [m/s], sigma_0 [1/m], sigma_1, sigma_2 [s/m].
+    """
     square = dot(slip, slip)
     fading = np.exp(-square / (p[2] * p[2]))
     relaxing = p[3] * np.sqrt(square) / (p[1] + (p[0] - p[1]) * fading)
@@ -50,27 +53,12 @@ def traction(z, slip, f_n, p):
     return force, max(0.0, loss), 0.5 * p[3] * f_n * dot(z, z), z_rate
 
 
-class LuGre:
-    """See the module's text."""
-
-    traction = staticmethod(traction)
-
-    @staticmethod
-    def parameters(law: clearance.LuGre) -> tuple[float, ...]:
-        """mu_s, mu_d [-], v_S [m/s], sigma_0 [1/m], sigma_1, sigma_2 [s/m]."""
-        return (law.static, law.dynamic, law.v_stribeck, law.bristle_stiffness, law.bristle_damping, law.viscous)
-
-    @staticmethod
-    def stick_speed(law: clearance.LuGre) -> float:
-        """v_S [m/s]: far below it the bristles carry the load, far above they slip."""
-        return law.v_stribeck
-
-    @staticmethod
-    def kinks(law: clearance.LuGre) -> tuple[float, float]:
-        """The law is smooth."""
-        return (0.0, 0.0)
-
-    @staticmethod
-    def bristle(law: clearance.LuGre) -> float | None:
-        """Largest deflection [m], mu_s / sigma_0."""
-        return law.static / law.bristle_stiffness
+LAW = Friction(
+    traction,
+    constants=lambda law: (
+        *(law.static, law.dynamic, law.v_stribeck),
+        *(law.bristle_stiffness, law.bristle_damping, law.viscous),
+    ),
+    stick_speed=lambda law: law.v_stribeck,  # far below it the bristles carry the load, far above they slip
+    bristle=lambda law: law.static / law.bristle_stiffness,
+)

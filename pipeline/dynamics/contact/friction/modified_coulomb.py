@@ -12,8 +12,7 @@ Source: Wang & Wang (2019), eqs. (27)-(29).
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.scene import clearance
-from flexclear.pipeline.dynamics.contact.friction.memoryless import sliding
+from flexclear.pipeline.dynamics.contact.friction.law import Friction, sliding
 from flexclear.pipeline.dynamics.kernels import kernel
 
 
@@ -32,31 +31,9 @@ def coefficient(speed, p):
     return 0.5 * p[0] * y * (3.0 - y * y)
 
 
-traction = sliding(coefficient)
-
-
-class ModifiedCoulomb:
-    """See the module's text."""
-
-    coefficient = staticmethod(coefficient)
-    traction = staticmethod(traction)
-
-    @staticmethod
-    def parameters(law: clearance.ModifiedCoulomb) -> tuple[float, ...]:
-        """mu_s, mu_d [-], v_s, v_d [m/s], and two unused numbers."""
-        return (law.static, law.dynamic, law.v_static, law.v_dynamic, 0.0, 0.0)
-
-    @staticmethod
-    def stick_speed(law: clearance.ModifiedCoulomb) -> float:
-        """v_s [m/s]."""
-        return law.v_static
-
-    @staticmethod
-    def kinks(law: clearance.ModifiedCoulomb) -> tuple[float, float]:
-        """v_s, v_d [m/s]: the coefficient's curvature jumps."""
-        return (law.v_static, law.v_dynamic)
-
-    @staticmethod
-    def bristle(law: clearance.ModifiedCoulomb) -> float | None:
-        """No memory."""
-        return None
+LAW = Friction(
+    sliding(coefficient),
+    constants=lambda law: (law.static, law.dynamic, law.v_static, law.v_dynamic),
+    stick_speed=lambda law: law.v_static,
+    kinks=lambda law: (law.v_static, law.v_dynamic),  # the coefficient's curvature jumps
+)

@@ -1,13 +1,13 @@
 """Normal contact laws. To add one: a module here, a line below, and a case in tests/properties/test_dynamics_laws.
 
-Each module has a `LAW` with its own ``exponent`` and with ``resolve(law, stiffness, mass) -> Resolved``
+Each is a module, or the `LAW` in it, with its own ``exponent`` and with ``resolve(law, stiffness, mass) -> Resolved``
 (see `contact.law`): the numbers for one of the compiled forms in `contact.form`, and the
 restitution that a free impact gets.
 """
 
 KIND = "normal law"
 NAMES = {
-    "hertz": "hertz:LAW",
+    "hertz": "hertz",
     "hunt-crossley": "hunt_crossley:LAW",
     "herbert-mcwhannell": "herbert_mcwhannell:LAW",
     "lee-wang": "lee_wang:LAW",
@@ -17,5 +17,5 @@ NAMES = {
     "hu-guo": "hu_guo:LAW",
     "zhiying-qishao": "zhiying_qishao:LAW",
     "carvalho-martins": "carvalho_martins:LAW",
-    "kelvin-voigt": "kelvin_voigt:LAW",
+    "kelvin-voigt": "kelvin_voigt",
 }

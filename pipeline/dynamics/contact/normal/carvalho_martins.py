@@ -11,10 +11,6 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
-
-def factor(c_r: float) -> float:
-    """Factor a of the damping for the coefficient of restitution c_r asked for."""
-    return 1.5 * (1.0 - c_r) * (11.0 - c_r) / (1.0 + 9.0 * c_r)
-
-
-LAW = Hysteresis("carvalho-martins", factor, valid=(0.03, 1.0))
+LAW = Hysteresis(
+    "carvalho-martins", lambda c_r: 1.5 * (1.0 - c_r) * (11.0 - c_r) / (1.0 + 9.0 * c_r), valid=(0.03, 1.0)
+)

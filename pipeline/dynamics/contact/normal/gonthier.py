@@ -11,10 +11,4 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
-
-def factor(c_r: float) -> float:
-    """Factor a of the damping for the coefficient of restitution c_r asked for."""
-    return (1.0 - c_r**2) / c_r
-
-
-LAW = Hysteresis("gonthier", factor, valid=(0.0, 1.0))
+LAW = Hysteresis("gonthier", lambda c_r: (1.0 - c_r**2) / c_r, valid=(0.0, 1.0))

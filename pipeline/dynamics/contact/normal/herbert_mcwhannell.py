@@ -11,10 +11,6 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
-
-def factor(c_r: float) -> float:
-    """Factor a of the damping for the coefficient of restitution c_r asked for."""
-    return 6.0 * (1.0 - c_r) / ((2.0 * c_r - 1.0) ** 2 + 3.0)
-
-
-LAW = Hysteresis("herbert-mcwhannell", factor, valid=(0.61, 1.0))
+LAW = Hysteresis(
+    "herbert-mcwhannell", lambda c_r: 6.0 * (1.0 - c_r) / ((2.0 * c_r - 1.0) ** 2 + 3.0), valid=(0.61, 1.0)
+)

@@ -9,31 +9,23 @@ Source: Hertz (1882), J. reine angew. Math. 92, 156-171; Wang & Wang (2019), eq.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.dynamics.contact.law import RESTITUTION_ERROR, Numbers, Resolved, refuse_linear
 
-
-@dataclass(frozen=True)
-class Hertz:
-    """See the module's text."""
-
-    exponent: float = 1.5
-
-    def resolve(self, law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
-        """The law for what the scene asks; ValueError, in words, when it cannot be had."""
-        refuse_linear("hertz", law)
-        if law.delivered_restitution not in (None, 1.0):
-            raise ValueError(
-                f"the law 'hertz' loses nothing and delivers no restitution of {law.delivered_restitution:g}; "
-                "choose a law with damping"
-            )
-        exponent = self.exponent if law.exponent is None else law.exponent
-        warning = None
-        if law.restitution is not None and 1.0 - law.restitution > RESTITUTION_ERROR:
-            warning = f"'hertz' loses nothing: it delivers a restitution of 1, not of {law.restitution:g}"
-        return Resolved("elastic", Numbers(stiffness, exponent, 0.0), None, 1.0, warning)
+#: where the scene gives none
+exponent = 1.5
 
 
-LAW = Hertz()
+def resolve(law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
+    """The law for what the scene asks; ValueError, in words, when it cannot be had."""
+    refuse_linear("hertz", law)
+    if law.delivered_restitution not in (None, 1.0):
+        raise ValueError(
+            f"the law 'hertz' loses nothing and delivers no restitution of {law.delivered_restitution:g}; "
+            "choose a law with damping"
+        )
+    warning = None
+    if law.restitution is not None and 1.0 - law.restitution > RESTITUTION_ERROR:
+        warning = f"'hertz' loses nothing: it delivers a restitution of 1, not of {law.restitution:g}"
+    power = exponent if law.exponent is None else law.exponent
+    return Resolved("elastic", Numbers(stiffness, power, 0.0), None, 1.0, warning)

@@ -12,10 +12,4 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
-
-def factor(c_r: float) -> float:
-    """Factor a of the damping for the coefficient of restitution c_r asked for."""
-    return 1.5 * (1.0 - c_r)
-
-
-LAW = Hysteresis("hunt-crossley", factor, valid=(0.75, 1.0))
+LAW = Hysteresis("hunt-crossley", lambda c_r: 1.5 * (1.0 - c_r), valid=(0.75, 1.0))

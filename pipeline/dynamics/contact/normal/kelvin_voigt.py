@@ -14,38 +14,31 @@ Granular Matter 9, 465-469.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
 from flexclear.pipeline.dynamics.contact import restitution
 from flexclear.pipeline.dynamics.contact.law import Numbers, Resolved
 
-
-@dataclass(frozen=True)
-class KelvinVoigt:
-    """See the module's text."""
-
-    exponent: float = 1.0
-
-    def resolve(self, law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
-        """The law for what the scene asks; ValueError, in words, when it cannot be had."""
-        if law.exponent not in (None, 1.0):
-            raise ValueError(f"the law 'kelvin-voigt' is linear; its exponent is 1, not {law.exponent:g}")
-        mass = mass if law.effective_mass is None else law.effective_mass
-        if mass is None:
-            raise ValueError("neither side of this joint has a mass of its own; give an effective_mass")
-        critical = 2.0 * math.sqrt(stiffness * mass)
-        asked = law.restitution if law.delivered_restitution is None else law.delivered_restitution
-        if law.damping is not None:
-            if asked is not None:
-                raise ValueError("damping and restitution say the same; give one")
-            damping = law.damping
-        elif asked is not None:
-            damping = critical * restitution.damping_ratio(asked)
-        else:
-            raise ValueError("the law 'kelvin-voigt' needs a damping [N s/m], or a restitution")
-        delivered = restitution.linear_delivered(damping / critical)
-        return Resolved("linear-damper", Numbers(stiffness, 1.0, damping), asked, delivered)
+#: where the scene gives none
+exponent = 1.0
 
 
-LAW = KelvinVoigt()
+def resolve(law: NormalLaw, stiffness: float, mass: float | None) -> Resolved:
+    """The law for what the scene asks; ValueError, in words, when it cannot be had."""
+    if law.exponent not in (None, 1.0):
+        raise ValueError(f"the law 'kelvin-voigt' is linear; its exponent is 1, not {law.exponent:g}")
+    mass = mass if law.effective_mass is None else law.effective_mass
+    if mass is None:
+        raise ValueError("neither side of this joint has a mass of its own; give an effective_mass")
+    critical = 2.0 * math.sqrt(stiffness * mass)
+    asked = law.restitution if law.delivered_restitution is None else law.delivered_restitution
+    if law.damping is not None:
+        if asked is not None:
+            raise ValueError("damping and restitution say the same; give one")
+        damping = law.damping
+    elif asked is not None:
+        damping = critical * restitution.damping_ratio(asked)
+    else:
+        raise ValueError("the law 'kelvin-voigt' needs a damping [N s/m], or a restitution")
+    delivered = restitution.linear_delivered(damping / critical)
+    return Resolved("linear-damper", Numbers(stiffness, 1.0, damping), asked, delivered)

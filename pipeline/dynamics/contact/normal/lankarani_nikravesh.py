@@ -11,10 +11,4 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
-
-def factor(c_r: float) -> float:
-    """Factor a of the damping for the coefficient of restitution c_r asked for; Wang & Wang (2019), eq. (25)."""
-    return 0.75 * (1.0 - c_r**2)
-
-
-LAW = Hysteresis("lankarani-nikravesh", factor, valid=(0.8, 1.0))
+LAW = Hysteresis("lankarani-nikravesh", lambda c_r: 0.75 * (1.0 - c_r**2), valid=(0.8, 1.0))

@@ -12,10 +12,4 @@ from __future__ import annotations
 
 from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
-
-def factor(c_r: float) -> float:
-    """Factor a of the damping for the coefficient of restitution c_r asked for."""
-    return 0.75 * (1.0 - c_r)
-
-
-LAW = Hysteresis("lee-wang", factor, valid=(0.91, 1.0))
+LAW = Hysteresis("lee-wang", lambda c_r: 0.75 * (1.0 - c_r), valid=(0.91, 1.0))

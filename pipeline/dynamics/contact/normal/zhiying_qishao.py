@@ -14,10 +14,4 @@ from math import exp
 
 from flexclear.pipeline.dynamics.contact.law import Hysteresis
 
-
-def factor(c_r: float) -> float:
-    """Factor a of the damping for the coefficient of restitution c_r asked for."""
-    return 0.75 * (1.0 - c_r**2) * exp(2.0 * (1.0 - c_r))
-
-
-LAW = Hysteresis("zhiying-qishao", factor, valid=(0.24, 1.0))
+LAW = Hysteresis("zhiying-qishao", lambda c_r: 0.75 * (1.0 - c_r**2) * exp(2.0 * (1.0 - c_r)), valid=(0.24, 1.0))

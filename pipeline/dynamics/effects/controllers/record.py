@@ -5,8 +5,8 @@ from __future__ import annotations
 from flexclear.pipeline.core.artifacts.coordinates import motion
 from flexclear.pipeline.core.scene.loads import Pid, SampledPid
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.effects.controllers.sampled_pid import INTEGRAL
 from flexclear.pipeline.dynamics.equations.observation import Observed, Series
-from flexclear.pipeline.dynamics.loads.sampled_pid import INTEGRAL
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.record.loads import along_coordinates, turning_loads
 

@@ -7,11 +7,10 @@ from collections.abc import Callable
 import numpy as np
 
 from flexclear.pipeline.core.scene.loads import Pid, SampledPid
-from flexclear.pipeline.core.scene.registry import lookup
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.drives.pieces import pieces_of, size
-from flexclear.pipeline.dynamics.effects import LOADS
+from flexclear.pipeline.dynamics.effects.controllers.sampled_pid import sample as sample_error
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.gauges import values
 from flexclear.pipeline.dynamics.model.model import Model
@@ -32,7 +31,7 @@ def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
     sampled = [(load, row) for load, row in loads if isinstance(load, SampledPid)]
 
     def sample(y: np.ndarray, t: float) -> np.ndarray:
-        due = [(load, row) for load, row in sampled if _is_due(load.period, t - engine.start)]
+        due = [row for load, row in sampled if _is_due(load.period, t - engine.start)]
         if not due:
             return y
         y = y.copy()
@@ -40,10 +39,10 @@ def sampler(engine: Engine) -> Callable[[np.ndarray, float], np.ndarray]:
         engine.attempt(y, t)
         sites, laws = engine.table(m.SITE_FRAMES), engine.table(m.LAW)["value"]
         internal = y[len(y) - model.arrays.size(m.N_INTERNAL) :]
-        for load, row in due:
+        for row in due:
             error = float(laws[row["law0"]]) - values(gauges[[row["measured"]]], sites, internal)[0]
             mine, states = numbers["value"][row["number0"] :][:7], internal[int(row["internal0"]) :][:3]
-            states[:] = lookup(LOADS, load.type, where="[load]").sample(mine, states, error, first=t == engine.start)
+            states[:] = sample_error(mine, states, error, first=t == engine.start)
         return y
 
     return sample

@@ -9,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import named_coordinate
+from flexclear.pipeline.dynamics.model.driving import measured, named_coordinate
 from flexclear.pipeline.dynamics.model.merge import Placement
 
 if TYPE_CHECKING:
@@ -77,11 +76,8 @@ def _coupling(mechanism: Mechanism, name: str) -> Coupling:
     gear, path = mechanism.scene.gear[name], f"[gear.{name}]"
     first, second = (_side(mechanism, getattr(gear, side), f"[gear.{name}.{side}]") for side in ("first", "second"))
     dimensions = {(True, True): "number", (False, False): "number", (True, False): "length per angle"}
-    try:
-        kinds = (first.coordinate.turning, second.coordinate.turning)
-        ratio = quantity(gear.ratio, dimensions.get(kinds, "angle per length"))
-    except ValueError as error:
-        raise InputError(f"[gear.{name}.ratio]", str(error)) from None
+    kinds = (first.coordinate.turning, second.coordinate.turning)
+    ratio = measured(gear.ratio, dimensions.get(kinds, "angle per length"), f"[gear.{name}.ratio]")
     if ratio == 0.0:
         raise InputError(path, "its ratio is 0: the second coordinate would be held", "give a ratio, or drive it")
     return Coupling(name, ratio, second, first)

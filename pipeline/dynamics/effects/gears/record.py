@@ -27,11 +27,7 @@ def on_geared_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarray
     for c, coupling in _couplings(model):
         size = _force(model, seen, c, coupling)
         for side, factor in coupling.parts:
-            along, push = _along(model, seen, side), np.zeros((len(size), 3))
-            moment = (factor * size)[:, None] * along
-            if not side.coordinate.turning:
-                push = moment
-                moment = np.cross(seen.sites[:, model.numbering.site(side.b)]["origin"], push)
+            moment, push = side.coordinate.wrench(*_sites(model, seen, side), factor * size)
             frames = model.scene.joint[side.joint].between
             acting += [(frame, sign * moment, sign * push) for frame, sign in zip(frames, (-1.0, 1.0), strict=True)]
     return acting
@@ -41,14 +37,14 @@ def _couplings(model: Model) -> list[tuple[int, Coupling]]:
     return [(c, closure) for c, closure in enumerate(model.closures) if isinstance(closure, Coupling)]
 
 
-def _along(model: Model, seen: Observed, side: Side) -> np.ndarray:
-    site = model.numbering.site(side.b if side.coordinate.side else side.a)
-    axis: np.ndarray = seen.sites[:, site]["axes"][:, :, side.coordinate.axis]
-    return axis
+def _sites(model: Model, seen: Observed, side: Side) -> tuple[np.ndarray, np.ndarray]:
+    """Frames of both sites of a coordinate, shape (time,)."""
+    return seen.sites[:, model.numbering.site(side.a)], seen.sites[:, model.numbering.site(side.b)]
 
 
 def _force(model: Model, seen: Observed, c: int, coupling: Coupling) -> np.ndarray:
     wrench = seen.closure_wrenches[:, c]
     acting = wrench["moment" if coupling.second.coordinate.turning else "force"]
-    size: np.ndarray = np.einsum("ti,ti->t", _along(model, seen, coupling.second), acting)
+    along = coupling.second.coordinate.along(*_sites(model, seen, coupling.second))
+    size: np.ndarray = np.einsum("ti,ti->t", along, acting)
     return size

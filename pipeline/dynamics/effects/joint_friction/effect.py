@@ -39,24 +39,21 @@ JOINT_FRICTION = Effect(
     work={
         # unit: wrench of its friction on the joint's second body per normal force, about the kernels' origin; loss:
         # what it takes per normal force [m/s]
+        "bearing": ("n_bearings", "load slip loss unit_moment:3 unit_force:3"),
         # the search for the loads: part of the friction that is there, turns, last change, whether in strides
-        "pursuit": "share turns change strides",
-        "bearing": "load slip loss unit_moment:3 unit_force:3",
+        "pursuit": ("1", "share turns change strides"),
         # what bends its friction where it reverses: sliding velocity, force along the axis, moment about it and forces
         # at both ends as they press
-        "bends": "sliding:3 along about one_end:2 other_end:2",
+        "bends": ("n_bearings", "sliding:3 along about one_end:2 other_end:2"),
         # of the joints: without friction, then per normal force of each bearing; about the second frame's origin
-        "reactions": "moment:3 force:3",
+        "reactions": ("n_rubbing+n_rubbing*n_bearings", "moment:3 force:3"),
     },
     # of the bearings' loads: slopes of their equations, and residuals; of the closures: multipliers without friction
-    stretches=("bearing_slopes", "bearing_residuals", "smooth_multiplier"),
-    lengths={
-        "pursuit": lambda size: 1,
-        **dict.fromkeys(("bearing", "bends", "bearing_residuals"), lambda size: size("n_bearings")),
-        "reactions": lambda size: size("n_rubbing") * (1 + size("n_bearings")),
-        "bearing_slopes": lambda size: size("n_bearings") ** 2,
-        "smooth_multiplier": lambda size: size("n_closure_rows") if size("n_bearings") else 0,
-    },
+    stretches=(
+        "bearing_slopes:n_bearings*n_bearings",
+        "bearing_residuals:n_bearings",
+        "smooth_multiplier:n_closure_rows",
+    ),
     compose={
         "rates": {
             "friction": "(<equations.make_joint_friction>({kinds}, {file.parts.closures}, {file.tree}), "

@@ -34,8 +34,8 @@ import numpy as np
 
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.choice import choose, nothing, repeat
+from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BALL, PIN, SLIDER
 from flexclear.pipeline.dynamics.equations.closures import respond
-from flexclear.pipeline.dynamics.joints.bearings import BALL, PIN, SLIDER
 from flexclear.pipeline.dynamics.kernels import kernel
 from flexclear.pipeline.dynamics.vectors import (
     ZERO,

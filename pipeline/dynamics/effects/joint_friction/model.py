@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from flexclear.pipeline.core.scene.parts import IdealJoint
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.effects.gears.model import Coupling
-from flexclear.pipeline.dynamics.joints.bearings import BEARINGS, SLIDER
+from flexclear.pipeline.dynamics.effects.joint_friction.bearings import BEARINGS, SLIDER
 from flexclear.pipeline.dynamics.model.components import Floors, Group
 from flexclear.pipeline.dynamics.model.contacts import friction_law
 from flexclear.pipeline.dynamics.model.filling import Filling

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from flexclear.pipeline.core.scene.clearance import NormalLaw
+from flexclear.pipeline.core.scene.parts import Stop
 from flexclear.pipeline.core.scene.schema import Scene
-from flexclear.pipeline.core.scene.stops import Stop
-from flexclear.pipeline.core.scene.units import quantity
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics.joints.coordinate import Coordinate
-from flexclear.pipeline.dynamics.model.driving import coordinate_of
+from flexclear.pipeline.dynamics.model.driving import coordinate_of, measured
 
 #: type of a contact that is an end of a stop
 STOP = "stop"
@@ -60,10 +59,7 @@ def _both(scene: Scene, name: str, stop: Stop, lengths: Mapping[str, float]) -> 
     joint, _, coordinate = coordinate_of(scene, stop.joint, stop.coordinate, path)
 
     def read(key: str, dimension: str) -> float:
-        try:
-            return quantity(getattr(stop, key), dimension)
-        except ValueError as error:
-            raise InputError(f"[stop.{name}.{key}]", str(error)) from None
+        return measured(getattr(stop, key), dimension, f"[stop.{name}.{key}]")
 
     limits = {end: read(end, coordinate.dimension) for end in stop.ends}
     if len(limits) == 2 and not limits["lower"] < limits["upper"]:

@@ -16,9 +16,6 @@ def on_stopped_frames(model: Model, seen: Observed) -> list[tuple[str, np.ndarra
         if not isinstance(end, End):
             continue
         a, b = (seen.sites[:, numbering.site(site)] for site in (outer, inner))
-        along = (b if end.coordinate.side else a)["axes"][:, :, end.coordinate.axis]
-        push = -end.sense * seen.touch["normal_force"][:, c, None] * along
-        force = np.zeros_like(push) if end.coordinate.turning else push
-        moment = push if end.coordinate.turning else np.cross(b["origin"], push)
+        moment, force = end.coordinate.wrench(a, b, -end.sense * seen.touch["normal_force"][:, c])
         acting += [(frame, sign * moment, sign * force) for frame, sign in zip(end.between, (-1.0, 1.0), strict=True)]
     return acting

@@ -9,7 +9,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.projection import BLIND
 from flexclear.pipeline.dynamics.integrate.singular_step import NEVER
 from flexclear.pipeline.dynamics.model import selection
-from flexclear.pipeline.dynamics.model.driving import joint_class
+from flexclear.pipeline.dynamics.model.driving import joint_type
 from flexclear.pipeline.dynamics.model.mobility import INFINITE
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.numbering import Numbering
@@ -104,7 +104,7 @@ def coordinate_scales(numbering: Numbering) -> np.ndarray:
     scales = np.full(numbering.nv, SCALE)
     for i, link in enumerate(numbering.mechanism.links):
         if i and not link.drives:
-            for k, letter in enumerate(joint_class(link.kind).SPEEDS):
+            for k, letter in enumerate(joint_type(link.kind).SPEEDS):
                 scales[numbering.coordinates[i][k]] = 1.0 if letter == "r" else SCALE
     return scales
 

@@ -20,7 +20,7 @@ from flexclear.pipeline.dynamics.effects import INTEGRATORS, scheme_of
 from flexclear.pipeline.dynamics.integrate.method import Method
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.model.driving import coordinate_of
-from flexclear.pipeline.dynamics.model.given_rates import given_rates
+from flexclear.pipeline.dynamics.model.initial import given_rates
 from flexclear.pipeline.dynamics.model.mobility import Mobility, analyse, moves
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.model.plausibility import refuse_missed

@@ -7,6 +7,7 @@ import numpy as np
 from flexclear.pipeline.core.scene.drives import PathDrive
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.model import initial
 from flexclear.pipeline.dynamics.model.given_start import moved
 from flexclear.pipeline.dynamics.model.merge import Placement
@@ -87,8 +88,8 @@ def _look(engine: Engine, y: np.ndarray) -> None:
 
 def project(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Y at the start with the loops closed and their rates zero; SolverError when that fails."""
-    rows = m.empty_record(1, len(engine.model.contacts), len(y))
-    start = m.record(rows, len(engine.model.contacts))
+    rows = recording.empty_record(1, len(engine.model.contacts), len(y))
+    start = recording.record(rows, len(engine.model.contacts))
     start.time[:], start.state[:] = engine.start, y
     seen = observe(engine, rows)
     if seen.status[0] != m.OK:

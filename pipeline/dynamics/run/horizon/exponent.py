@@ -15,10 +15,12 @@ import numpy as np
 
 from flexclear.pipeline.core.artifacts.quantities import LASTING, PERTURBATION, SEPARATED, lasting
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
-from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, offset_jacobian, perturbed
+from flexclear.pipeline.dynamics.run.horizon.horizon import Metric, moved_start
 from flexclear.pipeline.dynamics.run.horizon.tangents import Differentiated, Direction
+from flexclear.pipeline.dynamics.run.states import askew
 
 #: batches of the exponent's error, and Student's t of their number at 95 %
 EXPONENT_BATCHES, STUDENT = 10, 2.262
@@ -30,13 +32,10 @@ STATE_CHANGE = 1e-6
 class Growth:
     """How a change of the start grows.
 
-    time [s], separation: predicted for a perturbed run, a fraction of the largest motion; (n,).  exponent, error: the
-    mean growth of its logarithm over the run and half of the 95 % interval, from batch means [1/s].  horizon [s]: end
-    of the run where the separation is never visible.
+    exponent, error: the mean growth of its logarithm over the run and half of the 95 % interval, from batch means
+    [1/s].  horizon [s]: when a perturbed run would be visibly separated; end of the run where it never is.
     """
 
-    time: np.ndarray
-    separation: np.ndarray
     exponent: float
     error: float
     horizon: float
@@ -49,12 +48,10 @@ def start_direction(engine: Engine, y: np.ndarray) -> Direction:
     """
     model, nothing = engine.model, np.zeros(len(engine.model.arrays.f))
     if model.contacts:
-        along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
-        offsets = np.concatenate([PERTURBATION * contact.joint.clearance * along for contact in model.contacts])
-        return Direction(nothing, perturbed(engine, y, offset_jacobian(engine, y), offsets) - y)
+        return Direction(nothing, moved_start(engine, y) - y)
     end = model.speeds.stop
     change = np.zeros(len(y))
-    change[:end] = STATE_CHANGE * _far(engine)[:end] * np.sin(1.0 + np.arange(end) * 2.399963)
+    change[:end] = STATE_CHANGE * _far(engine)[:end] * askew(end)
     return Direction(
         nothing, PERTURBATION / STATE_CHANGE * 0.5 * (project(engine, y + change) - project(engine, y - change))
     )
@@ -68,7 +65,7 @@ def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
     sides = []
     for sign in (-1.0, 1.0):
         rows = trajectory.rows.copy()
-        m.record(rows, trajectory.contacts).state[:] += sign * steps[:, None] * changes
+        recording.record(rows, trajectory.contacts).state[:] += sign * steps[:, None] * changes
         sides.append(metric.motion(engine, rows))
     change = (sides[1] - sides[0]) / (2.0 * steps[:, None])
     largest = metric.norms(metric.motion(engine, trajectory.rows)).max(axis=0, initial=0.0)
@@ -76,7 +73,7 @@ def growth(engine: Engine, run: Differentiated, k: int) -> Growth:
     time, span = trajectory.time, engine.end - engine.start
     first = lasting(time, separation > SEPARATED, LASTING * span)
     mean, error = _slope(time, np.log(np.maximum(np.linalg.norm(change, axis=1), 1e-300)))
-    return Growth(time, separation, mean, error, engine.end if first is None else float(time[first]))
+    return Growth(mean, error, engine.end if first is None else float(time[first]))
 
 
 def _far(engine: Engine) -> np.ndarray:

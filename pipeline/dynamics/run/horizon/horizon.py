@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from threading import Condition
+from threading import Event
 
 import numpy as np
 
@@ -26,10 +26,11 @@ from flexclear.pipeline.core.system.errors import SolverError, StoppedError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.core.workflow.cores import TICK
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.closure_rows import select_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, another
 from flexclear.pipeline.dynamics.run.evaluation.observation import frames
-from flexclear.pipeline.dynamics.run.evaluation.start import project, rates_at_speeds
+from flexclear.pipeline.dynamics.run.states import displaced, per_speed
 from flexclear.pipeline.dynamics.run.trajectory import Followed, Stop
 
 #: the two are compared at about this many times, which bounds the cost; where outputs are rarer, between them as well
@@ -73,8 +74,7 @@ class Pair:
         self.times = np.union1d(self.outputs[:: max(1, len(self.outputs) // SAMPLES)], self.outputs[-1])
         self._engine, self._looking = another(engine), another(engine)
         self._metric = Metric(engine)
-        self._run, self._news = self._unseen(), Condition()
-        self._complete, self._ended = False, False
+        self._run, self._complete, self._ended = self._unseen(), False, Event()
 
     def run(self, steps: Callable[[Stop, np.ndarray], Followed]) -> Followed:
         """Result of the run that takes these steps, without the rows that serve comparisons alone."""
@@ -88,9 +88,7 @@ class Pair:
                 stopped.partial = engine, trajectory.without(self.added)
             raise
         finally:
-            with self._news:
-                self._ended = True
-                self._news.notify_all()
+            self._ended.set()
         return engine, trajectory.without(self.added), switched
 
     def perturbed_run(
@@ -109,13 +107,10 @@ class Pair:
 
         try:
             select_rows(engine, start, engine.start)
-            direction = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)  # along no axis of a mechanism
-            offsets = [PERTURBATION * contact.joint.clearance * direction for contact in engine.model.contacts]
-            moved = perturbed(engine, start, offset_jacobian(engine, start), np.concatenate(offsets))
-            other.rows = steps(engine, moved, enough, self.outputs)[1].rows
+            other.rows = steps(engine, moved_start(engine, start), enough, self.outputs)[1].rows
         except SolverError:
             failed = True
-        self._wait(lambda: self._ended, alive)
+        self._await_run(alive)
         time, separation, horizon = self._compared(other)
         if failed and horizon is None:
             # a neighbour that cannot be run says nothing for the run itself: no value is predictable
@@ -124,38 +119,31 @@ class Pair:
 
     def _hear(self, rows: np.ndarray) -> bool:
         """Note the rows that the run has so far; it continues."""
-        with self._news:
-            self._run.rows = rows
-            self._news.notify_all()
+        self._run.rows = rows
         return False
 
     def _enough(self, other: _Seen, alive: Progress) -> bool:
         """Whether the perturbed run has gone far enough beyond the horizon.
 
         What is visible depends on the largest motion of the whole run. Where the two are separated by the largest one
-        so far, the perturbed run waits for the run instead of going on, since that seldom changes.
+        so far, the perturbed run waits for the run to end instead of going on, since that seldom changes.
         """
-        while True:
-            with self._news:
-                complete, ended, known = self._complete, self._ended, self._run.rows
-            self._look(self._run)
-            self._look(other)
-            first = self._separated(self._separation(other))
-            if first is None or self._time(other.rows)[-1] < self._judged(first):
-                return False
-            if complete or ended:
-                return complete
-            self._wait_beyond(known, alive)
+        if not self._beyond(other):
+            return False
+        self._await_run(alive)
+        return self._complete and self._beyond(other)
 
-    def _wait_beyond(self, known: np.ndarray, alive: Progress) -> None:
-        """Wait until the run has more rows than the known ones, or has ended."""
-        self._wait(lambda: self._ended or self._run.rows is not known, alive)
+    def _beyond(self, other: _Seen) -> bool:
+        """Whether the two have been visibly separated for long enough, by what is known of the run."""
+        self._look(self._run)
+        self._look(other)
+        first = self._separated(self._separation(other))
+        return first is not None and bool(self._time(other.rows)[-1] >= self._judged(first))
 
-    def _wait(self, until: Callable[[], bool], alive: Progress) -> None:
-        """Wait for news of the run; a run that fails before it begins sends none."""
-        with self._news:
-            while not self._news.wait_for(until, TICK):
-                alive(None, "")
+    def _await_run(self, alive: Progress) -> None:
+        """Wait for the end of the run; one that fails before it begins has none."""
+        while not self._ended.wait(TICK):
+            alive(None, "")
 
     def _compared(self, other: _Seen) -> tuple[np.ndarray, np.ndarray, float | None]:
         """Times of comparison [s], separation and the horizon [s], when both have ended; None where they stay close."""
@@ -188,7 +176,7 @@ class Pair:
 
     def _unseen(self) -> _Seen:
         model = self._looking.model
-        return _Seen(m.empty_record(0, len(model.contacts), model.ny), np.zeros((0, self._metric.entries)))
+        return _Seen(recording.empty_record(0, len(model.contacts), model.ny), np.zeros((0, self._metric.entries)))
 
     def _look(self, seen: _Seen) -> None:
         """Add the motion at the times of comparison that a run has come to since the last look."""
@@ -199,7 +187,7 @@ class Pair:
             seen.motion = np.concatenate([seen.motion, new])
 
     def _time(self, rows: np.ndarray) -> np.ndarray:
-        return m.record(rows, len(self._looking.model.contacts)).time
+        return recording.record(rows, len(self._looking.model.contacts)).time
 
     def _motion(self, rows: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Motion at times of which there are rows, shape (time, entries)."""
@@ -239,7 +227,7 @@ class Metric:
     def motion(self, engine: Engine, rows: np.ndarray) -> np.ndarray:
         """Entries of all bodies in rows of the record [sqrt(J)], shape (row, entries)."""
         seen = frames(engine, rows).links
-        speeds = m.record(rows, len(engine.model.contacts)).state[:, engine.model.speeds]
+        speeds = recording.record(rows, len(engine.model.contacts)).state[:, engine.model.speeds]
         entries = [np.zeros((len(rows), 0))]
         for i, mass, com, turning, modes in self._bodies:
             R_WB, omega = seen["axes"][:, i], seen["omega"][:, i]
@@ -278,29 +266,29 @@ def _between(engine: Engine, requested: np.ndarray) -> np.ndarray:
 def offset_jacobian(engine: Engine, y: np.ndarray) -> np.ndarray:
     """Change of the ball-to-socket vectors (world) per change of the positions, closures closed; (3 contacts, nv).
 
-    Of a stop, whose way has no direction in space, its three rows are alike.  From the velocities that unit speeds add
-    to those of the drives, so that no step width enters.
+    Of a stop, whose way has no direction in space, its three rows are alike.
     """
     engine.select_pieces_after(engine.start)
     contacts, stops = engine.model.arrays.table(m.CONTACTS), engine.model.arrays.size(m.N_SURFACES)
 
-    def offset_rates(speeds: np.ndarray) -> np.ndarray:
-        rates_at_speeds(engine, y, speeds)
+    def offset_rates(rates: np.ndarray) -> np.ndarray:
         velocity = engine.table(m.SITE_FRAMES)["velocity"]
         offset = velocity[contacts["inner"]] - velocity[contacts["outer"]]
         offset[stops:] = engine.table(m.TOUCH)["rate"][stops:, None]
         return np.asarray(offset).ravel()
 
-    driven = offset_rates(np.zeros(engine.model.nv))
-    rates = [offset_rates(unit) - driven for unit in np.eye(engine.model.nv)]
-    return np.reshape(rates, (engine.model.nv, -1)).T if rates else np.zeros((len(driven), 0))
+    return per_speed(engine, y, offset_rates)
 
 
 def perturbed(engine: Engine, y: np.ndarray, jacobian: np.ndarray, offsets: np.ndarray) -> np.ndarray:
     """The start with the balls moved by `offsets` (3 per contact) [m] as nearly as the joints allow."""
     engine.select_pieces_after(engine.start)
     speeds, *_ = np.linalg.lstsq(jacobian, offsets, rcond=1e-9)
-    moved, nq = y.copy(), engine.model.nq
-    # rates per unit time, for one unit: a displacement of 1e-8 m is linear
-    moved[:nq] += rates_at_speeds(engine, y, speeds)[:nq] - rates_at_speeds(engine, y, np.zeros(len(speeds)))[:nq]
-    return project(engine, moved)
+    return displaced(engine, y, speeds)
+
+
+def moved_start(engine: Engine, y: np.ndarray) -> np.ndarray:
+    """The start of a perturbed run: every contact moved by PERTURBATION of its clearance, along no axis."""
+    along = np.array([1.0, 2.0, 3.0]) / np.sqrt(14.0)
+    offsets = [PERTURBATION * contact.joint.clearance * along for contact in engine.model.contacts]
+    return perturbed(engine, y, offset_jacobian(engine, y), np.concatenate(offsets))

@@ -25,7 +25,8 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.model.driving import prescribed
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.start import project
-from flexclear.pipeline.dynamics.run.pieces import Handover
+from flexclear.pipeline.dynamics.run.pieces import Handover, Moment, Tape
+from flexclear.pipeline.dynamics.run.states import askew, rows_of
 from flexclear.pipeline.dynamics.run.trajectory import LASTING, Trajectory, integrate
 
 #: waypoints of a period: impacts may part two motions a hundredfold, and they must stay close together
@@ -36,21 +37,6 @@ NEIGHBOUR = 1e3
 NOT_LINEAR = 1e4
 #: laws repeat when they end a period as they began it, but for this fraction
 EQUAL_LAWS = 1e-6
-
-
-@dataclass(frozen=True)
-class Moment:
-    """All that continues from one stretch of time to the next.
-
-    y: state.  modes, latched, watched: of the contacts, as in the work space.  begun: events of the contacts that are
-    closed, as rows of the event table.
-    """
-
-    y: np.ndarray
-    modes: np.ndarray
-    latched: np.ndarray
-    watched: np.ndarray
-    begun: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -104,31 +90,26 @@ def require_periodic(parts: list[Engine], y: np.ndarray) -> None:
         raise InputError(
             "[sections]", "nothing repeats: no drive and no load has a law of time", "drive a joint, or vary a load"
         )
-    values = list[np.ndarray]()
+    values = []
     for part, t in ((parts[0], parts[0].start), (parts[-1], parts[-1].end)):
         part.select_pieces_after(t)
         part.attempt(y, t)
         laws = part.table(m.LAW)
         values.append(np.stack([laws["value"], laws["rate"]], axis=1))
-    period = parts[-1].end - parts[0].start
-    driven = prescribed(parts[0].model.scene)
-    for k, (begin, end) in enumerate(zip(*values, strict=True)):
-        drive = driven[k] if k < len(driven) else None
-        change = end - begin
-        if drive is None:
-            change[1] = 0.0  # a load's rate may jump
-        elif drive.dimension == "angle":
-            change[0] = (change[0] + np.pi) % (2.0 * np.pi) - np.pi
-        size = np.abs([begin, end]).max(axis=0) + np.array([1.0, 1.0 / period]) * (1.0 if drive is None else EQUAL_LAWS)
-        if np.any(np.abs(change) > EQUAL_LAWS * size):
-            what = f"[drive.{drive.name}]" if drive is not None else "[load]"
-            which = "value" if abs(change[0]) > EQUAL_LAWS * size[0] else "rate"
-            raise InputError(
-                what,
-                f"its law does not repeat after a period of {period:.6g} s: its {which} has changed by "
-                f"{change[0 if which == 'value' else 1]:.3g}",
-                "give the laws' period as sections.period, or choose laws that end as they begin",
-            )
+    period, driven = parts[-1].end - parts[0].start, prescribed(parts[0].model.scene)
+    turning, change = [k for k, drive in enumerate(driven) if drive.dimension == "angle"], values[1] - values[0]
+    change[turning, 0] = (change[turning, 0] + np.pi) % (2.0 * np.pi) - np.pi
+    change[len(driven) :, 1] = 0.0  # a load's rate may jump
+    least = np.where(np.arange(len(change)) < len(driven), EQUAL_LAWS, 1.0)[:, None] * [1.0, 1.0 / period]
+    wrong = np.argwhere(np.abs(change) > EQUAL_LAWS * (np.abs(values).max(axis=0) + least))
+    if len(wrong):
+        k, rate = wrong[0]
+        raise InputError(
+            f"[drive.{driven[k].name}]" if k < len(driven) else "[load]",
+            f"its law does not repeat after a period of {period:.6g} s: its {'rate' if rate else 'value'} has changed "
+            f"by {change[k, rate]:.3g}",
+            "give the laws' period as sections.period, or choose laws that end as they begin",
+        )
 
 
 def stretches(engine: Engine, period: float, phase: float) -> list[Engine]:
@@ -196,18 +177,16 @@ def _follow(part: Engine, here: Moment) -> Moment | None:
 
 
 def handed(part: Engine, here: Moment) -> Handover:
-    """A moment as what another method would have left of this stretch: one row, and the contacts' open events."""
+    """A moment as what another method would have left of this stretch: one row."""
     counters = np.zeros(m.INTEGERS - m.STATUS, dtype=np.int64)
-    for index, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.begun))):
+    for index, value in ((m.N_RECORDED, 1), (m.NEXT_OUTPUT, 1), (m.N_EVENTS, len(here.events))):
         counters[index - m.STATUS] = value
     lasting = np.zeros(len(LASTING))
     lasting[0] = part.start
-    rows = m.empty_record(1, len(part.model.contacts), len(here.y))
-    first = m.record(rows, len(part.model.contacts))
-    first.time[:], first.state[:] = part.start, here.y
-    first.modes[:], first.latched[:] = here.modes[: len(part.model.contacts)], here.latched[: len(part.model.contacts)]
-    selections = ((part.start, part.selected.copy()),)
-    return Handover(here.y, here.modes, here.latched, here.watched, counters, lasting, rows, here.begun, selections)
+    contacts = slice(len(part.model.contacts))
+    rows = rows_of(part, here.y[None], part.start, here.modes[contacts], here.latched[contacts])
+    recorded = Tape(np.zeros(0), rows, here.events, [(part.start, part.selected.copy())])
+    return Handover(here, counters, lasting, recorded)
 
 
 def _moment(part: Engine, trajectory: Trajectory) -> Moment:
@@ -220,20 +199,20 @@ def _moment(part: Engine, trajectory: Trajectory) -> Moment:
             begun = trajectory.events[np.flatnonzero(mine)[-1]]
             table["event_row"][c] = len(events)
             events.append(np.array([float(begun[name]) for name in begun.dtype.names]))
-    begun_events = np.array(events).reshape(len(events), m.EVENT.size)
-    return Moment(trajectory.state[-1].copy(), part.modes.copy(), part.latched.copy(), watched, begun_events)
+    begun = np.array(events).reshape(len(events), m.EVENT.size)
+    return replace(Moment.of(part, watched, begun), y=trajectory.state[-1].copy())
 
 
 def _earlier(moment: Moment, period: float) -> Moment:
     """The moment when time has started over: its contacts began a period earlier."""
-    begun = moment.begun.copy()
-    m.named(m.EVENT, begun)["time"] -= period
-    return replace(moment, begun=begun)
+    events = moment.events.copy()
+    m.named(m.EVENT, events)["time"] -= period
+    return replace(moment, events=events)
 
 
 def _set_neighbour(part: Engine, scales: np.ndarray, here: Moment, separation: float) -> Moment:
     """A neighbour in a direction that no symmetry of a mechanism has."""
-    direction = np.where(np.isfinite(scales), np.sin(1.0 + np.arange(len(scales)) * 2.399963), 0.0)
+    direction = np.where(np.isfinite(scales), askew(len(scales)), 0.0)
     unit = direction / np.linalg.norm(direction)
     moved = here.y + separation * unit * np.where(np.isfinite(scales), scales, 0.0)
     return replace(here, y=_closed(part, moved))

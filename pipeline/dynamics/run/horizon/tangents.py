@@ -26,6 +26,7 @@ from flexclear.pipeline.core.scene.loads import SampledPid
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.core.system.progress import Progress
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.model.arrays import Arrays, pack
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine, assemble
 from flexclear.pipeline.dynamics.run.pieces import Tape
@@ -67,17 +68,13 @@ def differentiate(
     y: np.ndarray,
     directions: Sequence[Direction],
     progress: Progress,
-    outputs: np.ndarray | None = None,
 ) -> Differentiated:
-    """Run from a consistent start with derivatives along directions; SolverError where there are none.
-
-    outputs: times [s], as of `trajectory.integrate`.
-    """
+    """Run from a consistent start with derivatives along directions; SolverError where there are none."""
     model, count, ny = engine.model, len(directions), engine.model.ny
     mine, jumps = differentiated_engine(engine, directions), _Jumps(ny, count)
     start = np.concatenate([y, *(direction.start for direction in directions)])
     try:
-        whole = integrate(mine, start, progress, outputs=outputs, jumps=jumps)
+        whole = integrate(mine, start, progress, jumps=jumps)
     except UnsuitedError as error:
         raise SolverError(f"the equations of this mechanism are not differentiated: {error}") from None
     if whole.collocations:
@@ -161,7 +158,7 @@ class _Jumps:
         self.seen = int(engine.n[m.N_EVENTS])
         for event in events[np.isin(events["kind"], (m.CLOSING, m.OPENING)) & (events["time"] > engine.start)]:
             self._change_mode(engine, int(event["contact"]), closes=event["kind"] == m.CLOSING)
-        last = m.record(tape.rows[: engine.n[m.N_RECORDED]][-1:], len(engine.model.contacts))
+        last = recording.record(tape.rows[: engine.n[m.N_RECORDED]][-1:], len(engine.model.contacts))
         if last.time[0] == engine.control[m.TIME]:
             last.state[0, self.ny :] = engine.view(m.Y)[self.ny :]
 

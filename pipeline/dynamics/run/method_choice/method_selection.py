@@ -12,11 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
 
+from flexclear.pipeline.core.artifacts.labelled import Labelled
 from flexclear.pipeline.core.scene.integrators import DEFAULT, STIFF, VIBRATING, by_need
 from flexclear.pipeline.core.scene.load import edited
 from flexclear.pipeline.core.scene.schema import Scene
@@ -29,9 +29,6 @@ from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.progress_rate import Judge, Judges, Look, Panel, limited, pace
 from flexclear.pipeline.dynamics.run.refusals import refusal
 from flexclear.pipeline.dynamics.run.run import engine_of
-
-if TYPE_CHECKING:
-    from flexclear.pipeline.core.artifacts.labelled import Labelled
 
 #: evaluations of a step of the default method, and how far its region of stability reaches where steps swing about it,
 #: along both axes; the product of rate and step that its error control settles at

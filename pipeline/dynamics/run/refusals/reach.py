@@ -1,15 +1,29 @@
 """Ends of a motion at a singular pose: a drive that pulls a loop further than it reaches, a rest in the pose, and what
-moves too fast there for a branch to be followed."""
+moves too fast there for a branch to be followed.
+
+A drive that leads a loop with ideal joints out of reach ends the run there. With clearance the contact gives way
+instead, in ever shorter steps, millions of which friction's slope at rest may ask for. What it must come to is a matter
+of geometry: the least depth at the drives' positions, over all that they leave free. It is followed from the pose that
+the run has come to along the drives' laws.
+"""
 
 from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from flexclear.pipeline.core.system.errors import SolverError
 from flexclear.pipeline.dynamics import memory as m
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.model import selection
 from flexclear.pipeline.dynamics.run.evaluation import closure_rows
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.evaluation.start import project
+from flexclear.pipeline.dynamics.run.states import per_speed
 
 #: least singular value of the closures, as fraction of the largest, above which a pose is not yet at the end of reach;
 #: and above which it is not singular
@@ -18,6 +32,25 @@ END_OF_REACH, SINGULAR = 0.1, 1e-3
 REST_FRACTION, DYING = 0.1, 0.1
 #: at the end of reach speeds grow beyond bounds: so much faster than the drives' a loop does not move elsewhere
 FASTER = 40.0
+#: times ahead at which the least depth is searched for
+TIMES_AHEAD = 60
+#: a search proceeds in so many boxes of this half width, in fractions of the mechanism's size or in rad: coordinates
+#: of a box are those of the loops' tangents in its middle
+BOXES, HALF_WIDTH = 60, 0.1
+#: a depth is the least when another box takes off less than this fraction of it
+LEAST_GAIN = 1e-3
+#: of the search in a box, in which depths are fractions of that in its middle, so that no size of a mechanism matters
+OPTIONS: Any = {"eps": 1e-6}
+
+
+@contextmanager
+def preserved(engine: Engine) -> Iterator[None]:
+    """The work space is afterwards as it was."""
+    saved = engine.w.copy(), engine.n.copy()
+    try:
+        yield
+    finally:
+        engine.w[:], engine.n[:] = saved
 
 
 def beyond_reach(engine: Engine) -> str:
@@ -27,12 +60,11 @@ def beyond_reach(engine: Engine) -> str:
     drives; at the end of a loop's reach it asks them not to move.  Of loops with flexible
     bodies, whose modes give way, this says nothing.  The memory stays as it is.
     """
-    model, saved = engine.model, (engine.w.copy(), engine.n.copy())
+    model = engine.model
     if not model.drives or not model.closures or not model.mechanism.all_rigid:
         return ""
-    text = _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
-    engine.w[:], engine.n[:] = saved
-    return text
+    with preserved(engine):
+        return _pulled_too_far(engine, float(engine.control[m.TIME]), engine.view(m.Y).copy())
 
 
 def require_shallow(engine: Engine) -> None:
@@ -42,27 +74,22 @@ def require_shallow(engine: Engine) -> None:
     shorter steps: the run would be refused at its end, if it ever came there.  The memory stays as it is.
     """
     from flexclear.pipeline.dynamics.contact.validity import SHALLOW, pressed_through
-    from flexclear.pipeline.dynamics.run.refusals.overtravel import forced_depth
 
-    model, saved = engine.model, (engine.w.copy(), engine.n.copy())
-    t = float(engine.control[m.TIME])
-    engine.attempt(engine.view(m.Y).copy(), t)
-    gaps = engine.table(m.TOUCH)["gap"].copy()
-    powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[model.nv :])
-    pulled = bool(model.drives) and bool(np.any(powers > 0.0))
-    drive = model.drives[int(np.argmax(powers))] if pulled else ""
-    away = (
-        f"drive {drive} leads out of reach: shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"
-    )
-    engine.w[:], engine.n[:] = saved
-    for k, (contact, depth) in enumerate(zip(model.contacts, -gaps, strict=True)):
+    model, t = engine.model, float(engine.control[m.TIME])
+    with preserved(engine):
+        engine.attempt(engine.view(m.Y).copy(), t)
+        depths, drive = -engine.table(m.TOUCH)["gap"], _pulling(engine)
+    pulled = drive is not None
+    away = f"drive {drive} leads out of reach: {_shorten(drive or '')}"
+    for k, (contact, depth) in enumerate(zip(model.contacts, depths, strict=True)):
         if text := pressed_through(contact.words, contact.joint, float(depth)):
             remedy = "choose a stiffer contact, a slower impact or smaller loads"
             raise SolverError(f"at t = {t:.6g} s: {text}: {f'{away}; else {remedy}' if pulled else remedy}")
-        if not (pulled and model.mechanism.all_rigid and depth > SHALLOW * contact.joint.radius > 0.0):
+        shallow = SHALLOW * contact.joint.radius
+        if not (pulled and model.mechanism.all_rigid and depth > shallow > 0.0):
             continue
-        time, least = forced_depth(engine, k)
-        engine.w[:], engine.n[:] = saved
+        with preserved(engine):
+            time, least = forced_depth(engine, k, shallow)
         if least:
             raise SolverError(
                 f"at t = {t:.6g} s: {contact.words}: the surfaces are {depth:.3g} m deep in each other, and "
@@ -76,17 +103,16 @@ def end_in_pose(engine: Engine, rows: np.ndarray) -> str:
 
     rows: recorded so far, whose speeds those at the stepper's state are compared with.
     """
-    model, saved = engine.model, (engine.w.copy(), engine.n.copy())
-    t, y = float(engine.control[m.TIME]), engine.view(m.Y).copy()
-    engine.attempt(y, t)
-    J = closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN))
-    where = closure_rows.diagnosis(engine) if J.size else ""
+    model, t, y = engine.model, float(engine.control[m.TIME]), engine.view(m.Y).copy()
+    with preserved(engine):
+        engine.attempt(y, t)
+        J = closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN))
+        where = closure_rows.diagnosis(engine) if J.size else ""
     U, values, _ = np.linalg.svd(J) if J.size else (np.eye(1), np.ones(1), None)
-    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > REST_FRACTION)
-    engine.w[:], engine.n[:] = saved
     if not J.size or values[-1] > SINGULAR * values[0]:
         return ""
-    states = m.record(rows, len(model.contacts)).state
+    moving = selection.coordinates_of_rows(model, engine.h, np.abs(U[:, len(values) - 1]) > REST_FRACTION)
+    states = recording.record(rows, len(model.contacts)).state
     before, now = (np.abs(s[..., model.speeds] / model.speed_scales)[..., moving] for s in (states, y))
     if np.max(now, initial=0.0) > DYING * np.max(before, initial=0.0):
         return _too_fast(engine, t, where)
@@ -126,7 +152,7 @@ def _too_fast(engine: Engine, t: float, where: str) -> str:
 def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
     model, still = engine.model, y.copy()
     engine.attempt(y, t)
-    powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[model.nv :])
+    drive = _pulling(engine) or model.drives[0]
     still[model.speeds] = 0.0
     engine.attempt(still, t)
     U, values, _ = np.linalg.svd(closure_rows.natural(model, engine.h, engine.rows(m.JACOBIAN)))
@@ -137,9 +163,79 @@ def _pulled_too_far(engine: Engine, t: float, y: np.ndarray) -> str:
         return ""
     if not abs(U[:, len(values) - 1] @ pulled) > FASTER * values[-1] * np.linalg.norm(pulled) > 0.0:
         return ""
-    drive = model.drives[int(np.argmax(powers))]
     joint = closure_rows.worst_joint(engine, U[:, len(values) - 1])
     return (
         f"at t = {t:.6g} s: drive {drive} leads out of reach: the loop closed at joint {joint} is stretched or folded "
-        f"as far as it goes; shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"
+        f"as far as it goes; {_shorten(drive)}"
     )
+
+
+def _pulling(engine: Engine) -> str | None:
+    """The drive with the largest power in the state evaluated last; None where none has any."""
+    powers = np.abs(engine.view(m.DRIVE_FORCE) * engine.view(m.U)[engine.model.nv :])
+    return engine.model.drives[int(np.argmax(powers))] if np.any(powers > 0.0) else None
+
+
+def _shorten(drive: str) -> str:
+    return f"shorten the travel in [drive.{drive.partition('.')[0]}], or change lengths"
+
+
+def forced_depth(engine: Engine, contact: int, shallow: float) -> tuple[float, float]:
+    """When contact number `contact` must be deeper [m] than its inner radius, and how deep then; else (inf, 0).
+
+    From the stepper's state on, if the contact is deeper than `shallow` [m] already; rigid bodies only, since others
+    bend instead. Searches are local, as the motion is.  The memory is not preserved.
+    """
+    model, t = engine.model, float(engine.control[m.TIME])
+    radius, y = model.contacts[contact].joint.radius, engine.view(m.Y).copy()
+    try:
+        for time in np.linspace(t, engine.end, TIMES_AHEAD + 1)[:-1]:
+            y, depth = _shallowest(replace(engine, start=float(time)), y, contact, shallow)
+            if depth > radius:
+                return float(time), depth
+    except SolverError:
+        pass  # other loops do not reach so far either: the run will show it
+    return np.inf, 0.0
+
+
+def _shallowest(engine: Engine, y: np.ndarray, contact: int, enough: float) -> tuple[np.ndarray, float]:
+    """A state nearby in which the contact is least deep, or no deeper than `enough`; and how deep [m].
+
+    Drives are where they are at the engine's start.
+    """
+    y = project(engine, y)
+    depth = _depth(engine, y, contact)
+    for _ in range(BOXES):
+        if depth <= enough:
+            break
+        there, less = _shallower(engine, y, contact, depth)
+        if not less < (1.0 - LEAST_GAIN) * depth:
+            break
+        y, depth = there, less
+    return y, depth
+
+
+def _shallower(engine: Engine, y: np.ndarray, contact: int, depth: float) -> tuple[np.ndarray, float]:
+    """The same in the box about a state in which it is so deep."""
+    from scipy.optimize import minimize  # slow to import, and few runs come here
+
+    nq, scales = engine.model.nq, engine.model.speed_scales[: engine.model.nv]
+    ways = per_speed(engine, y, lambda rates: rates[:nq]) * scales
+
+    def there(x: np.ndarray) -> np.ndarray:
+        moved = y.copy()
+        moved[:nq] += ways @ x
+        return project(engine, moved)
+
+    def fraction(x: np.ndarray) -> float:
+        return _depth(engine, there(x), contact) / depth
+
+    box = [(-HALF_WIDTH, HALF_WIDTH)] * len(scales)
+    least = minimize(fraction, np.zeros(len(scales)), method="L-BFGS-B", bounds=box, options=OPTIONS)
+    return there(least.x), float(least.fun) * depth
+
+
+def _depth(engine: Engine, y: np.ndarray, contact: int) -> float:
+    """How deep the contact is [m]."""
+    engine.attempt(y, engine.start)
+    return -float(engine.table(m.TOUCH)["gap"][contact])

@@ -16,6 +16,7 @@ from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Observed
 from flexclear.pipeline.dynamics.model.model import Model
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
+from flexclear.pipeline.dynamics.run.refusals.reach import preserved
 
 #: displacement of a point in its body frame, as fraction of the body's length, above which linear modes are doubted
 BENT = 0.05
@@ -79,21 +80,14 @@ def warnings(model: Model, time: np.ndarray, seen: Observed) -> list[str]:
 
 def doubts(engine: Engine) -> list[str]:
     """The same of the state that the engine's last step came to; the engine is left as it was."""
-    before = engine.w.copy(), engine.n.copy()
-    # the last evaluation may be of a step that was rejected, at speeds that the motion never had
-    engine.attempt(engine.view(m.Y).copy(), float(engine.control[m.TIME]))
-    sentences = _doubts(engine)
-    engine.w[:], engine.n[:] = before
-    return sentences
-
-
-def _doubts(engine: Engine) -> list[str]:
-    coordinates, frames = engine.view(m.Y)[None, : engine.model.nq], engine.table(m.LINK_FRAMES)[None]
-    finite = np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.place)))
-    if not finite:
-        return []
-    time = engine.control[m.TIME : m.TIME + 1]
-    return [text for body in flexibles(engine.model) for text in _judged(body, time, coordinates, frames)]
+    with preserved(engine):
+        # the last evaluation may be of a step that was rejected, at speeds that the motion never had
+        engine.attempt(engine.view(m.Y).copy(), float(engine.control[m.TIME]))
+        coordinates, frames = engine.view(m.Y)[None, : engine.model.nq], engine.table(m.LINK_FRAMES)[None]
+        if not (np.all(np.isfinite(coordinates)) and np.all(np.isfinite(engine.view(m.LINK_FRAMES.place)))):
+            return []
+        time = engine.control[m.TIME : m.TIME + 1]
+        return [text for body in flexibles(engine.model) for text in _judged(body, time, coordinates, frames)]
 
 
 def _judged(body: Flexible, time: np.ndarray, coordinates: np.ndarray, frames: np.ndarray) -> Iterator[str]:

@@ -21,9 +21,11 @@ from numpy.polynomial import chebyshev
 from flexclear.pipeline.core.numerics.rotations import continued
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.equations.observation import Blocks
+from flexclear.pipeline.dynamics.integrate import recording
 from flexclear.pipeline.dynamics.run.evaluation.engine import Engine
 from flexclear.pipeline.dynamics.run.evaluation.observation import ROUNDING as CLOSED
 from flexclear.pipeline.dynamics.run.evaluation.observation import observe_with
+from flexclear.pipeline.dynamics.run.states import rows_of
 
 #: points of the polynomial; the end is one of them, the start is not
 POINTS = m.COLLOCATION_ROWS - 1
@@ -61,16 +63,11 @@ SIDES, WEIGHTS = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0]), np.array([1.0, -6.
 
 @dataclass(frozen=True)
 class Collocation:
-    """A polynomial motion. start, span [s]; series: Chebyshev coefficients of the state, (COLLOCATION_ROWS, n).
-
-    independence: of the closure rows at its end.  evaluations: what it took.
-    """
+    """A polynomial motion. start, span [s]; series: Chebyshev coefficients of the state, (COLLOCATION_ROWS, n)."""
 
     start: float
     span: float
     series: np.ndarray
-    independence: np.ndarray
-    evaluations: int
 
     @property
     def end(self) -> float:
@@ -80,6 +77,12 @@ class Collocation:
     def states(self, times: np.ndarray) -> np.ndarray:
         """States at times [s], shape (len(times), n)."""
         return np.asarray(chebyshev.chebval(2.0 * (np.asarray(times) - self.start) / self.span - 1.0, self.series).T)
+
+    def lay(self, engine: Engine) -> None:
+        """Leave it ready for the stepper, whose state is then that of its start."""
+        engine.view(m.Y)[:] = self.states(np.array([self.start]))[0]
+        engine.view(m.COLLOCATION)[:] = self.series.ravel()
+        engine.control[m.COLLOCATED] = self.span
 
 
 @dataclass(frozen=True)
@@ -107,23 +110,21 @@ class Sampler:
     """Evaluates closed states with the laws and contacts in force; `restore` leaves the engine as it was."""
 
     def __init__(self, engine: Engine) -> None:
-        self.engine, self.evaluations, contacts = engine, 0, len(engine.model.contacts)
+        self.engine, self.evaluations, contacts = engine, 0, slice(len(engine.model.contacts))
         laws = engine.model.arrays.size(m.N_LAWS)
         self._pieces = engine.n[engine.n[m.ACTIVE] :][:laws].copy()
-        self._row = m.empty_record(1, contacts, engine.model.ny)
-        record = m.record(self._row, contacts)
-        record.modes[:], record.latched[:] = engine.modes, engine.latched
+        self._contacts = engine.modes[contacts].copy(), engine.latched[contacts].copy()
         self._kept = engine.w.copy(), engine.n.copy()
 
     def restore(self) -> None:
-        """Put the engine's memory back."""
+        """Put the engine's memory back, but for the number of evaluations."""
         self.engine.w[:], self.engine.n[:] = self._kept
+        self.engine.n[m.EVALUATIONS] += self.evaluations
 
     def closed(self, t: float, y: np.ndarray) -> tuple[np.ndarray, bool]:
         """The state nearest to y with its loops closed, and whether there is one."""
-        record = m.record(self._row, len(self.engine.model.contacts))
-        record.time[:], record.state[:] = t, y
-        seen = observe_with(self.engine, self._row, self._pieces[None, :], CLOSED)
+        row = rows_of(self.engine, y[None], t, *self._contacts)
+        seen = observe_with(self.engine, row, self._pieces[None, :], CLOSED)
         self.evaluations += 2
         return seen["state"][0].copy(), bool(seen["status"][0, 0] == m.OK)
 
@@ -144,24 +145,17 @@ class Sampler:
 
 
 def collocate(
-    sampler: Sampler,
-    t: float,
-    y: np.ndarray,
-    span: float,
-    slope: np.ndarray | None,
-    lead: Lead | None = None,
-    fraction: float = 1.0,
+    sampler: Sampler, t: float, y: np.ndarray, span: float, begin: np.ndarray | Lead, fraction: float = 1.0
 ) -> Collocation | None:
     """The motion over a span from a closed state; None where there is no smooth one, or none that is resolved.
 
-    slope: at the start; None in a singular pose, where there is none.  lead: what to begin with there; without it the
-    state's own speeds lead.  fraction: what a closure row has left of its most at the ends; rounding follows its
-    square.
+    begin: the slope at the start; in a singular pose, which has none, what leads out of it.  fraction: what a closure
+    row has left of its most at the ends; rounding follows its square.
     """
-    began = sampler.evaluations
-    samples = _march(sampler, t, y, span, slope, lead)
+    lead = begin if isinstance(begin, Lead) else None
+    samples = _march(sampler, t, y, span, begin)
     used = _far_from_singular(samples, LEAST_INDEPENDENCE)
-    if slope is not None and used.sum() < POINTS - MANY_POINTS:
+    if lead is None and used.sum() < POINTS - MANY_POINTS:
         used = _far_from_singular(samples, LEAST_WHERE_SLOW)
     if used.sum() < FEWEST_POINTS:
         return None
@@ -180,7 +174,7 @@ def collocate(
             return None
         y = better
     series = _series(nodes, slopes, y, span)
-    made = Collocation(t, span, series, evaluated[-1].independence, sampler.evaluations - began)
+    made = Collocation(t, span, series)
     unresolved = _sensitivity(nodes, slopes, span, blur * size)
     sound = (
         left <= POLYNOMIAL_ERROR and unresolved <= SENSITIVE and _open(sampler, made, nodes) <= blur * POLYNOMIAL_ERROR
@@ -222,24 +216,13 @@ def _speeds_at_start(engine: Engine, y: np.ndarray, nodes: np.ndarray, closed: l
     return better
 
 
-def _march(
-    sampler: Sampler,
-    t: float,
-    y: np.ndarray,
-    span: float,
-    slope: np.ndarray | None,
-    lead: Lead | None,
-) -> list[Sample]:
+def _march(sampler: Sampler, t: float, y: np.ndarray, span: float, begin: np.ndarray | Lead) -> list[Sample]:
     """What there is at the nodes, each state predicted by the polynomial through the slopes before it."""
-    nq, flat = sampler.engine.model.nq, np.zeros(len(y))
-    if slope is None:
-        sampler.attempt(t, y)
-        flat[:nq] = sampler.slope()[:nq]
-    nodes, slopes = ([0.0], [slope]) if slope is not None else ([], [])
+    nodes, slopes = ([], []) if isinstance(begin, Lead) else ([0.0], [begin])
     samples = list[Sample]()
     for x in NODES:
-        if slope is None and len(nodes) < LED:
-            state = lead.state(t + x * span) if lead is not None else y + x * span * flat
+        if isinstance(begin, Lead) and len(nodes) < LED:
+            state = begin.state(t + x * span)
         else:
             state = y + span * (_integrals(np.array(nodes), np.array([x]))[0] @ np.array(slopes))
         samples.append(sampler.sample(t + x * span, state))
@@ -312,7 +295,7 @@ def _open(sampler: Sampler, made: Collocation, nodes: np.ndarray) -> float:
 
 def blurred(engine: Engine, row: np.ndarray, clear: float = CLEAR) -> bool:
     """Whether a row of the record is so close to a singular pose that its accelerations and forces are rounding."""
-    one = m.record(row[None], len(engine.model.contacts))
+    one = recording.record(row[None], len(engine.model.contacts))
     seen = engine.attempt(one.state[0], float(one.time[0]))
     return not seen or float(engine.view(m.PIVOT)[m.LAST_PIVOT]) < clear
 
@@ -329,7 +312,7 @@ def observe_around(engine: Engine, row: np.ndarray, motion: Collocation, clear: 
     pieces = np.tile(engine.pieces[engine.segments(0.5 * (motion.start + motion.end), after=True)], (len(SIDES), 1))
     for k in range(DISTANCE_TRIES):
         rows = np.tile(row, (len(SIDES), 1))
-        rows_around = m.record(rows, len(engine.model.contacts))
+        rows_around = recording.record(rows, len(engine.model.contacts))
         rows_around.time[:] += FIRST_DISTANCE * motion.span * WIDER**k * SIDES
         rows_around.state[:] = motion.states(rows_around.time)
         if not any(blurred(engine, side, clear) for side in rows):

@@ -64,16 +64,13 @@ def lay_over(engine: Engine) -> tuple[Collocation | None, tuple[Pass, ...]]:
     made, reach = _over(sampler, t, y, slope) if slope is not None else (_out(sampler, t, y), 0.0)
     passes = passes_of(sampler, made) if made is not None else ()
     sampler.restore()
-    engine.n[m.EVALUATIONS] += sampler.evaluations
     control[m.REACH] = control[m.MOST_REACH] = reach
     if made is None:
         text = beyond_reach(engine) if control[m.LEFT] < OBVIOUS else ""
         if text:
             raise SolverError(text)
         return None, ()
-    engine.view(m.Y)[:] = made.states(np.array([t]))[0]
-    engine.view(m.COLLOCATION)[:] = made.series.ravel()
-    control[m.COLLOCATED] = made.span
+    made.lay(engine)
     return made, passes
 
 
@@ -97,7 +94,6 @@ def foresee_at_start(engine: Engine) -> bool:
     back = BACKWARD_STEP / fastest if fastest > 0.0 else np.inf
     before = sampler.sample(t - back, here.y - back * here.slope) if here.sound and fastest > 0.0 else here
     sampler.restore()
-    engine.n[m.EVALUATIONS] += sampler.evaluations
     fall = before.independence - here.independence
     falling = fall > 0.0
     ahead = back * float(np.min(here.independence[falling] / fall[falling], initial=np.inf))
@@ -131,7 +127,7 @@ def _out(sampler: Sampler, t: float, y: np.ndarray) -> Collocation | None:
     fastest = float(np.max(np.abs(rate / sampler.engine.model.state_scales), initial=0.0))
     lead = Lead(lambda at: y + (at - t) * rate, TURNING_BACK)
     for k in range(REACH_HALVINGS if fastest > 0.0 else 0):
-        made = collocate(sampler, t, y, _within(sampler, t, FIRST_REACH / fastest * 0.5**k), None, lead)
+        made = collocate(sampler, t, y, _within(sampler, t, FIRST_REACH / fastest * 0.5**k), lead)
         if made is not None:
             return made
     return None

@@ -10,7 +10,6 @@ import scipy.sparse as sp
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.schema import MATRICES, conform
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.exchange import files
 from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS, Contents, Table
@@ -103,7 +102,7 @@ def _frames(recipe: MatricesRecipe, table: Table, position: np.ndarray, path: st
         nodes += list(chosen)
         frames += [k] * len(chosen)
         origins.append(np.mean([position[table.node == node][0] for node in chosen], axis=0))
-        rotations.append(quaternion_to_matrix(frame.orientation().as_quaternion()))
+        rotations.append(frame.orientation())
     return {
         "frame": (("frame",), list(recipe.frames)),
         "frame_position": (("frame", "axis"), np.array(origins)),

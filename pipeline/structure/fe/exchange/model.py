@@ -13,10 +13,10 @@ import xarray as xr
 from flexclear.pipeline.core.system.errors import InputError, SolverError
 from flexclear.pipeline.structure.fe.exchange import lumped
 from flexclear.pipeline.structure.fe.exchange.files import COMPONENTS
-from flexclear.pipeline.structure.fe.model import Drawn, Families, Integrals, Interface, Model, rigid_motions
+from flexclear.pipeline.structure.fe.model import Drawn, Integrals, Interface, Model, rigid_motions
 from flexclear.pipeline.structure.fe.slices import integrate
 from flexclear.pipeline.structure.fe.solid import ties
-from flexclear.pipeline.structure.fe.solid.model import FAMILIES, MEMBER, integrals
+from flexclear.pipeline.structure.fe.solid.model import families, integrals
 from flexclear.pipeline.structure.sparse.multifrontal import cholesky
 
 WHERE = "mesh recipe [shape]"
@@ -43,7 +43,7 @@ def assemble(mesh: xr.Dataset) -> Model:
         interfaces=interfaces,
         ends=tuple(frame for name in names[:2] for frame in interfaces if frame.name == name),
         integrate=_integrate(mesh, M, component),
-        families=_families(positions, component),
+        families=families(positions, component),
         drawn=_drawn(mesh, component),
     )
 
@@ -152,17 +152,6 @@ def _unknown(node: np.ndarray, component: np.ndarray, number: int, requested: in
             f"mesh recipe [frames.{frame}]", f"node {number} has {len(indices)} unknowns {COMPONENTS[requested]}"
         )
     return int(indices[0])
-
-
-def _families(positions: np.ndarray, component: np.ndarray) -> Families:
-    member = np.zeros(len(positions), dtype=np.int64)
-    for rank, name in enumerate(FAMILIES):
-        member[np.isin(component, MEMBER[name])] = rank
-    main = tuple(np.flatnonzero(component == MEMBER[name][0]) for name in FAMILIES)
-    extent = np.ptp(positions, axis=0)
-    along = positions[:, int(np.argmax(extent))]
-    local = sp.eye_array(len(positions), format="csr")
-    return Families(FAMILIES, sp.csr_array(local), member, main, (along - along.min()) / extent.max())
 
 
 def _drawn(mesh: xr.Dataset, component: np.ndarray) -> Drawn:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from flexclear.pipeline.core.scene.fields import Part
-from flexclear.pipeline.structure.fe.recipe_parts import TurnedFrame, check_interfaces
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, TurnedFrame
 
 
 class Matrices(Part):
@@ -15,16 +15,19 @@ class Matrices(Part):
 
     Either `file`, an npz as `exchange.files.write_npz` makes it, or `stiffness` and `mass` (MatrixMarket) and
     `unknowns` (CSV with the columns node, x, y, z, component, one line per row of the matrices).
-    units: the consistent system of all numbers in the files; a file does not say. Paths are relative to the recipe.
-    file: npz with everything.  stiffness, mass: MatrixMarket files.  unknowns: CSV table of the rows.
     """
 
     type: Literal["matrices"]
     units: Literal["m-kg-s", "mm-t-s", "mm-kg-ms"]
+    """the consistent system of all numbers in the files; a file does not say. Paths are relative to the recipe"""
     file: str | None = None
+    """npz with everything"""
     stiffness: str | None = None
+    """MatrixMarket files"""
     mass: str | None = None
+    """MatrixMarket files"""
     unknowns: str | None = None
+    """CSV table of the rows"""
 
     @model_validator(mode="after")
     def _one_way(self) -> Matrices:
@@ -35,13 +38,12 @@ class Matrices(Part):
 
 
 class NodeFrame(TurnedFrame):
-    """A named frame at a node with six unknowns, or following the mean motion of several nodes (RBE3, equal weights).
-
-    node, nodes: numbers from the table of unknowns.
-    """
+    """A named frame at a node with six unknowns, or following the mean motion of several (RBE3, equal weights)."""
 
     node: int | None = None
+    """number from the table of unknowns"""
     nodes: tuple[int, ...] = ()
+    """numbers from the table of unknowns"""
 
     @model_validator(mode="after")
     def _one_way(self) -> NodeFrame:
@@ -50,18 +52,10 @@ class NodeFrame(TurnedFrame):
         return self
 
 
-class MatricesRecipe(Part):
-    """A body given by its matrices. interfaces: frames at which the body is joined to others.
+class MatricesRecipe(BodyRecipe):
+    """A body given by its matrices."""
 
-    title: what the body is, in words.  shape: files of the matrices.  frames: named frames and their nodes.
-    """
-
-    title: str = ""
     shape: Matrices
+    """files of the matrices"""
     frames: Annotated[dict[str, NodeFrame], Field(min_length=1)]
-    interfaces: tuple[str, ...] = ()
-
-    @model_validator(mode="after")
-    def _known(self) -> MatricesRecipe:
-        check_interfaces(self.interfaces, self.frames)
-        return self
+    """named frames and their nodes"""

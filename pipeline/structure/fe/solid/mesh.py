@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 
 from flexclear.pipeline.core.artifacts.schema import SOLID, conform
-from flexclear.pipeline.core.numerics.rotations import quaternion_to_matrix
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.solid import geometry as geometries
 from flexclear.pipeline.structure.fe.solid import imported, ties
@@ -107,7 +106,7 @@ def _frames(recipe: SolidRecipe, geometry: Geometry, path: str) -> dict[str, Any
         columns["weight"].append(weight)
         columns["frame"].append(np.full(len(nodes), k))
         columns["position"].append(ties.centre(x, weight) if frame.position is None else np.array(frame.position))
-        columns["rotation"].append(quaternion_to_matrix(frame.orientation().as_quaternion()))
+        columns["rotation"].append(frame.orientation())
     return {
         "frame": (("frame",), names),
         "frame_tie": (("frame",), [frame.tie for frame in recipe.frames.values()]),

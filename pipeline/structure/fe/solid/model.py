@@ -50,7 +50,7 @@ def assemble(mesh: xr.Dataset) -> Model:
         interfaces=interfaces,
         ends=ends,
         integrate=partial(integrals, line, solid.nodes, T),
-        families=_families(unknowns),
+        families=families(unknowns.position, unknowns.component),
         drawn=_drawn(mesh, T),
     )
 
@@ -130,15 +130,16 @@ def _interfaces(mesh: xr.Dataset, unknowns: Unknowns) -> tuple[Interface, ...]:
     return tuple(interfaces)
 
 
-def _families(unknowns: Unknowns) -> Families:
-    size = len(unknowns.position)
-    member = np.empty(size, dtype=np.int64)
+def families(position: np.ndarray, component: np.ndarray) -> Families:
+    """Those of unknowns along x, y and z, of position (ndof, 3) [m] and component 0 .. 5, or more, (ndof,)."""
+    member = np.zeros(len(position), dtype=np.int64)
     for rank, name in enumerate(FAMILIES):
-        member[np.isin(unknowns.component, MEMBER[name])] = rank
-    main = tuple(np.flatnonzero(unknowns.component == MEMBER[name][0]) for name in FAMILIES)
-    extent = np.ptp(unknowns.position, axis=0)
-    along = unknowns.position[:, int(np.argmax(extent))]
-    return Families(FAMILIES, sp.eye_array(size, format="csr"), member, main, (along - along.min()) / extent.max())
+        member[np.isin(component, MEMBER[name])] = rank
+    main = tuple(np.flatnonzero(component == MEMBER[name][0]) for name in FAMILIES)
+    extent = np.ptp(position, axis=0)
+    along = position[:, int(np.argmax(extent))]
+    local = sp.csr_array(sp.eye_array(len(position), format="csr"))
+    return Families(FAMILIES, local, member, main, (along - along.min()) / extent.max())
 
 
 def surface(mesh: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:

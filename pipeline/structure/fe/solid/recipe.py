@@ -7,46 +7,47 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, model_validator
 
 from flexclear.pipeline.core.scene.fields import Direction, Length, Part, Position
-from flexclear.pipeline.structure.fe.recipe_parts import Isotropic, Positive, TurnedFrame, check_interfaces
+from flexclear.pipeline.structure.fe.recipe_parts import BodyRecipe, Isotropic, Positive, TurnedFrame
 
 Cells = Annotated[int, Field(ge=1, le=1000)]
 ElementName = Literal["hex8", "hex20", "hex27", "tet4", "tet10"]
 
 
 class CylinderCells(Part):
-    """Numbers of cells: along the axis, along a side of the section's square core, and rings around the core.
-
-    along, across, rings: cells along the axis, along a side of the core, and rings around it.
-    """
+    """Numbers of cells: along the axis, along a side of the section's square core, and rings around the core."""
 
     along: Cells
+    """cells along the axis, along a side of the core, and rings around it"""
     across: Cells
+    """cells along the axis, along a side of the core, and rings around it"""
     rings: Cells
+    """cells along the axis, along a side of the core, and rings around it"""
 
 
 class Cylinder(Part):
-    """A round rod along x of the mesh frame, from x = 0 to `length`. Regions: body, start, end, side.
-
-    radius, length: of the rod.  cells: how it is cut.  element: type of the cells.
-    """
+    """A round rod along x of the mesh frame, from x = 0 to `length`. Regions: body, start, end, side."""
 
     type: Literal["cylinder"]
     radius: Annotated[Length, Positive]
+    """of the rod"""
     length: Annotated[Length, Positive]
+    """of the rod"""
     cells: CylinderCells
+    """how it is cut"""
     element: ElementName = "hex27"
+    """type of the cells"""
 
 
 class Block(Part):
-    """A box from x = 0 to size[0], centred in y and z. Regions: body, start (x = 0), end, side.
-
-    size: lengths along x, y, z.  cells: numbers along x, y, z.  element: type of the cells.
-    """
+    """A box from x = 0 to size[0], centred in y and z. Regions: body, start (x = 0), end, side."""
 
     type: Literal["block"]
     size: Position
+    """lengths along x, y, z"""
     cells: tuple[Cells, Cells, Cells]
+    """numbers along x, y, z"""
     element: ElementName = "hex27"
+    """type of the cells"""
 
     @model_validator(mode="after")
     def _has_a_volume(self) -> Block:
@@ -56,15 +57,13 @@ class Block(Part):
 
 
 class MeshFile(Part):
-    """A mesh of tetrahedra or of hexahedra in a file that meshio reads; `file` is relative to the recipe.
-
-    length_unit: unit of the file's coordinates; a file does not say.
-    file: the mesh, relative to the recipe.
-    """
+    """A mesh of tetrahedra or of hexahedra in a file that meshio reads; `file` is relative to the recipe."""
 
     type: Literal["mesh-file"]
     file: str
+    """the mesh, relative to the recipe"""
     length_unit: Literal["m", "cm", "mm", "um", "in"]
+    """unit of the file's coordinates; a file does not say"""
 
 
 def _pointing(direction: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -77,48 +76,47 @@ Pointing = Annotated[Direction, AfterValidator(_pointing)]
 
 
 class Plane(Part):
-    """Nodes on a plane.
-
-    point, normal: a point of the plane and its normal.
-    """
+    """Nodes on a plane."""
 
     point: Position
+    """a point of the plane and its normal"""
     normal: Pointing
+    """a point of the plane and its normal"""
 
 
 class Tube(Part):
-    """Nodes on a cylinder's surface around the line through `point` along `axis`.
-
-    point, axis, radius: a point of the axis, its direction, and the radius.
-    """
+    """Nodes on a cylinder's surface around the line through `point` along `axis`."""
 
     point: Position
+    """a point of the axis, its direction, and the radius"""
     axis: Pointing
+    """a point of the axis, its direction, and the radius"""
     radius: Annotated[Length, Positive]
+    """a point of the axis, its direction, and the radius"""
 
 
 class Sphere(Part):
-    """Nodes on a sphere's surface.
-
-    centre, radius: of the sphere.
-    """
+    """Nodes on a sphere's surface."""
 
     centre: Position
+    """of the sphere"""
     radius: Annotated[Length, Positive]
+    """of the sphere"""
 
 
 class On(Part):
-    """Which nodes a frame is tied to: those of a named region, or on a surface; on the boundary of the body only.
-
-    tolerance: largest distance from the surface; default: 1e-6 of the body's size.
-    region: a named region of the mesh.  plane, cylinder, sphere: a surface.
-    """
+    """Which nodes a frame is tied to: those of a named region, or on a surface; on the boundary of the body only."""
 
     region: str | None = None
+    """a named region of the mesh"""
     plane: Plane | None = None
+    """a surface"""
     cylinder: Tube | None = None
+    """a surface"""
     sphere: Sphere | None = None
+    """a surface"""
     tolerance: Annotated[Length, Positive] | None = None
+    """largest distance from the surface; default: 1e-6 of the body's size"""
 
     @model_validator(mode="after")
     def _one_rule(self) -> On:
@@ -130,36 +128,30 @@ class On(Part):
 
 
 class TiedFrame(TurnedFrame):
-    """A named frame tied to nodes: rigidly (RBE2; they move as one), or to their mean motion (RBE3; they deform).
-
-    position: origin in the mesh frame; default: the centre of the nodes.
-    on: which nodes.  tie: rigid or mean.
-    """
+    """A named frame tied to nodes: rigidly (RBE2; they move as one), or to their mean motion (RBE3; they deform)."""
 
     on: On
+    """which nodes"""
     tie: Literal["rigid", "mean"]
+    """rigid or mean"""
     position: Position | None = None
+    """origin in the mesh frame; default: the centre of the nodes"""
 
 
-class SolidRecipe(Part):
-    """A solid body.
+class SolidRecipe(BodyRecipe):
+    """A solid body."""
 
-    material: of all cells, or materials: by region.
-    interfaces: frames at which the body is joined to others; the first carries the body frame of a Craig-Bampton basis.
-    title: what the body is, in words.  shape: the solid.  materials: elastic constants and density by region.  frames:
-    named frames and their nodes.
-    """
-
-    title: str = ""
     shape: Annotated[Cylinder | Block | MeshFile, Field(discriminator="type")]
+    """the solid"""
     material: Isotropic | None = None
+    """of all cells, or materials: by region"""
     materials: dict[str, Isotropic] = Field(default_factory=dict)
+    """elastic constants and density by region"""
     frames: Annotated[dict[str, TiedFrame], Field(min_length=1)]
-    interfaces: tuple[str, ...] = ()
+    """named frames and their nodes"""
 
     @model_validator(mode="after")
     def _complete(self) -> SolidRecipe:
         if (self.material is None) == (not self.materials):
             raise ValueError("give either `material` for the whole body or `materials` by region")
-        check_interfaces(self.interfaces, self.frames)
         return self

@@ -5,16 +5,11 @@ Source: Shabana, *Dynamics of Multibody Systems*, ch. 5 (reference conditions of
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model
-from flexclear.pipeline.structure.modes.condition import Condition, Given, holding
+from flexclear.pipeline.structure.modes.condition import Condition, Given, holding, joined
 
 
 def condition(model: Model, given: Given) -> Condition:
     """Normal modes with the first interface clamped; InputError without one."""
-    if not given.interfaces:
-        raise InputError(
-            "modes.interfaces", "a cantilever is clamped at an interface", "name one of the recipe's frames"
-        )
-    first = given.interfaces[0]
+    first = joined(given, 1, "a cantilever is clamped at an interface")[0]
     return holding(first.motion, f"the body frame rides on '{first.name}', where all shapes vanish")

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model, rows
-from flexclear.pipeline.structure.modes.condition import Condition, Given, different, holding
+from flexclear.pipeline.structure.modes.condition import Condition, Given, different, holding, joined
 
 
 def condition(model: Model, given: Given) -> Condition:
@@ -18,11 +17,7 @@ def condition(model: Model, given: Given) -> Condition:
 
     Raises InputError without interfaces, and when two are the same.
     """
-    if not given.interfaces:
-        raise InputError(
-            "modes.interfaces", "a Craig-Bampton basis needs at least one interface", "name the recipe's frames"
-        )
-    different(given.interfaces)
+    different(joined(given, 1, "a Craig-Bampton basis needs at least one interface"))
     held = rows(given.interfaces, model.size)
     first = given.interfaces[0].name
     note = f"the body frame rides on '{first}', where all shapes vanish; no rigid motion is left"

@@ -8,16 +8,13 @@ Source: Craig & Chang (1977), NASA CR-2731; Craig & Kurdila (2006), ch. 17.
 
 from __future__ import annotations
 
-from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model, rows
-from flexclear.pipeline.structure.modes.condition import Condition, Given, different, floating
+from flexclear.pipeline.structure.modes.condition import Condition, Given, different, floating, joined
 
 NOTE = "six rigid-body modes were left out; the attachment modes' rigid motion was taken out by mass orthogonality"
 
 
 def condition(model: Model, given: Given) -> Condition:
     """Six attachment modes per interface and normal modes of the free body; InputError without interfaces."""
-    if not given.interfaces:
-        raise InputError("modes.interfaces", "attachment modes need an interface to load", "name the recipe's frames")
-    different(given.interfaces)
+    different(joined(given, 1, "attachment modes need an interface to load"))
     return floating(model, NOTE, rows(given.interfaces, model.size))

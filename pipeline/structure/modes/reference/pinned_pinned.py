@@ -11,16 +11,14 @@ import scipy.sparse as sp
 
 from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.structure.fe.model import Model
-from flexclear.pipeline.structure.modes.condition import Condition, Given, holding
+from flexclear.pipeline.structure.modes.condition import Condition, Given, holding, joined
 
 WHERE = "modes.interfaces"
 
 
 def condition(model: Model, given: Given) -> Condition:
     """Normal modes between two pins; InputError without two interfaces at different points."""
-    if len(given.interfaces) < 2:
-        raise InputError(WHERE, "a pinned-pinned basis needs two interfaces", "name two of the recipe's frames")
-    first, second = given.interfaces[:2]
+    first, second = joined(given, 2, "a pinned-pinned basis needs two interfaces")[:2]
     line = second.position - first.position
     length = float(np.linalg.norm(line))
     if length <= 1e-9 * np.ptp(model.position, axis=0).max():

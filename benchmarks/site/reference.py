@@ -1,0 +1,193 @@
+"""docs/datasets.md: every dataset, variable and coordinate as their schemas say, and recipes for reading them."""
+
+from __future__ import annotations
+
+import inspect
+
+import flexclear as fc
+from benchmarks.page import DOCS
+from benchmarks.site.keys import table
+from flexclear.pipeline.core.artifacts import schema as artifacts
+from flexclear.pipeline.core.artifacts.coordinates import COORDINATES
+from flexclear.pipeline.core.artifacts.schema import Schema
+from flexclear.pipeline.core.scene.output import Variable
+from flexclear.pipeline.core.scene.quantity import CONTACT_REDUCTIONS, KINDS, OWNERS, SERIES, WORDS, Kind
+from flexclear.pipeline.post.sections.verdict import VERDICT
+from flexclear.pipeline.post.single_run.schema import POST
+
+RECIPES = DOCS / "examples" / "datasets"
+#: datasets in the order of their making: heading, where the file is, schema
+DATASETS: dict[str, tuple[str, Schema]] = {
+    "Run": ("`run.nc`, from `flexclear run` and `flexclear.run`", artifacts.RUN),
+    "What follows from a run": ("`post.nc`", POST),
+    "Ensemble": ("`ensemble.nc`, of scenes with `[ensemble]`", artifacts.ENSEMBLE),
+    "Equilibrium": ("from `flexclear.equilibrium`", artifacts.EQUILIBRIUM),
+    "Vibrations": (
+        "from `flexclear frequencies`; it has the variables of an equilibrium as well, and as attribute `growth` the "
+        "largest rate [1/s] at which a small motion grows, 0 where the state is stable",
+        artifacts.LINEAR,
+    ),
+    "Campbell diagram": ("from `flexclear frequencies --speeds`", artifacts.CAMPBELL),
+    "Sections": ("from `flexclear sections`", artifacts.SECTIONS),
+    "Verdict": ("from `flexclear sections`", VERDICT),
+    "Reduced body": ("`bundle/<body>.nc`", artifacts.BUNDLE),
+    "Modes": ("`modes/<body>.nc`", artifacts.MODES),
+    "Mesh of a beam": ("`mesh/<body>.nc`", artifacts.MESH),
+    "Mesh of a solid": ("`mesh/<body>.nc`", artifacts.SOLID),
+    "Matrices of another program": ("`mesh/<body>.nc`", artifacts.MATRICES),
+    "Rigid body of a mesh": ("kept in the cache alone, for bodies of the type rigid with a mesh", artifacts.RIGID),
+}
+DATASETS_HEAD = """# Datasets
+
+Results are NetCDF-4 files that follow the CF conventions, and xarray datasets in Python. Dimensions have coordinates
+with names, so that values are selected by the name of a body, joint, mode or contact. Units are SI, written as UDUNITS
+reads them. This page is written from the schemas that every dataset is checked against (`python -m benchmarks.site`);
+the recipes run as tests.
+
+- **Units of entries.** Where some entries of a variable slide and others turn, as drives do, the variable has no
+  attribute `units`; the coordinate `<variable>_units` then gives the unit of each entry. Where all are of one kind, the
+  attribute is there and the coordinate is not. The coordinate `<dimension>_motion` says which are which.
+- **Modal coordinates** belong to shapes with a modal mass of 1 kg, so that they have the unit m. (Texts that write
+  sqrt(kg) m for mass-normalised modes mean the same numbers.)
+- **Times.** The rows of a run are the regular outputs, and besides them breaks of drives, events and the deepest points
+  of contacts.
+- **Attributes.** `title`; `source`, the version that made the file; `references`, publications of the methods that
+  the scene's parts represent; `parameters` of the scene as JSON; `versions` of libraries; `warnings`. `sources` and
+  `assumptions`, where the values of the scene and of its recipes come from, are attributes of post.nc and of what
+  `flexclear.run` returns, so that another sentence there runs nothing again. No file holds the time or the machine of
+  its making: equal inputs give equal bytes.
+- **Marked `*`:** variables that are there only when the scene has such a part.
+"""
+
+
+def datasets() -> str:
+    """The page."""
+    parts = [
+        DATASETS_HEAD,
+        "## Recipes\n\n",
+        *(_recipe(path.read_text(encoding="utf-8")) for path in sorted(RECIPES.glob("*.py"))),
+    ]
+    known: set[str] = set()
+    for heading, (where, schema) in DATASETS.items():
+        own = {name: v for name, v in schema.items() if heading != "Vibrations" or name not in artifacts.EQUILIBRIUM}
+        parts.append(f"## {heading}\n\n{where[0].upper()}{where[1:]}.\n\n{_table(own)}\n\n")
+        known |= set(schema)
+    parts.append(
+        f"## Coordinates\n\nThe same names mean the same in all datasets.\n\n{_table(COORDINATES, marks=False)}\n"
+    )
+    return "".join(parts)
+
+
+def _recipe(source: str) -> str:
+    title, _, code = source.removeprefix('"""').partition('"""\n')
+    return f"### {title.removesuffix('.')}\n\n```python\n{code.strip()}\n```\n\n"
+
+
+def _table(schema: Schema, *, marks: bool = True) -> str:
+    rows = [
+        (f"`{name}`{'*' if marks and v.optional else ''}", ", ".join(v.dims) or "-", _units(v), v.long_name)
+        for name, v in schema.items()
+    ]
+    return table(("name", "dimensions", "unit", "meaning"), rows)
+
+
+def _units(variable: Variable) -> str:
+    if not variable.units:
+        return "words"
+    return f"{variable.units}; {variable.turning} where it turns" if variable.turning else variable.units
+
+
+QUANTITIES = """# Quantities
+
+What a run holds over time has a name. The same name is watched (`[view] watch`), compared, planned, filmed,
+asked for in `[accuracy]` and read from a run. Sweeps record it with a reduction behind it (`keep`), also once in each
+period:
+
+```python
+import flexclear as fc
+
+run = fc.run("slider_crank.toml")
+fc.quantity(run, "slider.acceleration.x")  # over time, with its unit
+fc.quantity(run, "force(pin) - force(main)")
+```
+
+- `<owner>.<word>` as in `slider.position`; `slider.position.x` is a component along x, y or z of the world.
+- Where a part is a body and a joint at the same time, the word means the first of the owners below that has it.
+  The second word of the table says which one is meant: `guide.joint_position`.
+- `force(A1)` is another way to write `A1.force`.
+- What belongs to the whole mechanism has no owner: `kinetic`.
+- Expressions have `+ - * / ^`, parentheses, numbers with units, the time `t` and the functions `max`, `min`, `abs`,
+  `sqrt`, `sin`, `cos`, `tan`, `exp`, `log`, `sign`, `step` (1 from zero on) and `norm`, the magnitude, with spaces
+  around + and -: `max(0, slider.position.x - 10 mm)^1.5`. Units are checked; a bare 0 fits every unit.
+  As keys of `[accuracy]` they are quoted.
+- A relative accuracy refers to the largest change since the start (lengths and angles) or to the largest magnitude (all
+  others). An absolute one has the unit of the quantity.
+
+This page is written from the schema of runs (`python -m benchmarks.site`).
+
+"""
+
+
+def quantities() -> str:
+    """The page."""
+    parts = [QUANTITIES]
+    for dim, owner in OWNERS.items():
+        rows = [
+            (", ".join(f"`{word}`" for word in _words(key)), " or ".join(dict.fromkeys(kind.units)), _meaning(kind))
+            for key, kind in KINDS.items()
+            if kind.owner == dim and kind.variable
+        ]
+        parts.append(f"## {owner[0].upper()}{owner[1:]}\n\n{table(('word', 'unit', 'meaning'), rows)}\n\n")
+    reductions = [(f"`{name}`", meaning) for name, meaning in SERIES.items()]
+    of_contacts = [
+        (f"`{kind}.{name}`", meaning) for kind, few in CONTACT_REDUCTIONS.items() for name, meaning in few.items()
+    ]
+    parts.append(f"## Reductions, of sweeps\n\n{table(('name', 'meaning'), reductions + of_contacts)}\n")
+    return "".join(parts)
+
+
+def _words(key: str) -> list[str]:
+    return sorted((word for word, keys in WORDS.items() if key in keys), key=lambda word: (len(word), word))
+
+
+def _meaning(kind: Kind) -> str:
+    parts = {"axis": "; x, y, z", "quat": "; a rotation, in radians"}
+    most = "; of all sections the one where it is largest" if kind.owner == "section" else ""
+    return f"{kind.meaning}{parts.get(kind.dim, '')}{most}"
+
+
+PYTHON = """# Python
+
+`import flexclear as fc` brings the functions below. All but `load_scene`, `edited` and `open` bring results up to date
+first: what is fresh comes from the cache. Examples run as tests. What the datasets hold is in
+[datasets.md](../datasets.md), which errors there are at the end of this page.
+
+"""
+PROMISES = """## What stays
+
+Public are the names in `fc.__all__`, the keys of scene files, recipes and sweeps, the commands with their options and
+exit codes, and the variables of [datasets.md](../datasets.md). A release that breaks one of them has a new first
+number. Before that the old name works for at least one release and warns (`DeprecationWarning`, or one line of the
+command), and CHANGELOG.md names what replaces it. Everything else may change with each release, `flexclear.pipeline`
+and `flexclear.stages` included.
+
+## Errors
+
+All are `fc.FlexclearError`: `fc.InputError` where something given is wrong (the message names the place, the value, the
+rule and the remedy), `fc.SolverError` where a computation refuses or gives up (with the time, the part and the reason),
+and `fc.ResourceError` where the machine lacks memory or disk. The command ends with the exit codes 2, 3 and 4 for them.
+"""
+
+
+def python() -> str:
+    """The page."""
+    names = [name for name in fc.__all__ if inspect.isfunction(getattr(fc, name, None))]
+    return PYTHON + "".join(_section(name) for name in names) + PROMISES
+
+
+def _section(name: str) -> str:
+    function = getattr(fc, name)
+    signature = str(inspect.signature(function)).replace("'", "")
+    text, _, example = (inspect.getdoc(function) or "").partition("\n\n>>> ")
+    shown = f"```python\n>>> {example}\n```\n\n" if example else ""
+    return f"## {name}\n\n```python\nfc.{name}{signature}\n```\n\n{text}\n\n{shown}"

@@ -1,0 +1,72 @@
+"""Stiffness of surfaces from radii and materials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from flexclear.pipeline.core.scene.clearance import Clearance, ClearanceRevolute, ClearanceSlot
+
+#: joints whose surfaces meet along a line
+Pin = ClearanceRevolute | ClearanceSlot
+
+
+def given_or(joint: Clearance, exponent: float, published: Mapping[float, Callable[[Any], float]]) -> float:
+    """Stiffness K [N/m^exponent] that the scene gives, or published for the exponent; ValueError where nothing is."""
+    if joint.normal.stiffness is not None:
+        return joint.normal.stiffness
+    if exponent in published:
+        return published[exponent](joint)
+    known = f"exponent{'s' if len(published) > 1 else ''} {' and '.join(f'{one:g}' for one in published)}"
+    raise ValueError(
+        f"radii and materials give the stiffness of the {known}, not of {exponent:g}; "
+        f"give normal.stiffness [N/m^{exponent:g}]"
+    )
+
+
+def compliance(joint: Clearance) -> float:
+    r"""Sum of sigma = (1 - nu^2) / (pi E) [1/Pa] of both surfaces; 1 / (pi times it) is Hertz's E*."""
+    return sum(
+        (1.0 - material.poisson**2) / (math.pi * material.youngs_modulus)
+        for material in joint.materials
+        if material is not None
+    )
+
+
+def sphere_stiffness(joint: Clearance) -> float:
+    r"""Generalised stiffness K [N/m^1.5] of a sphere in a sphere.
+
+    .. math:: K = \frac{4}{3\pi(\sigma_i+\sigma_j)}\sqrt{\frac{R_iR_j}{R_i-R_j}}, \quad
+              \sigma = \frac{1-\nu^2}{\pi E}
+
+    It grows as the clearance to the power -1/2. Holds while the contact's radius is small against
+    the ball's (below about 0.3 of it).
+    Source: Wang & Wang (2019), eq. (26).
+    """
+    return 4.0 / (3.0 * math.pi * compliance(joint)) * math.sqrt(relative_radius(joint))
+
+
+def plane_stiffness(joint: Clearance) -> float:
+    r"""The same [N/m^1.5] of a sphere on a plane: :math:`K = \frac{4}{3\pi(\sigma_i+\sigma_j)}\sqrt{R}`."""
+    return 4.0 / (3.0 * math.pi * compliance(joint)) * math.sqrt(joint.radius)
+
+
+def cylinder_stiffness(joint: Pin) -> float:
+    r"""K [N/m] of two parallel cylinders, or of one on a plane: :math:`K = \tfrac{\pi}{4}E^*L`, whatever the radii."""
+    return joint.length / (4.0 * compliance(joint))
+
+
+def relative_radius(joint: Clearance) -> float:
+    """Radius R_i R_j / (R_i - R_j) [m] of the sphere or cylinder that meets a plane as these two meet."""
+    return (joint.radius + joint.clearance) * joint.radius / joint.clearance
+
+
+def half_width(joint: Pin, radius: float, depth: float, force: float) -> float:
+    r"""Half-width of a pin's contact [m] under a force [N]: :math:`\sqrt{4FR/(\pi E^*L)}` (Hertz).
+
+    Without materials: sqrt(R d), the width that a parabolic gap would leave.  radius: R, relative one of the surfaces.
+    """
+    if None in joint.materials:
+        return math.sqrt(radius * depth)
+    return math.sqrt(4.0 * force * radius * compliance(joint) / joint.length)

@@ -1,0 +1,31 @@
+"""Ball above a plane, which is that of x and y of the outer frame; z points out of the ground towards the ball."""
+
+from __future__ import annotations
+
+import math
+
+from flexclear.pipeline.core.scene.clearance import BallOnPlane
+from flexclear.pipeline.dynamics.contact.hertz import given_or, plane_stiffness
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import ZERO, axis, dot, scale
+
+
+@kernel
+def separation(axes, numbers, p, v):
+    """As `clearance_spherical.separation`; the normal points into the plane."""
+    z = axis(axes, 2)
+    height = dot(z, p)
+    return height - numbers.radius, -dot(z, v), scale(-1.0, z), ZERO, scale(height, z)
+
+
+def stiffness(joint: BallOnPlane, exponent: float) -> float:
+    """K [N/m^exponent], given or of Hertz; ValueError where nothing is published.
+
+    Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
+    """
+    return given_or(joint, exponent, {1.5: plane_stiffness})
+
+
+def contact_size(joint: BallOnPlane, depth: float, force: float) -> float:
+    """Radius of the contact [m] at a penetration [m]: sqrt(R d) (Hertz)."""
+    return math.sqrt(joint.radius * depth)

@@ -1,0 +1,44 @@
+"""Pin in a straight slot with clearance: two walls along x of the slot's frame, and a half circle at each end.
+
+The pin's centre is led by the straight part of the slot's centre line; between its ends the gap is measured across it,
+beyond them from the end. Axial motion and tilt are held as a planar joint holds them (`joints.HELD`).
+
+The walls are planes; the round ends are given their stiffness. Exponent 1.5: K of a sphere on a plane, as is usual for
+revolute joints (see `clearance_revolute`). Exponent 1: a cylinder on a plane.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexclear.pipeline.core.scene.clearance import ClearanceSlot
+from flexclear.pipeline.dynamics.contact.hertz import cylinder_stiffness, given_or, half_width, plane_stiffness
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import axis, dot, radial, scale, sub
+
+
+@kernel
+def separation(axes, numbers, p, v):
+    """As `clearance_spherical.separation`; shape: half the length of the straight part [m]."""
+    x, z, half = axis(axes, 0), axis(axes, 2), numbers.shape[0]
+    across, across_rate = sub(p, scale(dot(z, p), z)), sub(v, scale(dot(z, v), z))
+    along = dot(x, p)
+    if abs(along) <= half:
+        across, across_rate = sub(across, scale(along, x)), sub(across_rate, scale(dot(x, v), x))
+    else:
+        across = sub(across, scale(np.copysign(half, along), x))
+    distance, rate, normal, turning = radial(across, across_rate)
+    return numbers.clearance - distance, rate, normal, turning, across
+
+
+def stiffness(joint: ClearanceSlot, exponent: float) -> float:
+    """K [N/m^exponent], given or as above; ValueError where nothing is published.
+
+    Source: Wang & Wang (2019), eq. (26), with a plane for the socket.
+    """
+    return given_or(joint, exponent, {1.0: cylinder_stiffness, 1.5: plane_stiffness})
+
+
+def contact_size(joint: ClearanceSlot, depth: float, force: float) -> float:
+    """Half-width of the contact [m] under a force [N]."""
+    return half_width(joint, joint.radius, depth, force)

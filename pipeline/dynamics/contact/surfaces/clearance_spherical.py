@@ -1,0 +1,38 @@
+"""Ball in a socket with clearance: the surfaces part along the line of centres, in space.
+
+Nothing but the contact (`contact.forces`) joins the bodies.
+"""
+
+from __future__ import annotations
+
+import math
+
+from flexclear.pipeline.core.scene.clearance import ClearanceSpherical
+from flexclear.pipeline.dynamics.contact.hertz import given_or, relative_radius, sphere_stiffness
+from flexclear.pipeline.dynamics.kernels import kernel
+from flexclear.pipeline.dynamics.vectors import radial
+
+
+@kernel
+def separation(axes, numbers, p, v):
+    """Gap [m], rate of penetration, normal towards the socket, its rate, and the offset that closes the gap.
+
+    p, v: offset of the ball's centre from the socket's, its rate as seen from the socket, world axes.
+    axes: of the socket, world axes.  numbers: of the contact (CONTACT_NUMBERS).
+    Source: Wang & Wang (2019), eqs. (19), (20), (21), (22).
+    """
+    distance, rate, normal, turning = radial(p, v)
+    return numbers.clearance - distance, rate, normal, turning, p
+
+
+def stiffness(joint: ClearanceSpherical, exponent: float) -> float:
+    """K [N/m^exponent], given or of two spheres; ValueError where nothing is published.
+
+    Source: Wang & Wang (2019), eq. (26).
+    """
+    return given_or(joint, exponent, {1.5: sphere_stiffness})
+
+
+def contact_size(joint: ClearanceSpherical, depth: float, force: float) -> float:
+    """Radius of the contact [m] at a penetration [m]: sqrt(R d) (Hertz)."""
+    return math.sqrt(relative_radius(joint) * depth)
