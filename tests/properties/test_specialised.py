@@ -12,6 +12,7 @@ from llvmlite import ir
 
 from flexclear.pipeline.core.scene.load import edited, load_scene
 from flexclear.pipeline.core.scene.schema import Scene
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.core.system.progress import silent
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.compile import compiler_process, files, functions, sources
@@ -25,7 +26,7 @@ from flexclear.pipeline.dynamics.run.evaluation.specialised import settle
 from flexclear.pipeline.dynamics.run.evaluation.start import consistent_start
 from flexclear.pipeline.dynamics.run.run import engine_of
 from flexclear.pipeline.dynamics.run.trajectory import integrate
-from flexclear.pipeline.dynamics.specialise import code
+from flexclear.pipeline.dynamics.specialise import code, straight
 from flexclear.pipeline.dynamics.specialise.code import Emitter
 from flexclear.pipeline.dynamics.specialise.straight import program
 from flexclear.pipeline.dynamics.specialise.trace import Trace
@@ -188,6 +189,13 @@ def test_no_number_is_in_the_code(place: str, value: Any) -> None:
     scene = load_scene(TREE / "scenes/sps4/csj.toml")
     known = place.split(".")[1] in getattr(scene, place.split(".")[0])
     assert not known or source(edited(scene, {place: value})) == source(scene)
+
+
+def test_a_mechanism_whose_code_would_be_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = tabulate(build(load_scene(TREE / "scenes/checks/four_bars_2.toml"), {}))
+    monkeypatch.setattr(straight, "LONGEST", 100)
+    with pytest.raises(InputError, match=r"\[body\], \[joint\]: .* more than 100 operations(.|\n)*hint: use fewer"):
+        straight.straight(rates_kernel(model), wiring(model.arrays, model.arrays.h))
 
 
 def test_laws_of_time_and_integrators_are_not_in_the_code() -> None:

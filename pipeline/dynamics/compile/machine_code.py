@@ -26,6 +26,8 @@ NEVER_REACHED = {
     "numba_runtime_build_excinfo_struct",
     "numba_unpickle",
 }
+#: lines of LLVM's text beyond which its passes over them take too long for what they save
+LONG = 30_000
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,12 @@ def assembled(code: str, level: int = 3) -> tuple[Any, bytes]:
 
     module, features = llvm.parse_assembly(code), llvm.get_host_cpu_features().flatten()
     machine = _target().create_target_machine(llvm.get_host_cpu_name(), features, opt=level, jit=True)
+    if level and code.count("\n") < LONG:
+        module.data_layout = str(machine.target_data)
+        options = llvm.create_pipeline_tuning_options(speed_level=1)
+        options.loop_vectorization = options.slp_vectorization = False
+        passes = llvm.create_pass_builder(machine, options)
+        passes.getModulePassManager().run(module, passes)
     return module, bytes(machine.emit_object(module))
 
 

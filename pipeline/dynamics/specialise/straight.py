@@ -8,18 +8,20 @@ assembles it as it is, in a tenth of the time.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
 
+from flexclear.pipeline.core.system.errors import InputError
 from flexclear.pipeline.dynamics import memory as m
 from flexclear.pipeline.dynamics.specialise import wiring as wired
 from flexclear.pipeline.dynamics.specialise.code import Emitter, Program, loads
-from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, same
+from flexclear.pipeline.dynamics.specialise.tape import FLOAT, INTEGER, UnsuitedError, same
 from flexclear.pipeline.dynamics.specialise.trace import Memory, Trace
 
+#: most operations of an evaluation: code of so many takes minutes and some gigabytes to make
+LONGEST = 1_000_000
 #: stretches of w that the steps read after an evaluation; of ROW_SCALE and SCHUR see `_kept`
 KEPT = {m.TOUCH.place, m.LOAD_BENDS.place, m.RESIDUAL, m.RESIDUAL_RATE, m.PIVOT, wired.RATES}
 KEPT |= {m.NAMED[watched].place for watched in ("bends", "bearing")}
@@ -31,14 +33,14 @@ NAME = "straight"
 
 
 def program(
-    kernel: Callable, wiring: wired.Wiring, *, whole: bool = False, describes: bool = False, longest: float = math.inf
+    kernel: Callable, wiring: wired.Wiring, *, whole: bool = False, describes: bool = False, longest: int = 0
 ) -> Program:
-    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is longer than `longest`.
+    """What the kernel rates(h, f, w, n, y, dy) computes for a wiring; UnsuitedError when it is too long for that.
 
     whole: whether it leaves all in w, or only what steps read.  describes: the kernel is describe(h, f, w, n), of what
-    has been evaluated; all is left.
+    has been evaluated; all is left.  longest: most operations; `LONGEST` when 0.
     """
-    h, trace = wired.header(wiring), Trace(longest)
+    h, trace = wired.header(wiring), Trace(longest or LONGEST)
     w, f, n = Memory(trace, "w", FLOAT), Memory(trace, "f", FLOAT), Memory(trace, "n", INTEGER)
     ground = wired.ground(h)
     w.values.update(ground)
@@ -76,8 +78,17 @@ def straight(
     It is evaluate(h, f, w, n, t, y, dy), which finds the laws at time t first, or where it describes describe(h, f, w,
     n).  whole, describes: see `program`.  exact: it gives what each lane of `abreast` gives, to the last bit; sums in
     any order are faster by a sixth.
+
+    Raises InputError for a mechanism whose code would be too long.
     """
-    tape, module = program(kernel, wiring, whole=whole, describes=describes), ir.Module("straight")
+    try:
+        tape, module = program(kernel, wiring, whole=whole, describes=describes), ir.Module("straight")
+    except UnsuitedError:
+        raise InputError(
+            "[body], [joint]",
+            f"an evaluation of this mechanism has more than {LONGEST} operations, the most that code is made for",
+            "use fewer bodies, joints or modes, or join bodies that need not move against each other by 'fixed' joints",
+        ) from None
     tables = [_INTEGER.as_pointer(), _FLOAT.as_pointer(), _FLOAT.as_pointer(), _INTEGER.as_pointer()]
     more = [] if describes else [_FLOAT, _INTEGER, _INTEGER]
     function = ir.Function(module, ir.FunctionType(_INTEGER, [*tables, *more]), NAME)

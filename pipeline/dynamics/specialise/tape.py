@@ -149,7 +149,7 @@ def operands(item: Any) -> Iterator[Symbol]:
 class Tape:
     """What has been computed; `block` is where the next operation goes."""
 
-    def __init__(self, decide: Callable[[Symbol], bool], longest: float) -> None:
+    def __init__(self, decide: Callable[[Symbol], bool], longest: int) -> None:
         self.decide, self.longest, self.count = decide, longest, 0
         self.block: list[Any] = []
         #: known: operations that have been done on the way to here; scopes: which of them began in each open block

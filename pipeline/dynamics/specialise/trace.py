@@ -68,7 +68,7 @@ class Run:
 class Trace:
     """Writes a tape; `journal` lists stores in their order."""
 
-    def __init__(self, longest: float) -> None:
+    def __init__(self, longest: int) -> None:
         self.tape = Tape(self.decide, longest)
         self.journal: list[Any] = []
         self.runs = [Run([], [])]
