@@ -53,9 +53,8 @@ from flexclear.pipeline.dynamics.vectors import (
 )
 
 #: Newton's iterations for the loads; the change of a load, as a fraction of the largest, at which they end, and below
-#: which
-#: they end when it shrinks no more, near a jam, where rounding grows; in how many strides friction is turned on where
-#: they do not
+#: which they end when it shrinks no more, near a jam, where rounding grows; in how many strides friction is turned on
+#: where they do not
 ITERATIONS, CONVERGED, ROUNDED, STRIDES = 30, 1e-13, 1e-9, 32
 #: what a turn of the search for the loads has come to
 GOES_ON, FOUND, FAILED = 0, 1, 2
@@ -266,8 +265,7 @@ def sign_of(pivot):
 
 @kernel
 def eliminate(A, b, size):
-    """Solve A x = b in place (Gauss, partial pivoting); the sign of det A, and 0, with no solution, where A is
-    singular."""
+    """Solve A x = b in place (Gauss, partial pivoting); the sign of det A, 0 (and no solution) where it is singular."""
     sign = 1.0
     for k in range(size):
         for i in range(k + 1, size):
